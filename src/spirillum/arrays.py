@@ -1,0 +1,31 @@
+"""Shape-typed arrays: one axis of robots (or a single value that holds for all of them) comes first."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+if TYPE_CHECKING:
+    _Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    _Truths = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+else:
+    _Floats = _Truths = np.ndarray
+
+__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Values", "Vectors"]
+
+Values: TypeAlias = Float[_Floats, "*#n"]
+"""Floats of any shape; all of them broadcast against each other."""
+Vectors: TypeAlias = Float[_Floats, "*#n 3"]
+"""Cartesian vectors."""
+PerRobot: TypeAlias = Float[_Floats, "#n"]
+"""One float for each robot, or one for all."""
+Flags: TypeAlias = Bool[_Truths, "#n"]
+"""One truth value for each robot, or one for all."""
+Axial: TypeAlias = Float[_Floats, "#n 4 4"]
+"""Axial resistance of both parts: rows and columns (F_x, T_x; U_x, Omega_x) of body, then of rotor."""
+Matrix6: TypeAlias = Float[_Floats, "#n 6 6"]
+"""Resistance matrix of one rigid part: force then torque against velocity then rotation."""
+Matrix12: TypeAlias = Float[_Floats, "#n 12 12"]
+"""Resistance matrix of both parts: body, then rotor."""

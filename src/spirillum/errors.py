@@ -1,0 +1,28 @@
+"""The one error that a user's input can raise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+__all__ = ["InputError", "did_you_mean"]
+
+
+class InputError(ValueError):
+    """Bad input or usage: one sentence with the field or file, its value, and what is allowed.
+
+    The command line prints the sentence on standard error and exits with code 2.
+
+    Attributes:
+        problems: every problem found, one sentence each; the first is the message.
+    """
+
+    def __init__(self, message: str, problems: Iterable[str] = ()) -> None:
+        self.problems: tuple[str, ...] = tuple(problems) or (message,)
+        super().__init__(message)
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
+    near = get_close_matches(name.lower(), list(allowed), n=1, cutoff=0.5)
+    return f" (did you mean {near[0]}?)" if near else ""

@@ -1,0 +1,119 @@
+"""Reading users' files with care and writing results whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from spirillum.errors import InputError
+
+__all__ = ["output_folder", "parse_toml", "read_text", "read_toml", "whole_file", "write_text"]
+
+_LARGEST_TEXT = 1 << 20
+
+
+def read_text(path: Path, what: str, largest: int = _LARGEST_TEXT) -> str:
+    """Text of a user's file.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        largest: largest size, bytes.
+
+    Raises:
+        InputError: if it is missing, a folder, unreadable, empty, too large, or not UTF-8 text.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; allowed: {what}")
+        if not path.exists():
+            raise InputError(f"{path} does not exist; allowed: {what}")
+        if not path.is_file():
+            raise InputError(f"{path} is not a regular file; allowed: {what}")
+        size = path.stat().st_size
+        if size > largest:
+            raise InputError(f"{path} has {size} bytes; allowed: {what} of at most {largest} bytes")
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not text (byte {error.start} is not UTF-8); allowed: {what}") from error
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InputError(f"{str(path)[:200]!r} cannot be read ({reason}); allowed: {what}") from error
+    if not text.strip():
+        raise InputError(f"{path} is empty; allowed: {what}")
+    return text
+
+
+def parse_toml(text: str, source: str, what: str) -> dict[str, Any]:
+    """Tables of a TOML text.
+
+    Raises:
+        InputError: if it is not TOML; the sentence names source and line.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source} is not TOML: {str(error)[:200]}; allowed: {what}") from error
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"{source} holds values nested too deeply or too long; allowed: {what}") from error
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Tables of a user's TOML file.
+
+    Raises:
+        InputError: as `read_text` and `parse_toml`.
+    """
+    return parse_toml(read_text(path, what), str(path), what)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; when the block ends well it takes the place of `path`.
+
+    Raises:
+        InputError: if the folder cannot be written to.
+    """
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); allowed: a folder you may write to") from error
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        try:
+            temporary.replace(path)
+        except OSError as error:
+            raise InputError(f"{path} cannot be written ({error.strerror}); allowed: a file name") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def output_folder(path: Path) -> Path:
+    """Create the folder for results.
+
+    Raises:
+        InputError: if it is a file or cannot be created.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path} cannot be a folder for results ({error.strerror}); allowed: a new folder") from error
+    return path

@@ -1,0 +1,95 @@
+"""What drives the robot: drive, motor, battery, friction (the paper's Table II)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from spirillum.robot.fields import (
+    BackEmfConstant,
+    Charge,
+    Inductance,
+    InverseCurrent,
+    Rate,
+    Resistance,
+    ResistancePerCurrent,
+    RotaryFriction,
+    Section,
+    Torque,
+    TorqueConstant,
+    Voltage,
+)
+
+__all__ = ["Battery", "Drive", "Friction", "FrictionReading", "Motor", "MotorResistance"]
+
+FrictionReading = Literal["none", "rotor", "body", "paper"]
+
+
+class Drive(Section):
+    """What turns the tail, and the joint between tail and body."""
+
+    kind: Literal["dc-motor", "rate", "torque"]
+    """`dc-motor` (the motor and battery of the file), `rate` or `torque` (prescribed)."""
+    joint: Literal["revolute", "fixed"] = "revolute"
+    """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
+    rate: Rate | None = None
+    """For `rate`: rotation rate of the tail about +x in the lab."""
+    torque: Torque | None = None
+    """For `torque`: torque at the joint before friction; with a fixed joint, external torque on the whole."""
+    duty: Annotated[float, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = 1.0
+    """For `dc-motor`: pulse-width duty of the voltage controller; 1 is full throttle."""
+
+
+class MotorResistance(Section):
+    """Table II: R(I) = constant + decay exp(-decay_rate I) + growth exp(growth_rate I) + slope I."""
+
+    constant: Resistance
+    """Constant term."""
+    decay: Resistance = 0.0
+    """Amplitude of the term that decays with current."""
+    decay_rate: InverseCurrent = 0.0
+    """Rate of that decay."""
+    growth: Resistance = 0.0
+    """Amplitude of the term that grows with current."""
+    growth_rate: InverseCurrent = 0.0
+    """Rate of that growth."""
+    slope: ResistancePerCurrent = 0.0
+    """Slope of the linear term (with its sign)."""
+
+
+class Motor(Section):
+    """The DC-motor of eqs (17) and (18)."""
+
+    torque_constant: TorqueConstant
+    """Torque constant K_m (Table II)."""
+    back_emf_constant: BackEmfConstant
+    """Back-emf constant K_b (Table II)."""
+    inductance: Inductance
+    """Inductance L (Table II)."""
+    rotor_friction: RotaryFriction
+    """Friction B_m of the rotor alone (Table II)."""
+    resistance: MotorResistance
+    """Equivalent resistance R(I) of motor and driver (Table II)."""
+    polarity: Literal["forward", "reverse"] = "forward"
+    """`forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
+
+
+class Battery(Section):
+    """Table II: V(I) = voltage - internal_resistance I at the terminals."""
+
+    voltage: Voltage
+    """Open-circuit voltage."""
+    internal_resistance: Resistance
+    """Voltage lost per current."""
+    capacity: Charge | None = None
+    """Rated charge."""
+
+
+class Friction(Section):
+    """The effective rotary friction of eqs (18) and (19), and how it is read."""
+
+    effective: RotaryFriction | None = None
+    """B_eff, which contains B_m; unset: the rotor's own B_m alone. For the `body` reading: the wall's coefficient B."""
+    reading: FrictionReading = "rotor"
+    """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""

@@ -1,0 +1,258 @@
+"""From a preset or a TOML file, with overrides, to a checked robot."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from spirillum.errors import InputError, did_you_mean
+from spirillum.files import parse_toml, read_toml
+from spirillum.robot.robot import Robot
+
+__all__ = ["load", "load_calibration", "parse_setting", "preset_names", "preset_text", "problems_in", "raw_table"]
+
+_WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
+# A measured mass no longer describes the robot once one of these changes (Table I weighs body and coupling).
+_WEIGHED = {
+    "body": ("shape", "diameter", "length", "front", "rear", "fillet"),
+    "coupling": ("diameter", "length", "clearance"),
+}
+_DEEPEST = 8
+
+
+@lru_cache(maxsize=1)
+def preset_names() -> tuple[str, ...]:
+    """Names of the robots that come with the package."""
+    folder = files("spirillum.robot") / "presets"
+    return tuple(sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def preset_text(name: str) -> str:
+    """The preset's robot file as it stands."""
+    return (files("spirillum.robot") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load(robot: str | Path | Mapping[str, Any] | Robot, **overrides: Any) -> Robot:
+    """Load a robot, apply overrides to its raw tables, and check the whole once.
+
+    Args:
+        robot: a preset's name, a TOML file, or the same tables as a mapping. A checked `Robot` is returned as
+            it is (then without overrides).
+        overrides: dotted fields (``**{"tail.wavelength": "20 mm"}``) or tables
+            (``tail={"wavelength": "20 mm"}``); dimensional values carry their unit.
+
+    Returns:
+        The robot, SI inside, frozen. What is doubtful is in `robot.warnings`.
+
+    Raises:
+        InputError: if the file cannot be read or any field is wrong; `problems` lists every one.
+    """
+    if isinstance(robot, Robot):
+        if overrides:
+            raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
+        return robot
+    table, source = raw_table(robot)
+    touched = _touched(table)
+    table = _extended(table, source)
+    for path, value in overrides.items():
+        _put(table, path.split("."), value, path)
+        touched |= _touched(_nested(path, value))
+    return _checked(table, source, _stale_mass(table, touched))
+
+
+def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
+    """The raw tables of a preset, file or mapping, and what to call it in a sentence."""
+    if isinstance(robot, Mapping):
+        return deepcopy(dict(robot)), "the robot"
+    if isinstance(robot, str) and robot in preset_names():
+        return tomllib.loads(preset_text(robot)), f"preset {robot}"
+    path = Path(robot)
+    if _looks_like_a_name(robot) and not path.exists():
+        presets = ", ".join(preset_names())
+        hint = did_you_mean(str(robot), preset_names())
+        raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
+    return read_toml(path, _WHAT), str(path)
+
+
+def _looks_like_a_name(robot: str | Path) -> bool:
+    return isinstance(robot, str) and re.fullmatch(r"[\w-]{1,99}", robot) is not None
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Split ``PATH=VALUE``; VALUE is read as TOML, else taken as text (a quantity or a word).
+
+    Raises:
+        InputError: if there is no ``=`` or no path.
+    """
+    path, equals, value = text.partition("=")
+    path, value = path.strip(), value.strip()
+    if not equals or not path or not value:
+        raise InputError(f"--set {text[:80]!r} is not PATH=VALUE; for example --set tail.wavelength=20mm")
+    try:
+        return path, parse_toml(f"value = {value}", "--set", "PATH=VALUE")["value"]
+    except InputError:
+        return path, value
+
+
+def load_calibration(path: str | Path) -> dict[str, Any]:
+    """The `[calibration.<model>]` tables of a calibration file, raw.
+
+    Raises:
+        InputError: if the file cannot be read or holds anything else.
+    """
+    what = "a calibration file (TOML with [calibration.<model>] tables)"
+    table = read_toml(Path(path), what)
+    calibration = table.get("calibration")
+    if set(table) != {"calibration"} or not isinstance(calibration, dict) or not calibration:
+        others = ", ".join(sorted(set(table) - {"calibration"})) or "no [calibration.<model>] table"
+        raise InputError(f"{path} holds {others[:100]}; allowed: {what}")
+    return calibration
+
+
+def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:
+    """Lay the table over the preset that its `extends` names."""
+    base = table.pop("extends", None)
+    if base is None:
+        return table
+    if not isinstance(base, str) or base not in preset_names() or depth > 3:
+        hint = did_you_mean(str(base), preset_names())
+        raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {', '.join(preset_names())}")
+    below = _extended(tomllib.loads(preset_text(base)), f"preset {base}", depth + 1)
+    return _merged(below, table)
+
+
+def _merged(below: dict[str, Any], above: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
+    if depth > _DEEPEST:
+        raise InputError("tables are nested more deeply than a robot file's are; see `spirillum schema robot`")
+    for key, value in above.items():
+        if isinstance(value, Mapping) and isinstance(below.get(key), dict):
+            below[key] = _merged(below[key], value, depth + 1)
+        else:
+            below[key] = dict(value) if isinstance(value, Mapping) else value
+    return below
+
+
+def _nested(path: str, value: Any) -> dict[str, Any]:
+    *parents, last = path.split(".")
+    table: dict[str, Any] = {last: value}
+    for name in reversed(parents):
+        table = {name: table}
+    return table
+
+
+def _put(table: dict[str, Any], names: list[str], value: Any, path: str) -> None:
+    """Set one dotted field; a table merges into a table, None takes the field out."""
+    if len(names) > _DEEPEST or not all(names):
+        raise InputError(f"{path[:80]!r} is no field; allowed: a dotted field such as tail.wavelength")
+    for name in names[:-1]:
+        below = table.setdefault(name, {})
+        if not isinstance(below, dict):
+            # `channel = "none"` gives way to `channel.diameter`; other text is left for the check to name.
+            below = table[name] = {}
+        table = below
+    if value is None:
+        table.pop(names[-1], None)
+    elif isinstance(value, Mapping) and isinstance(table.get(names[-1]), dict):
+        table[names[-1]] = _merged(table[names[-1]], value)
+    else:
+        table[names[-1]] = value
+
+
+def _touched(table: Mapping[str, Any]) -> set[str]:
+    return {
+        f"{section}.{name}" for section, entries in table.items() if isinstance(entries, Mapping) for name in entries
+    }
+
+
+def _stale_mass(table: Mapping[str, Any], touched: set[str]) -> tuple[str, ...]:
+    """Warn where a measured mass is older than the geometry that it weighs."""
+    body = table.get("body")
+    if "body.mass" in touched or not isinstance(body, dict) or "mass" not in body:
+        return ()
+    changed = [f"{section}.{name}" for section, names in _WEIGHED.items() for name in names]
+    stale = [field for field in changed if field in touched]
+    if not stale:
+        return ()
+    return (f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew",)
+
+
+def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> Robot:
+    problems = problems_in(Robot, table)
+    if isinstance(problems, Robot):
+        problems._warnings = warnings  # noqa: SLF001 - the private attribute is the loader's to set
+        return problems
+    more = f" (and {len(problems) - 1} more: `spirillum robot check` lists them)" if len(problems) > 1 else ""
+    raise InputError(f"{source}: {problems[0]}{more}", [f"{source}: {problem}" for problem in problems])
+
+
+_M = TypeVar("_M", bound=BaseModel)
+
+
+def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
+    """Check a raw table; return the model, or every problem as a sentence."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        sentences: list[str] = []
+        for problem in error.errors(include_url=False):
+            sentences += _sentences(model, problem)
+        return list(dict.fromkeys(sentences))
+    except RecursionError:
+        return ["its tables are nested too deeply; see `spirillum schema robot`"]
+
+
+def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[str]:
+    """Our sentences for one of pydantic's findings."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    names = [str(name) for name in problem["loc"]]
+    if kind == "assembly":
+        return str(context["sentences"]).split("\n")
+    field = ".".join(names)
+    if kind == "quantity":
+        return [f"{field} {context['sentence']}"]
+    if kind == "missing":
+        return [f"{field} is missing; it has to be given"]
+    if kind == "extra_forbidden":
+        allowed = list(_fields_at(model, names[:-1]))
+        hint = did_you_mean(names[-1][:60], allowed)
+        return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
+    shown = repr(problem.get("input"))
+    shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
+    hint = ""
+    if kind == "literal_error":
+        allowed_words = str(context["expected"])
+        hint = did_you_mean(str(problem["input"])[:60], [word.strip("' ") for word in allowed_words.split(",")])
+    elif kind == "value_error":
+        allowed_words = str(context["error"])
+    elif kind == "model_type":
+        allowed_words = f"a [{field}] table"
+    else:
+        allowed_words = str(problem["msg"]).removeprefix("Input should be ")
+    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {allowed_words}"]
+
+
+def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
+    """Field names of the section that a location leads to."""
+    for name in names:
+        if name in model.model_fields:
+            found = _section(model.model_fields[name].annotation)
+            model = found or model
+    return tuple(model.model_fields)
+
+
+def _section(annotation: Any) -> type[BaseModel] | None:
+    """The section class inside an annotation such as ``Channel | Literal['none']``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in getattr(annotation, "__args__", ()):
+        if (found := _section(part)) is not None:
+            return found
+    return None

@@ -1,0 +1,77 @@
+"""How the models are to be evaluated, and the calibration factors of the paper's Table III."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from spirillum.robot.fields import Factor, Length, Section
+
+__all__ = ["Calibration", "FittedTo", "ModelOptions", "PerrinOptions", "RftOptions", "SbtOptions"]
+
+
+class PerrinOptions(Section):
+    """Options of Perrin's body formulas."""
+
+    spheroid: Literal["inscribed", "equal-volume"] = "inscribed"
+    """Spheroid that stands for a capsule or cylinder: inscribed, or stretched across to the same volume."""
+
+
+class RftOptions(Section):
+    """Options of resistive force theory, eqs (8)-(16)."""
+
+    coefficients: Literal["printed", "gray-hancock", "lighthill", "brennen-winet"] = "printed"
+    """Local resistance coefficients; `brennen-winet` are those near a plane floor."""
+    axis_height: Length | None = None
+    """For `brennen-winet`: height of the tail's axis above the floor; unset: the body's radius (lying on it)."""
+    arc_element: Literal["printed", "true"] = "printed"
+    """Arc element in (12): printed `(l/L_t) dx`, or the true `ds` on the tapered root."""
+    row4: Literal["kept", "zeroed"] = "kept"
+    """Row 4 of the tail's matrix in (15): kept (correct), or zeroed as printed, for comparison."""
+    spin: bool = Field(default=False, strict=True)
+    """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
+
+
+class SbtOptions(Section):
+    """Options of Lighthill's slender-body theory, eqs (1)-(7)."""
+
+    eps_constant: Literal["printed", "exact"] = "printed"
+    """Constant of eps: the printed 2.6, or the exact `pi sqrt(e)/2` = 2.58985."""
+    spin: bool = Field(default=False, strict=True)
+    """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
+
+
+class ModelOptions(Section):
+    """Options of the hydrodynamic models."""
+
+    perrin: PerrinOptions = PerrinOptions()
+    """Body formulas."""
+    rft: RftOptions = RftOptions()
+    """Resistive force theory."""
+    sbt: SbtOptions = SbtOptions()
+    """Slender-body theory."""
+
+
+class FittedTo(Section):
+    """The geometry that a calibration was fitted to; used outside it, the answer warns."""
+
+    channel_diameter: Length
+    """Channel diameter."""
+    body_diameter: Length
+    """Body diameter."""
+    body_length: Length
+    """Body length."""
+
+
+class Calibration(Section):
+    """Factors on the isolated body's Perrin drag for one model (Table III)."""
+
+    body_drag: Factor = 1.0
+    """Factor on the axial translational drag D_x."""
+    body_rotation: Factor = 1.0
+    """Factor on the axial rotational drag E_x."""
+    source: str = Field(min_length=1, max_length=500)
+    """Where the factors come from."""
+    fitted_to: FittedTo
+    """Geometry that they were fitted to."""

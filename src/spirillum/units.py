@@ -1,0 +1,193 @@
+"""Units at the edge: text such as ``"18 mm"`` to SI floats and back.
+
+Inside the package every number is SI with rates in rad/s. pint reads the units, in a registry of our
+own (`units.txt`) where angle is a dimension, because 1 Hz of a rotating part is 2 pi rad/s.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Any
+
+from spirillum.errors import InputError
+
+if TYPE_CHECKING:
+    import pint
+
+__all__ = ["KINDS", "Kind", "parse_quantity", "show", "shown_in"]
+
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
+)
+# Letters, products, quotients and one-digit powers: nothing that could be expensive to read.
+_UNIT = re.compile(r"(?:[^\W\d_]|[ */·().°²³⁻¹]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
+_LONGEST_UNIT = 40
+
+Hz = 2 * math.pi
+"""One turn per second in rad/s."""
+
+_SHOWN: dict[str, float] = {
+    "1": 1.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "m/s": 1.0,
+    "mm/s": 1e-3,
+    "rad/s": 1.0,
+    "Hz": Hz,
+    "kg": 1.0,
+    "g": 1e-3,
+    "N": 1.0,
+    "mN": 1e-3,
+    "N m": 1.0,
+    "mN m": 1e-3,
+    "N m s/rad": 1.0,
+    "W": 1.0,
+    "mW": 1e-3,
+    "A": 1.0,
+    "mA": 1e-3,
+    "V": 1.0,
+    "deg": math.pi / 180,
+    "ml": 1e-6,
+    "mm/turn": 1e-3 / (2 * math.pi),
+    "m/rad": 1.0,
+    "min": 60.0,
+    "%": 1e-2,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of quantity: what it is called, its SI unit, an example, and the range that makes sense.
+
+    The range is generous (micro-swimmers to metre-long models); it stops typing errors and overflow,
+    not unusual robots.
+    """
+
+    name: str
+    unit: str
+    example: str
+    low: str
+    high: str
+    also: str | None = None
+
+    @property
+    def allowed(self) -> str:
+        """The allowed range in words."""
+        return f"{self.low} to {self.high}"
+
+
+KINDS: dict[str, Kind] = {
+    "length": Kind("length", "m", "18 mm", "1 nm", "100 m"),
+    "length or zero": Kind("length", "m", "10 mm", "0 m", "100 m"),
+    "mass": Kind("mass", "kg", "10.7 g", "1e-21 kg", "1e6 kg"),
+    "density": Kind("density", "kg/m**3", "985 kg/m^3", "1e-3 kg/m^3", "1e5 kg/m^3"),
+    "viscosity": Kind("viscosity", "Pa s", "3.5 Pa s", "1e-6 Pa s", "1e6 Pa s"),
+    "rate": Kind("rotation rate", "rad/s", "1.5 Hz", "-1e6 rad/s", "1e6 rad/s"),
+    "torque": Kind("torque", "N m", "0.1 mN m", "-1e6 N m", "1e6 N m"),
+    "rotary friction": Kind("rotary friction", "N m s/rad", "7e-7 N m s/rad", "0 N m s/rad", "1e6 N m s/rad", "N m s"),
+    "voltage": Kind("voltage", "V", "3.7 V", "1e-6 V", "1e4 V"),
+    "resistance": Kind("resistance", "ohm", "10.4 ohm", "0 ohm", "1e6 ohm"),
+    "inductance": Kind("inductance", "H", "0.082 H", "1e-9 H", "1e3 H"),
+    "torque constant": Kind("torque constant", "N m/A", "0.00045 N m/A", "1e-12 N m/A", "1e3 N m/A"),
+    "back-emf constant": Kind("back-emf constant", "V s/rad", "0.004 V s/rad", "0 V s/rad", "1e3 V s/rad", "V s"),
+    "charge": Kind("charge", "C", "70 mA h", "1e-9 C", "1e9 C"),
+    "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
+    "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),
+    "time": Kind("time", "s", "2 s", "0 s", "1e9 s"),
+}
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Any]:
+    import pint
+
+    with as_file(files("spirillum") / "units.txt") as path:
+        return pint.UnitRegistry(filename=str(path), cache_folder=None)
+
+
+@lru_cache(maxsize=512)
+def _factor(unit: str, kind: Kind) -> float:
+    """SI value of one `unit` as a quantity of `kind`.
+
+    Raises:
+        InputError: if `unit` is unknown or measures something else.
+    """
+    hint = f'use a unit of {kind.name}, for example "{kind.example}"'
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise InputError(f'"{_clip(unit)}" is not a unit; {hint}')
+    registry = _registry()
+    try:
+        one = registry.Quantity(1.0, registry.parse_units(unit))
+    except Exception as error:  # pint raises its own kinds and those of Python's tokenizer
+        raise InputError(f'"{unit}" is not a known unit; {hint}') from error
+    for accepted in (kind.unit, kind.also):
+        if accepted is not None and one.is_compatible_with(accepted):
+            return float(one.to(accepted).magnitude)
+    if kind.unit == "rad/s" and one.is_compatible_with("1/s"):
+        raise InputError(f'"{unit}" does not say what turns: write rad/s, Hz, rpm or turn/s')
+    raise InputError(f'"{unit}" is not a unit of {kind.name}; {hint}')
+
+
+def _clip(text: str, longest: int = 60) -> str:
+    return text if len(text) <= longest else f"{text[:longest]}…"
+
+
+def parse_quantity(value: object, kind: Kind) -> float:
+    """Read a quantity such as ``"18 mm"`` or a pint quantity into an SI float.
+
+    Args:
+        value: text with number and unit, or an object with `magnitude` and `units` (pint).
+        kind: what is expected.
+
+    Raises:
+        InputError: if there is no unit, the unit is of another kind, or the number is not finite or out
+            of the allowed range. The sentence starts with the value; the caller puts the field before it.
+    """
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        value = f"{value.magnitude} {value.units}"
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        shown = "a table or list" if isinstance(value, (dict, list)) else _clip(str(value))
+        raise InputError(f'= {shown} is not a {kind.name}; write it with its unit, for example "{kind.example}"')
+    if not isinstance(value, str):
+        number, unit = value if isinstance(value, float) else float(max(-(10**300), min(value, 10**300))), ""
+        shown = f"{value:.6g}" if isinstance(value, float) else _clip(f"{value:d}" if abs(value) < 10**30 else "(huge)")
+    else:
+        found = _QUANTITY.fullmatch(value)
+        shown = f'"{_clip(value)}"'
+        if found is None or len(value) > 200:
+            raise InputError(f'= {shown} is not a {kind.name}; write it with its unit, for example "{kind.example}"')
+        number, unit = float(found["number"]), (found["unit"] or "").strip()
+        unit = f"1{unit}" if unit.startswith("/") else unit
+    if not math.isfinite(number):
+        raise InputError(f"= {shown} is not finite; allowed: {kind.allowed}")
+    if not unit:
+        raise InputError(f'= {shown} has no unit; a {kind.name} needs one, for example "{kind.example}"')
+    try:
+        si = number * _factor(unit, kind)
+    except InputError as error:
+        raise InputError(f"= {shown}: {error}") from error
+    if not _bound(kind.low, kind) <= si <= _bound(kind.high, kind):
+        raise InputError(f"= {shown} is out of range; allowed: {kind.allowed}")
+    return si
+
+
+@lru_cache(maxsize=128)
+def _bound(text: str, kind: Kind) -> float:
+    number, unit = text.split(" ", 1)
+    return float(number) * _factor(unit, kind)
+
+
+def shown_in(value: float, unit: str) -> float:
+    """The SI `value` expressed in a display `unit` (``mm``, ``Hz``, ``mm/s``...)."""
+    return float(value) / _SHOWN[unit]
+
+
+def show(value: float, unit: str) -> str:
+    """Text of an SI `value` in a display `unit`, four significant digits."""
+    number = f"{shown_in(value, unit):.4g}"
+    return number if unit == "1" else f"{number} {unit}"
