@@ -1,0 +1,71 @@
+"""The one question that every hydrodynamic model answers.
+
+A model maps the twists of the two rigid parts, body and rotor, to the wrenches that the fluid exerts:
+(F_body, F_rotor) = -R (V_body, V_rotor), twists about the origin in body axes, R symmetric positive
+definite. A new model is one new file with one class.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit
+
+__all__ = ["PARTS", "ResistanceModel", "SwimmerModel"]
+
+PARTS = ("body", "coupling", "tail", "rotor", "robot")
+"""Parts of a robot: body, coupling, the bare wire, coupling and wire together, and the whole with its joint locked."""
+
+
+class ResistanceModel(ABC):
+    """A model that knows the resistance of some parts of a robot."""
+
+    name: ClassVar[str]
+    """Name on the command line."""
+    title: ClassVar[str]
+    """Name in tables and figures."""
+    references: ClassVar[tuple[str, ...]]
+    """Keys of its references, see `spirillum.citation`."""
+    known_error: ClassVar[str]
+    """What it leaves out, and what that costs."""
+    parts: ClassVar[tuple[str, ...]]
+    """Parts whose matrix it can give."""
+    axial_only: ClassVar[bool] = False
+    """True where only the entries along and about the motor axis are known; the others are NaN."""
+
+    @abstractmethod
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """Requirements of the theory: outside them an answer is NaN in a batch and an `InputError` alone."""
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """Requirements of the theory's accuracy: where they are broken, the answer carries a warning."""
+        return []
+
+    @abstractmethod
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """Resistance of one part alone in the same fluid, about the origin, never calibrated.
+
+        Args:
+            batch: the robots.
+            part: one of `parts`.
+            phase: phase phi of the tail, rad.
+        """
+
+
+class SwimmerModel(ResistanceModel):
+    """A model of body and rotor together, from which the motion follows."""
+
+    @abstractmethod
+    def axial(self, batch: RobotBatch) -> Axial:
+        """R between (U_x, Omega_x) of body and rotor, 4x4: all that motion along the channel needs.
+
+        Asked for directly, never cut from a 12x12, so that a million robots fit into memory. Where it depends
+        on the tail's phase it is the average over a turn.
+        """
+
+    @abstractmethod
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """The full R, 12x12, at a phase of the tail; NaN where the model does not know an entry."""
