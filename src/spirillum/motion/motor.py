@@ -1,0 +1,86 @@
+"""DC-motor and battery: eq. (17) with the current-dependent R(I) and V(I) of Table II.
+
+Everything here is in the motor's own sense: current, rate and back-emf are positive the way that the
+applied voltage drives. The pulse-width controller (400 kHz, far above R/L) is averaged: the motor sees
+duty V(I), the battery gives duty I.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spirillum.arrays import PerRobot
+from spirillum.robot.batch import Electrics
+
+__all__ = ["battery_voltage", "run_time", "steady_current", "winding_resistance"]
+
+
+def winding_resistance(motor: Electrics, current: PerRobot) -> PerRobot:
+    """R(I) of Table II, ohm; takes |I|."""
+    i = np.abs(current)
+    return (
+        motor.constant
+        + motor.decay * np.exp(-motor.decay_rate * i)
+        + motor.growth * np.exp(motor.growth_rate * i)
+        + motor.slope * i
+    )
+
+
+def _resistance_slope(motor: Electrics, i: PerRobot) -> PerRobot:
+    return (
+        -motor.decay * motor.decay_rate * np.exp(-motor.decay_rate * i)
+        + motor.growth * motor.growth_rate * np.exp(motor.growth_rate * i)
+        + motor.slope
+    )
+
+
+def battery_voltage(motor: Electrics, current: PerRobot) -> PerRobot:
+    """V(I) of Table II at the terminals, V; takes |I|."""
+    return motor.voltage - motor.internal_resistance * np.abs(current)
+
+
+def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: PerRobot) -> PerRobot:
+    """Steady root of (17): R(I) I = duty V(I) - (back_emf + back_emf_per_current I).
+
+    Args:
+        motor: motor and battery.
+        back_emf: the part of K_b omega_m that does not depend on the current, V.
+        back_emf_per_current: K_b d(omega_m)/dI of whatever the motor turns, V/A, not negative.
+
+    Returns:
+        The current, A; negative where the tail drives the motor (back-emf above the voltage). It is the
+        single root (the robot file is checked for that), found by Newton steps kept inside a bracket.
+    """
+    open_voltage = motor.duty * motor.voltage - back_emf
+    sense = np.where(open_voltage < 0, -1.0, 1.0)
+    drive = np.abs(open_voltage)
+    linear = back_emf_per_current + sense * motor.duty * motor.internal_resistance
+
+    def excess(i: PerRobot) -> PerRobot:
+        return (winding_resistance(motor, i) + linear) * i - drive
+
+    low = np.zeros(np.broadcast_shapes(drive.shape, linear.shape, motor.constant.shape))
+    i = low + drive / (motor.constant + motor.growth + np.maximum(linear, 0.0))
+    high = 2.0 * i + 1e-12
+    for _ in range(60):
+        short = excess(high) < 0
+        if not np.any(short):
+            break
+        high = np.where(short, 2.0 * high, high)
+    for _ in range(100):
+        f = excess(i)
+        low, high = np.where(f < 0, i, low), np.where(f < 0, high, i)
+        slope = winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i
+        newton = i - f / slope
+        step = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
+        settled = np.abs(step - i) <= 1e-9 * np.abs(i)  # Newton's next error is the square of this step
+        i = step
+        if np.all(settled | ~np.isfinite(f)):
+            break
+    return sense * i
+
+
+def run_time(motor: Electrics, current: PerRobot) -> PerRobot:
+    """Time for which the rated charge lasts at a constant motor current, s; NaN without a rating."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return motor.capacity / (motor.duty * np.abs(current))
