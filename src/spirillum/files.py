@@ -8,11 +8,14 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
 
-__all__ = ["output_folder", "parse_toml", "read_text", "read_toml", "whole_file", "write_text"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["output_folder", "parse_toml", "read_text", "read_toml", "whole_file", "write_dataset", "write_text"]
 
 _LARGEST_TEXT = 1 << 20
 
@@ -87,6 +90,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise InputError(f"{path} cannot be written ({error.strerror}); allowed: a folder you may write to") from error
     os.close(handle)
     temporary = Path(name)
+    temporary.unlink()  # some writers treat a file that is there, even an empty one, as one to add to
     try:
         yield temporary
         mask = os.umask(0)
@@ -104,6 +108,15 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file whole or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """Write NetCDF-4, compressed, whole or not at all."""
+    encoding = {
+        str(name): {"zlib": True, "complevel": 4} for name, variable in dataset.data_vars.items() if variable.ndim > 0
+    }
+    with whole_file(path) as temporary:
+        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
 
 
 def output_folder(path: Path) -> Path:

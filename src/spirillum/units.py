@@ -53,6 +53,7 @@ _SHOWN: dict[str, float] = {
     "V": 1.0,
     "deg": math.pi / 180,
     "ml": 1e-6,
+    "s": 1.0,
     "mm/turn": 1e-3 / (2 * math.pi),
     "m/rad": 1.0,
     "min": 60.0,
@@ -98,6 +99,7 @@ KINDS: dict[str, Kind] = {
     "charge": Kind("charge", "C", "70 mA h", "1e-9 C", "1e9 C"),
     "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
     "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),
+    "angle": Kind("angle", "rad", "90 deg", "-1e6 rad", "1e6 rad"),
     "time": Kind("time", "s", "2 s", "0 s", "1e9 s"),
 }
 
@@ -166,7 +168,7 @@ def parse_quantity(value: object, kind: Kind) -> float:
     if not math.isfinite(number):
         raise InputError(f"= {shown} is not finite; allowed: {kind.allowed}")
     if not unit:
-        raise InputError(f'= {shown} has no unit; a {kind.name} needs one, for example "{kind.example}"')
+        raise InputError(f'= {shown} has no unit; write one, for example "{kind.example}"')
     try:
         si = number * _factor(unit, kind)
     except InputError as error:

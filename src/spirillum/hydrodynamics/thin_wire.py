@@ -13,7 +13,7 @@ __all__ = ["EXACT_EPS_CONSTANT", "PRINTED_EPS_CONSTANT", "cutoff", "thin_wire_ca
 PRINTED_EPS_CONSTANT = 2.6
 """Constant of eps as the paper prints it."""
 EXACT_EPS_CONSTANT = 0.5 * np.pi * np.exp(0.5)
-"""pi sqrt(e)/2 = 2.58985: Lighthill's cut-off delta = a sqrt(e)/2 (SIAM Rev. 18:161, 1976)."""
+"""pi sqrt(e)/2 = 2.58981: Lighthill's cut-off delta = a sqrt(e)/2 (SIAM Rev. 18:161, 1976)."""
 
 _LARGEST_EPS = 0.2
 _FEWEST_TURNS = 1.0

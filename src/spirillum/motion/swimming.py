@@ -26,36 +26,90 @@ _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processo
 class Swimming:
     """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`."""
 
-    forward_velocity: PerRobot = field(metadata={"unit": "m/s", "meaning": "forward velocity U_x"})
-    advance_per_radian: PerRobot = field(metadata={"unit": "m/rad", "meaning": "forward velocity over tail rate"})
-    tail_rotation_rate: PerRobot = field(metadata={"unit": "rad/s", "meaning": "rotation rate omega of the tail (lab)"})
-    body_rotation_rate: PerRobot = field(metadata={"unit": "rad/s", "meaning": "rotation rate Omega_x of the body"})
-    motor_rotation_rate: PerRobot = field(metadata={"unit": "rad/s", "meaning": "motor rate omega_m = omega - Omega_x"})
-    tail_torque: PerRobot = field(
-        metadata={"unit": "N m", "meaning": "hydrodynamic torque T_h on the rotor, magnitude"}
+    forward_velocity: PerRobot = field(
+        metadata={"unit": "m/s", "meaning": "forward velocity U_x", "source": "eqs (1), (8), (15)"}
     )
-    drive_torque: PerRobot = field(metadata={"unit": "N m", "meaning": "torque that turns the rotor against the fluid"})
-    motor_current: PerRobot = field(metadata={"unit": "A", "meaning": "motor current I"})
-    battery_voltage: PerRobot = field(metadata={"unit": "V", "meaning": "battery voltage V(I) at the terminals"})
+    advance_per_radian: PerRobot = field(
+        metadata={"unit": "m/rad", "meaning": "forward velocity over tail rate", "source": "eqs (1), (15)"}
+    )
+    tail_rotation_rate: PerRobot = field(
+        metadata={
+            "unit": "rad/s",
+            "meaning": "rotation rate omega of the tail (lab)",
+            "source": "eqs (15), (18), or prescribed",
+        }
+    )
+    body_rotation_rate: PerRobot = field(
+        metadata={"unit": "rad/s", "meaning": "rotation rate Omega_x of the body", "source": "eqs (2), (15)"}
+    )
+    motor_rotation_rate: PerRobot = field(
+        metadata={"unit": "rad/s", "meaning": "motor rate omega_m = omega - Omega_x", "source": "Table II"}
+    )
+    tail_torque: PerRobot = field(
+        metadata={
+            "unit": "N m",
+            "meaning": "hydrodynamic torque T_h on the rotor, magnitude",
+            "source": "eqs (12), (18)",
+        }
+    )
+    drive_torque: PerRobot = field(
+        metadata={"unit": "N m", "meaning": "torque that turns the rotor against the fluid", "source": "eq. (18)"}
+    )
+    motor_current: PerRobot = field(metadata={"unit": "A", "meaning": "motor current I", "source": "eq. (17)"})
+    battery_voltage: PerRobot = field(
+        metadata={"unit": "V", "meaning": "battery voltage V(I) at the terminals", "source": "Table II"}
+    )
     effective_friction: PerRobot = field(
-        metadata={"unit": "N m s/rad", "meaning": "effective rotary friction B_eff (reading body: B of the wall)"}
+        metadata={
+            "unit": "N m s/rad",
+            "meaning": "effective rotary friction B_eff (reading body: B of the wall)",
+            "source": "eq. (18)",
+        }
     )
     motor_residual_torque: PerRobot = field(
-        metadata={"unit": "N m", "meaning": "motor torque that the friction reading leaves unexplained"}
+        metadata={
+            "unit": "N m",
+            "meaning": "motor torque that the friction reading leaves unexplained",
+            "source": "eq. (18)",
+        }
     )
-    electrical_power: PerRobot = field(metadata={"unit": "W", "meaning": "electrical power at the battery's terminals"})
-    shaft_power: PerRobot = field(metadata={"unit": "W", "meaning": "drive torque times motor rate"})
-    friction_power: PerRobot = field(metadata={"unit": "W", "meaning": "power lost to friction"})
-    dissipated_power: PerRobot = field(metadata={"unit": "W", "meaning": "viscous dissipation"})
+    electrical_power: PerRobot = field(
+        metadata={"unit": "W", "meaning": "electrical power at the battery's terminals", "source": "Table II"}
+    )
+    shaft_power: PerRobot = field(
+        metadata={"unit": "W", "meaning": "drive torque times motor rate", "source": "eq. (18)"}
+    )
+    friction_power: PerRobot = field(
+        metadata={"unit": "W", "meaning": "power lost to friction", "source": "eqs (18), (19)"}
+    )
+    dissipated_power: PerRobot = field(metadata={"unit": "W", "meaning": "viscous dissipation", "source": "eq. (9)"})
     hydrodynamic_efficiency: PerRobot = field(
-        metadata={"unit": "1", "meaning": "isolated uncalibrated body drag times U^2 over shaft power"}
+        metadata={
+            "unit": "1",
+            "meaning": "isolated uncalibrated body drag times U^2 over shaft power",
+            "source": "eq. (16)",
+        }
     )
-    reynolds_number: PerRobot = field(metadata={"unit": "1", "meaning": "Reynolds number on the body's diameter"})
+    reynolds_number: PerRobot = field(
+        metadata={"unit": "1", "meaning": "Reynolds number on the body's diameter", "source": "definition"}
+    )
     tail_reynolds_number: PerRobot = field(
-        metadata={"unit": "1", "meaning": "Reynolds number rho |omega| B_o^2/mu on the tail's amplitude"}
+        metadata={
+            "unit": "1",
+            "meaning": "Reynolds number rho |omega| B_o^2/mu on the tail's amplitude",
+            "source": "definition",
+        }
     )
-    battery_run_time: PerRobot = field(metadata={"unit": "s", "meaning": "time until the rated charge is spent"})
-    valid: Flags = field(metadata={"unit": "1", "meaning": "robot can be built and lies inside the model's domain"})
+    battery_run_time: PerRobot = field(
+        metadata={"unit": "s", "meaning": "time until the rated charge is spent", "source": "Table II"}
+    )
+    valid: Flags = field(
+        metadata={
+            "unit": "1",
+            "meaning": "robot can be built and lies inside the model's domain",
+            "source": "domain of the model",
+        }
+    )
 
 
 def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:

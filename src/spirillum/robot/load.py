@@ -14,10 +14,20 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.files import parse_toml, read_toml
+from spirillum.files import parse_toml, read_toml, write_text
+from spirillum.robot.options import CalibrationFile
 from spirillum.robot.robot import Robot
 
-__all__ = ["load", "load_calibration", "parse_setting", "preset_names", "preset_text", "problems_in", "raw_table"]
+__all__ = [
+    "load",
+    "new_robot_file",
+    "parse_setting",
+    "preset_names",
+    "preset_text",
+    "problems_in",
+    "raw_table",
+    "with_calibration",
+]
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
 # A measured mass no longer describes the robot once one of these changes (Table I weighs body and coupling).
@@ -60,12 +70,12 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, **overrides: Any) -> Rob
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
     table, source = raw_table(robot)
-    touched = _touched(table)
+    changes = [_touched(table)] if "extends" in table else []
     table = _extended(table, source)
     for path, value in overrides.items():
         _put(table, path.split("."), value, path)
-        touched |= _touched(_nested(path, value))
-    return _checked(table, source, _stale_mass(table, touched))
+    changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
+    return _checked(table, source, _stale_mass(table, changes))
 
 
 def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -80,6 +90,29 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         hint = did_you_mean(str(robot), preset_names())
         raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
     return read_toml(path, _WHAT), str(path)
+
+
+def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) -> None:
+    """Write a robot file to edit: a preset's own text, whole.
+
+    Args:
+        path: file to write.
+        preset: the preset to start from.
+        overwrite: replace a file that is there.
+
+    Raises:
+        InputError: if there is no such preset, or the file is there or cannot be written.
+    """
+    if preset not in preset_names():
+        raise InputError(
+            f"preset {preset!r}{did_you_mean(preset, preset_names())}; allowed: {', '.join(preset_names())}"
+        )
+    path = Path(path)
+    if path.exists() and (path.is_dir() or not overwrite):
+        raise InputError(f"{path} exists; allowed: a new file, or --force to overwrite one")
+    name = re.sub(r"[^\w-]+", "-", path.stem)[:100] or "robot"
+    text = preset_text(preset).replace(f'name = "{preset}"', f'name = "{name}"', 1)
+    write_text(path, text)
 
 
 def _looks_like_a_name(robot: str | Path) -> bool:
@@ -102,19 +135,21 @@ def parse_setting(text: str) -> tuple[str, Any]:
         return path, value
 
 
-def load_calibration(path: str | Path) -> dict[str, Any]:
-    """The `[calibration.<model>]` tables of a calibration file, raw.
+def with_calibration(robot: Robot, path: str | Path) -> Robot:
+    """The robot with the factors of a calibration file in place of its own.
+
+    Args:
+        robot: a checked robot.
+        path: TOML file with `[calibration.<model>]` tables, as in a robot file.
 
     Raises:
-        InputError: if the file cannot be read or holds anything else.
+        InputError: if the file cannot be read or a field is wrong.
     """
     what = "a calibration file (TOML with [calibration.<model>] tables)"
-    table = read_toml(Path(path), what)
-    calibration = table.get("calibration")
-    if set(table) != {"calibration"} or not isinstance(calibration, dict) or not calibration:
-        others = ", ".join(sorted(set(table) - {"calibration"})) or "no [calibration.<model>] table"
-        raise InputError(f"{path} holds {others[:100]}; allowed: {what}")
-    return calibration
+    checked = problems_in(CalibrationFile, read_toml(Path(path), what))
+    if isinstance(checked, list):
+        raise InputError(f"{path}: {checked[0]}", [f"{path}: {problem}" for problem in checked])
+    return robot.model_copy(update={"calibration": checked.calibration})
 
 
 def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:
@@ -172,14 +207,19 @@ def _touched(table: Mapping[str, Any]) -> set[str]:
     }
 
 
-def _stale_mass(table: Mapping[str, Any], touched: set[str]) -> tuple[str, ...]:
-    """Warn where a measured mass is older than the geometry that it weighs."""
+def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
+    """Warn where a measured mass is older than the geometry that it weighs.
+
+    Args:
+        table: the final raw tables.
+        changes: fields that each layer changed (a file over its preset, then the overrides).
+    """
     body = table.get("body")
-    if "body.mass" in touched or not isinstance(body, dict) or "mass" not in body:
-        return ()
-    changed = [f"{section}.{name}" for section, names in _WEIGHED.items() for name in names]
-    stale = [field for field in changed if field in touched]
-    if not stale:
+    stale: list[str] = []
+    for changed in changes:
+        newer = [f"{section}.{name}" for section, names in _WEIGHED.items() for name in names]
+        stale = [] if "body.mass" in changed else stale + [field for field in newer if field in changed]
+    if not stale or not isinstance(body, dict) or "mass" not in body:
         return ()
     return (f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew",)
 

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from spirillum.robot.fields import Factor, Length, Section
 
-__all__ = ["Calibration", "FittedTo", "ModelOptions", "PerrinOptions", "RftOptions", "SbtOptions"]
+__all__ = [
+    "Calibration",
+    "CalibrationFile",
+    "Calibrations",
+    "FittedTo",
+    "ModelOptions",
+    "PerrinOptions",
+    "RftOptions",
+    "SbtOptions",
+]
 
 
 class PerrinOptions(Section):
@@ -37,7 +46,7 @@ class SbtOptions(Section):
     """Options of Lighthill's slender-body theory, eqs (1)-(7)."""
 
     eps_constant: Literal["printed", "exact"] = "printed"
-    """Constant of eps: the printed 2.6, or the exact `pi sqrt(e)/2` = 2.58985."""
+    """Constant of eps: the printed 2.6, or the exact `pi sqrt(e)/2` = 2.58981."""
     spin: bool = Field(default=False, strict=True)
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
 
@@ -75,3 +84,14 @@ class Calibration(Section):
     """Where the factors come from."""
     fitted_to: FittedTo
     """Geometry that they were fitted to."""
+
+
+Calibrations = dict[Annotated[str, Field(pattern="^[a-z][a-z0-9-]*$")], Calibration]
+"""Calibration factors by model."""
+
+
+class CalibrationFile(Section):
+    """A file of calibration factors: the same tables as in a robot file."""
+
+    calibration: Annotated[Calibrations, Field(min_length=1)]
+    """Factors for each model."""

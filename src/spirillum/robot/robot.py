@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
@@ -13,7 +13,7 @@ from spirillum.robot.actuation import Battery, Drive, Friction, Motor
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import Section
 from spirillum.robot.limits import assembly_limits, broken
-from spirillum.robot.options import Calibration, ModelOptions
+from spirillum.robot.options import Calibrations, ModelOptions
 from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, Tail
 
 __all__ = ["STANDARD_GRAVITY", "Derived", "Robot"]
@@ -62,7 +62,7 @@ class Robot(Section):
     """Rotary friction."""
     model: ModelOptions = ModelOptions()
     """Options of the hydrodynamic models."""
-    calibration: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9-]*$")], Calibration] = Field(default_factory=dict)
+    calibration: Calibrations = Field(default_factory=dict)
     """Calibration factors for each model."""
 
     _warnings: tuple[str, ...] = PrivateAttr(default=())

@@ -1,0 +1,5 @@
+"""`python -m spirillum`."""
+
+from spirillum.cli import main
+
+main()

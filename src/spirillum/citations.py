@@ -1,0 +1,80 @@
+"""The references that results rest on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from spirillum.errors import InputError
+
+__all__ = ["REFERENCES", "citation"]
+
+REFERENCES: dict[str, str] = {
+    "biorob2012": (
+        "Experiments on In-Channel Swimming of an Untethered Biomimetic Robot with Different Helical Tails. "
+        "IEEE RAS & EMBS International Conference on Biomedical Robotics and Biomechatronics (BioRob), 2012."
+    ),
+    "lighthill1976": "J. Lighthill. Flagellar hydrodynamics. SIAM Review 18:161-230, 1976.",
+    "gray1955": (
+        "J. Gray and G. J. Hancock. The propulsion of sea-urchin spermatozoa. "
+        "Journal of Experimental Biology 32:802-814, 1955."
+    ),
+    "brennen1977": (
+        "C. Brennen and H. Winet. Fluid mechanics of propulsion by cilia and flagella. "
+        "Annual Review of Fluid Mechanics 9:339-398, 1977."
+    ),
+    "katz1975": (
+        "D. F. Katz, J. R. Blake and S. L. Paveri-Fontana. On the movement of slender bodies near plane boundaries "
+        "at low Reynolds number. Journal of Fluid Mechanics 72:529-540, 1975."
+    ),
+    "jeffrey1981": (
+        "D. J. Jeffrey and Y. Onishi. The slow motion of a cylinder next to a plane wall. "
+        "Quarterly Journal of Mechanics and Applied Mathematics 34:129-137, 1981."
+    ),
+    "perrin1934": (
+        "F. Perrin. Mouvement brownien d'un ellipsoide (I). Journal de Physique et le Radium 5:497-511, 1934; "
+        "(II) 7:1-11, 1936."
+    ),
+    "happel1983": "J. Happel and H. Brenner. Low Reynolds Number Hydrodynamics. Martinus Nijhoff, 1983.",
+    "higdon1979": (
+        "J. J. L. Higdon. The hydrodynamics of flagellar propulsion: helical waves. "
+        "Journal of Fluid Mechanics 94:331-351, 1979."
+    ),
+}
+"""Key to full reference."""
+
+_SOFTWARE = "The Spirillum developers. spirillum, version {version}."
+
+
+def citation(result: object = None) -> str:
+    """The references that a result rests on, one a line; the software itself comes first.
+
+    Args:
+        result: a `Prediction`, `Resistance`, dataset, model or robot with references of its own; a model's
+            name; None for the software and its paper.
+
+    Raises:
+        InputError: if the object carries no references.
+    """
+    from spirillum import __version__
+
+    keys = list(dict.fromkeys(("biorob2012", *_keys_of(result))))
+    return "\n".join([_SOFTWARE.format(version=__version__), *(REFERENCES[key] for key in keys)])
+
+
+def _keys_of(result: object) -> Iterable[str]:
+    if result is None:
+        return ()
+    if isinstance(result, str):
+        from spirillum.hydrodynamics import find_model
+
+        return find_model(result).references
+    found = getattr(result, "references", None)
+    if found is None:
+        found = getattr(result, "attrs", {}).get("references")
+    if isinstance(found, str):
+        found = found.split()
+    if found is None:
+        raise InputError(
+            f"a {type(result).__name__} carries no references; allowed: an answer, a dataset or a model's name"
+        )
+    return [key for key in found if key in REFERENCES]

@@ -1,0 +1,288 @@
+"""One robot's predicted swimming, with everything that a reader of the number has to know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
+from spirillum.hydrodynamics.coefficients import axis_height
+from spirillum.motion.swimming import Swimming, calibrated_balance, requirements, swim
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit, broken
+from spirillum.robot.load import load, with_calibration
+from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_quantity, show
+
+__all__ = ["Prediction", "accuracy_limits", "calibration_warnings", "checked_batch", "predict", "prepared"]
+
+_LARGEST_REYNOLDS = 0.1
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Steady swimming of one robot, SI, rates signed about +x.
+
+    The quantities are attributes (`prediction.forward_velocity`); NaN where one does not apply.
+    """
+
+    robot: Robot
+    """The robot."""
+    model: SwimmerModel
+    """The hydrodynamic model."""
+    friction: FrictionReading
+    """Reading of the friction."""
+    calibrated: bool
+    """Whether calibration factors were applied."""
+    swimming: Swimming
+    """The quantities, as arrays of length one."""
+    warnings: tuple[str, ...]
+    """What to be careful about, a sentence each."""
+
+    def __getattr__(self, name: str) -> float:
+        """A quantity by name, as a float."""
+        if name.startswith("_") or name not in _QUANTITIES:
+            raise AttributeError(name)
+        return float(getattr(self.swimming, name)[0])
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Keys of the references that it rests on."""
+        return self.model.references
+
+    @cached_property
+    def placement(self) -> dict[str, Any]:
+        """Where the model places the robot."""
+        if self.model.name == "rft" and self.robot.model.rft.coefficients == "brennen-winet":
+            height = float(axis_height(RobotBatch.of(self.robot))[0])
+            return {"kind": "above a plane floor", "tail_axis_height": quantity(height, "m")}
+        return {"kind": "unbounded fluid"}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum predict --json`."""
+        quantities = {
+            name: quantity(getattr(self, name), unit, **_MORE.get(name, {})) for name, (unit, _) in _QUANTITIES.items()
+        }
+        content = {
+            "robot": self.robot.name,
+            "model": self.model.name,
+            "friction": self.friction,
+            "calibrated": self.calibrated,
+            **quantities,
+            "placement": self.placement,
+            "error_estimate": quantity(None, "1", statement=self.model.known_error),
+            "references": list(self.references),
+        }
+        return envelope("prediction", content, self.warnings)
+
+
+_QUANTITIES: dict[str, tuple[str, str]] = {
+    f.name: (f.metadata["unit"], f.metadata["meaning"]) for f in fields(Swimming) if f.name != "valid"
+}
+_MORE = {
+    "reynolds_number": {"length": "body diameter"},
+    "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
+}
+
+
+def predict(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = "sbt",
+    tail_rate: str | float | None = None,
+    friction: FrictionReading | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+) -> Prediction:
+    """Predict the steady swimming of one robot.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        model: `sbt` or `rft`.
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
+            the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
+            the effective friction from (18).
+        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+
+    Raises:
+        InputError: for wrong input, or a robot outside the model's domain.
+    """
+    ready, chosen, batch = prepared(robot, model, calibration)
+    reading = friction or ready.friction.reading
+    if reading not in get_args(FrictionReading):
+        raise InputError(f"friction = {reading!r}; allowed: {', '.join(get_args(FrictionReading))}")
+    rate = _rate(tail_rate)
+    if rate is None and ready.drive is None:
+        raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
+    result = swim(
+        batch,
+        chosen.name,
+        tail_rate=None if rate is None else np.array([rate]),
+        friction=reading,
+        calibrated=calibrated,
+    )
+    if not result.valid[0]:
+        raise InputError(_why_not(batch, chosen, reading, calibrated=calibrated))
+    warnings = [
+        *ready.warnings,
+        *(calibration_warnings(ready, chosen.name) if calibrated else ()),
+        *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
+        *_drive_warnings(ready, chosen, reading, result, rate),
+    ]
+    return Prediction(ready, chosen, reading, calibrated, result, tuple(warnings))
+
+
+def prepared(
+    robot: str | Path | Mapping[str, Any] | Robot, model: str, calibration: str | Path | None = None
+) -> tuple[Robot, SwimmerModel, RobotBatch]:
+    """A loaded robot with its model and batch, inside the model's domain.
+
+    Raises:
+        InputError: for wrong input, or a robot outside the model's domain.
+    """
+    ready = load(robot)
+    if calibration is not None:
+        ready = with_calibration(ready, calibration)
+    chosen = find_swimmer_model(model)
+    return ready, chosen, checked_batch(ready, chosen)
+
+
+def checked_batch(robot: Robot, model: SwimmerModel) -> RobotBatch:
+    """The robot as a batch of one.
+
+    Raises:
+        InputError: if it is outside the model's domain.
+    """
+    batch = RobotBatch.of(robot)
+    outside = broken(requirements(batch, model))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}")
+    return batch
+
+
+def _rate(value: str | float | None) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        value = f"{float(value)!r} rad/s"
+    try:
+        rate = parse_quantity(value, KINDS["rate"])
+    except InputError as error:
+        raise InputError(f"tail-rate {error}") from error
+    if rate == 0:
+        raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
+    return rate
+
+
+def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
+    """What has to hold for the answer to be accurate; each broken one is a warning."""
+    inertia = "inertia is neglected (Stokes flow)"
+    return [
+        *model.cautions(batch),
+        Limit.at_most(
+            "Reynolds number (body diameter)",
+            result.reynolds_number,
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "reynolds-number",
+        ),
+        Limit.at_most(
+            "Reynolds number (tail amplitude)",
+            result.tail_reynolds_number,
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "tail-reynolds-number",
+        ),
+    ]
+
+
+def _why_not(batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, *, calibrated: bool) -> str:
+    if reading == "paper":
+        limit = calibrated_balance(batch, model, calibrated=calibrated).bb[0]
+        return (
+            f"friction.effective = {batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
+            f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
+        )
+    return f"model '{model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
+
+
+def calibration_warnings(robot: Robot, model: str) -> list[str]:
+    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry."""
+    entry = robot.calibration.get(model)
+    if entry is None:
+        return [f"no calibration for model '{model}': body drag factors are 1"]
+    fitted = entry.fitted_to
+    channel = robot.channel.diameter if robot.channel else None
+    pairs = (
+        ("channel.diameter", channel, fitted.channel_diameter),
+        ("body.diameter", robot.body.diameter, fitted.body_diameter),
+        ("body.length", robot.body.length, fitted.body_length),
+    )
+    differing = [
+        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
+        for name, value, fit in pairs
+        if value is None or not np.isclose(value, fit, rtol=1e-6)
+    ]
+    if not differing:
+        return []
+    return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
+
+
+def _drive_warnings(
+    robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
+) -> list[str]:
+    motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
+    factors = robot.calibration.get(model.name)
+    found = []
+    if reading == "paper" and factors is not None and factors.body_rotation < 1:
+        found.append(
+            f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already makes up for friction on "
+            "the body; with friction reading 'paper' it is counted twice"
+        )
+    if not motor_driven:
+        return found
+    if rate is None:
+        return found + _unset_friction_warning(robot, reading)
+    return found + _prescribed_rate_warnings(robot, reading, result)
+
+
+def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]:
+    if reading == "none":
+        return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
+    if robot.friction.effective is not None or robot.motor is None:
+        return []
+    own = f"the rotor's own B_m = {robot.motor.rotor_friction:g} N m s/rad"
+    if reading == "body":
+        return [f"friction.effective is unset: no wall friction on the body, {own} in the joint"]
+    return [f"friction.effective is unset: {own} alone is used, which makes the rates upper bounds"]
+
+
+def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[str]:
+    found = []
+    if reading in ("rotor", "paper"):
+        if robot.friction.effective is not None:
+            found.append("friction.effective is ignored: with a tail rate it is inferred from (17) and (18)")
+        if result.effective_friction[0] < 0:
+            found.append(
+                "the inferred effective friction is negative: at this rate the model's hydrodynamic torque exceeds "
+                "what the motor gives"
+            )
+    else:
+        found.append(
+            f"friction reading '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained"
+        )
+    if result.electrical_power[0] < 0:
+        found.append("at this rate the tail drives the motor: current and electrical power are negative")
+    return found
