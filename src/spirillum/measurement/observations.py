@@ -1,0 +1,198 @@
+"""`observations.csv`: one row a trial (or a mean with its interval), signed about +x."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from spirillum.errors import InputError, did_you_mean
+from spirillum.files import read_text
+from spirillum.measurement.statistics import Mean, mean_with_interval
+from spirillum.units import Hz
+
+__all__ = ["COLUMNS", "RATES", "Observation", "Observed", "read_observations", "summarised"]
+
+_MM = 1e-3
+_KEYS = {"channel_diameter_mm": _MM, "wavelength_mm": _MM, "amplitude_mm": _MM}
+RATES = {"forward_velocity_mm_s": _MM, "tail_rate_Hz": Hz, "body_rate_Hz": Hz, "motor_rate_Hz": Hz}
+"""Measured columns and their factor to SI."""
+_INTERVALS = {f"{name}_ci95": factor for name, factor in RATES.items()}
+COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
+"""All columns; those after the trial number may be left out or left empty."""
+_NEEDED = tuple(_KEYS)
+_WHAT = "an observations file (CSV)"
+_LARGEST = 64 << 20
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One row: a trial, or a mean over trials, SI."""
+
+    row: int
+    """Line number in the file."""
+    robot: str
+    channel_diameter: float
+    wavelength: float
+    amplitude: float
+    forward_velocity: float
+    """m/s; NaN where not measured, as all that follow."""
+    tail_rate: float
+    body_rate: float
+    motor_rate: float
+    trials: int
+    """1 for a trial, more for a mean."""
+    intervals: tuple[float, float, float, float]
+    """Half widths of a mean's 95 % intervals in the same order."""
+
+    @property
+    def tail(self) -> tuple[float, float, float]:
+        """Channel diameter, wavelength, amplitude, rounded to 1 nm: what tells robots of a study apart."""
+        return (round(self.channel_diameter, 9), round(self.wavelength, 9), round(self.amplitude, 9))
+
+
+@dataclass(frozen=True)
+class Observed:
+    """All that was observed of one robot, with 95 % intervals, SI."""
+
+    forward_velocity: Mean
+    tail_rate: Mean
+    body_rate: Mean
+    motor_rate: Mean
+
+
+def read_observations(path: str | Path) -> list[Observation]:
+    """Read and check an observations file.
+
+    Args:
+        path: tidy CSV as the contract describes it; `#` starts a comment line.
+
+    Raises:
+        InputError: if the file or a cell is wrong; the sentence names file, row and column.
+    """
+    path = Path(path)
+    text = read_text(path, _WHAT, _LARGEST)
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise InputError(f"{path} holds no observations; allowed: a header line and at least one row")
+    try:
+        table = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
+    except csv.Error as error:
+        raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
+    header = [name.strip() for name in table[0]]
+    _check_header(path, header)
+    rows = zip((number for number, _ in lines[1:]), table[1:], strict=False)
+    found = [_observation(path, number, header, cells) for number, cells in rows]
+    _check_duplicates(path, found)
+    return found
+
+
+def _check_header(path: Path, header: Sequence[str]) -> None:
+    for name in header:
+        if name not in COLUMNS:
+            raise InputError(
+                f"{path}: column '{name[:40]}' is unknown{did_you_mean(name, COLUMNS)}; allowed: {', '.join(COLUMNS)}"
+            )
+    twice = [name for name in header if header.count(name) > 1]
+    if twice:
+        raise InputError(f"{path}: column '{twice[0]}' stands twice; allowed: once")
+    missing = [name for name in _NEEDED if name not in header]
+    if missing:
+        raise InputError(f"{path}: column '{missing[0]}' is missing; needed: {', '.join(_NEEDED)}")
+    if not set(header) & set(RATES):
+        raise InputError(f"{path} has no measured column; allowed: at least one of {', '.join(RATES)}")
+
+
+def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence[str]) -> Observation:
+    if len(cells) != len(header):
+        raise InputError(f"{path}, row {number}: {len(cells)} cells; allowed: {len(header)}, one for each column")
+    row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+    place = f"{path}, row {number}"
+    channel_diameter, wavelength, amplitude = (_number(place, row, name, _MM, least=1e-6) for name in _KEYS)
+    rates = [_number(place, row, name, factor) for name, factor in RATES.items()]
+    if all(math.isnan(value) for value in rates):
+        raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
+    velocity, tail, body, motor = rates
+    a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
+    return Observation(
+        row=number,
+        robot=row.get("robot", ""),
+        channel_diameter=channel_diameter,
+        wavelength=wavelength,
+        amplitude=amplitude,
+        forward_velocity=velocity,
+        tail_rate=tail,
+        body_rate=body,
+        motor_rate=motor,
+        trials=_trials(path, number, row),
+        intervals=(a, b, c, d),
+    )
+
+
+def _number(place: str, row: dict[str, str], name: str, factor: float, least: float | None = None) -> float:
+    """One cell in SI; NaN where it is empty and may be.
+
+    Args:
+        place: file and row, for the sentence of an error.
+        row: the cells by column.
+        name: the column.
+        factor: its unit in SI.
+        least: smallest value in the column's unit; a key column, which has a positive one, may not be empty.
+    """
+    text = row.get(name, "")
+    if not text and not (least is not None and least > 0):
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or (least is not None and value < least):
+        wanted = "a finite number, or empty" if least is None else f"a number of at least {least:g}"
+        raise InputError(f"{place}, column {name}: '{text[:40]}'; allowed: {wanted}")
+    return value * factor
+
+
+def _trials(path: Path, number: int, row: dict[str, str]) -> int:
+    text = row.get("trials", "")
+    if not text:
+        return 1
+    if not text.isascii() or not text.isdigit() or not 1 <= int(text[:9]) <= 10**6:
+        raise InputError(f"{path}, row {number}, column trials: '{text[:40]}'; allowed: a whole number from 1")
+    return int(text)
+
+
+def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
+    """A robot's mean stands alone: another row of the same robot would count it twice."""
+    seen: dict[tuple[float, float, float], Observation] = {}
+    for item in observations:
+        other = seen.setdefault(item.tail, item)
+        if other is not item and max(item.trials, other.trials) > 1:
+            raise InputError(
+                f"{path}, rows {other.row} and {item.row} are of the same robot and one is a mean; "
+                "allowed: trials, or one mean"
+            )
+
+
+def summarised(observations: Iterable[Observation]) -> dict[tuple[float, float, float], Observed]:
+    """Mean and 95 % interval of every robot, by (channel diameter, wavelength, amplitude)."""
+    groups: dict[tuple[float, float, float], list[Observation]] = {}
+    for item in observations:
+        groups.setdefault(item.tail, []).append(item)
+    return {tail: _observed(items) for tail, items in groups.items()}
+
+
+def _observed(items: Sequence[Observation]) -> Observed:
+    columns = [
+        [item.forward_velocity for item in items],
+        [item.tail_rate for item in items],
+        [item.body_rate for item in items],
+        [item.motor_rate for item in items],
+    ]
+    if len(items) == 1 and items[0].trials > 1:
+        only = items[0]
+        return Observed(*(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True)))
+    return Observed(*(mean_with_interval(column) for column in columns))

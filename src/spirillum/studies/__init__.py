@@ -1,0 +1,5 @@
+"""Many robots, one labelled Dataset."""
+
+from spirillum.studies.run import study
+
+__all__ = ["study"]

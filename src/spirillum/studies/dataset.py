@@ -1,0 +1,167 @@
+"""The answer of a study as a labelled Dataset: coordinates are the question, variables the answer."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Iterable, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.work import QUANTITIES, REASONS, Part, Task
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["assembled", "read_dataset"]
+
+_PAPER = "BioRob 2012"
+
+
+def assembled(
+    loaded: LoadedStudy,
+    answers: Iterable[tuple[Task, Part]],
+    observed: ObservedArrays | None,
+    fingerprint: str,
+    warnings: Sequence[str],
+) -> xr.Dataset:
+    """Lay all answers into one Dataset."""
+    import xarray as xr
+
+    study = loaded.study
+    robots, shape = _robot_dimensions(loaded)
+    count = int(np.prod(shape))
+    flat = _gathered(loaded, answers, count)
+    dims = {2: (*robots, "model", "friction"), 3: (*robots, "model", "friction", "assumed_motor_rate")}
+    data: dict[str, Any] = {}
+    for name, values in flat.items():
+        axis_last = np.moveaxis(values, 0, 1)  # (robots, models, friction[, rates])
+        laid = axis_last.reshape(*shape, *axis_last.shape[1:])
+        data[name] = (dims[axis_last.ndim - 1], laid, _attributes(name))
+    data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes("outside"))
+    if observed is not None:
+        data |= _observed_variables(observed, robots, shape)
+    dataset = xr.Dataset(data, coords=_coordinates(loaded))
+    references = [key for name in study.models for key in find_swimmer_model(name).references]
+    dataset.attrs = {
+        "title": study.title,
+        "note": study.note.strip(),
+        "settings": json.dumps(loaded.question, sort_keys=True),
+        "fingerprint": fingerprint,
+        "observations": observed.source if observed else "none: nothing in this dataset is measured",
+        "claims": study.claims,
+        "references": " ".join(dict.fromkeys(references)),
+        "warnings": "\n".join(warnings),
+        "versions": _versions(),
+        "Conventions": "CF-1.11",
+    }
+    return dataset
+
+
+def _gathered(loaded: LoadedStudy, answers: Iterable[tuple[Task, Part]], count: int) -> dict[str, Values]:
+    """All parts in arrays of (models, robots, ...); NaN where a part does not have a quantity."""
+    models = loaded.study.models
+    flat: dict[str, Values] = {}
+    for task, part in answers:
+        for name, values in part.items():
+            if name not in flat:
+                flat[name] = np.full((len(models), count, *values.shape[1:]), np.nan)
+            flat[name][models.index(task.model), task.places] = values
+    return flat
+
+
+def _robot_dimensions(loaded: LoadedStudy) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    grid = loaded.study.grid
+    if grid is None:
+        return ("robot",), (len(loaded.robots),)
+    return ("channel", "wavelength", "amplitude"), (len(grid.channels), len(grid.wavelengths), len(grid.amplitudes))
+
+
+def _coordinates(loaded: LoadedStudy) -> dict[str, Any]:
+    study, robots = loaded.study, loaded.robots
+    channel = [robot.channel.diameter if robot.channel else np.inf for robot in robots]
+    first = "channel" if study.grid else "robot"
+    coordinates: dict[str, Any] = {
+        first: (first, _text(loaded.names), {"long_name": first}),
+        "channel_diameter": (first, channel, {"units": "m", "long_name": "channel diameter D_ch", "source": "Table I"}),
+        "model": ("model", _text(study.models), {"long_name": "hydrodynamic model"}),
+        "friction": ("friction", _text(study.friction), {"long_name": "reading of the effective friction"}),
+    }
+    tail = {
+        "wavelength": (study.grid.wavelengths if study.grid else [r.tail.wavelength for r in robots], "lambda"),
+        "amplitude": (study.grid.amplitudes if study.grid else [r.tail.amplitude for r in robots], "B_o"),
+    }
+    for name, (values, symbol) in tail.items():
+        attributes = {"units": "m", "long_name": f"tail {name} {symbol}", "source": "input of the study"}
+        coordinates[name] = (name if study.grid else first, values, attributes)
+    if study.assumed_motor_rates:
+        attributes = {"units": "rad/s", "long_name": "assumed motor rate omega_m", "source": "input of the study"}
+        coordinates["assumed_motor_rate"] = ("assumed_motor_rate", list(study.assumed_motor_rates), attributes)
+    return coordinates
+
+
+def _text(names: Sequence[str]) -> Values:
+    return np.array(list(names), dtype=str)
+
+
+def _attributes(name: str) -> dict[str, Any]:
+    if name == "outside":
+        return {
+            "units": "1",
+            "long_name": "why there is no answer (0: answered)",
+            "source": "domain of the model, fit of the parts",
+            "flag_values": np.arange(len(REASONS), dtype="int8"),
+            "flag_meanings": " ".join(REASONS),
+        }
+    base, _, at = name.partition("_at_")
+    field = next(f for f in QUANTITIES if f.name == base)
+    suffix = f", at the {at.replace('_rate', '').replace('_', ' ')} rate" if at else ", driven by its own drive"
+    return {
+        "units": field.metadata["unit"],
+        "long_name": field.metadata["meaning"] + suffix,
+        "source": f"{field.metadata['source']} of {_PAPER}",
+    }
+
+
+def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: Sequence[int]) -> dict[str, Any]:
+    meanings = {
+        "forward_velocity": ("m/s", "observed forward velocity"),
+        "tail_rate": ("rad/s", "observed rotation rate of the tail (lab)"),
+        "body_rate": ("rad/s", "observed rotation rate of the body"),
+        "motor_rate": ("rad/s", "observed motor rate"),
+    }
+    source = f"observations file {observed.source}"
+    found: dict[str, Any] = {}
+    for name, (unit, meaning) in meanings.items():
+        attributes = {"units": unit, "long_name": meaning, "source": source}
+        found[f"observed_{name}"] = (robots, getattr(observed, name).reshape(shape), attributes)
+        interval = {**attributes, "long_name": f"half width of the 95 % interval of the {meaning}"}
+        found[f"observed_{name}_ci95"] = (robots, observed.intervals[name].reshape(shape), interval)
+    trials = {"units": "1", "long_name": "number of trials", "source": source}
+    found["trials"] = (robots, observed.trials.reshape(shape).astype("int32"), trials)
+    return found
+
+
+def _versions() -> str:
+    packages = ("spirillum", "numpy", "scipy", "xarray")
+    return ", ".join([f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in packages)])
+
+
+def read_dataset(path: Path) -> xr.Dataset | None:
+    """A dataset that an earlier run has written; None if there is none or it is damaged."""
+    import xarray as xr
+
+    if not path.is_file():
+        return None
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as stored:
+            return stored.load()
+    except (OSError, ValueError, KeyError, RuntimeError):
+        return None

@@ -1,0 +1,110 @@
+"""Observed rates and speeds, laid onto the robots of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import PerRobot
+from spirillum.errors import InputError
+from spirillum.measurement.observations import Observation, Observed, read_observations, summarised
+from spirillum.robot.robot import Robot
+from spirillum.studies.spec import LoadedStudy
+
+__all__ = ["ObservedArrays", "observed_arrays"]
+
+_NAMES = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
+
+
+@dataclass(frozen=True)
+class ObservedArrays:
+    """Means and half widths of 95 % intervals in the flat order of a study, SI; NaN where not observed."""
+
+    forward_velocity: PerRobot
+    tail_rate: PerRobot
+    body_rate: PerRobot
+    motor_rate: PerRobot
+    intervals: Mapping[str, PerRobot]
+    trials: PerRobot
+    source: str
+
+    @property
+    def motor_rate_for_18(self) -> PerRobot:
+        """omega_m for (17) and (18): observed, else tail less body rate where both were observed."""
+        return np.where(np.isnan(self.motor_rate), self.tail_rate - self.body_rate, self.motor_rate)
+
+    def question(self) -> dict[str, Any]:
+        """What of the observations decides the answer."""
+        columns = {name: getattr(self, name).tolist() for name in _NAMES}
+        return {name: [repr(value) for value in values] for name, values in columns.items()}
+
+
+def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:
+    """Read observations and match them with the study's robots by channel, wavelength and amplitude.
+
+    Raises:
+        InputError: if the file is wrong, a row belongs to no robot of the study, or a rate's sign contradicts
+            the tail's hand.
+    """
+    observations = read_observations(path)
+    tails = _tails(loaded)
+    for item in observations:
+        if item.tail not in tails:
+            raise InputError(
+                f"{path}, row {item.row}: no robot of the study has channel {item.channel_diameter * 1e3:g} mm, "
+                f"wavelength {item.wavelength * 1e3:g} mm and amplitude {item.amplitude * 1e3:g} mm; "
+                "allowed: tails of the study"
+            )
+        _check_signs(path, item, tails[item.tail])
+    means = summarised(observations)
+    rows = [means.get(tail) for tail in tails]
+    columns = {name: _column(rows, name, 0) for name in _NAMES}
+    return ObservedArrays(
+        **columns,
+        intervals={name: _column(rows, name, 1) for name in _NAMES},
+        trials=np.array([0 if row is None else max(getattr(row, name).trials for name in _NAMES) for row in rows])
+        * 1.0,
+        source=Path(path).name,
+    )
+
+
+def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
+    """(channel diameter, wavelength, amplitude) of every robot, in the flat order of the study."""
+    grid = loaded.study.grid
+    listed = []
+    for robot in loaded.robots:
+        channel = robot.channel.diameter if robot.channel else float("inf")
+        wavelengths = grid.wavelengths if grid else [robot.tail.wavelength]
+        amplitudes = grid.amplitudes if grid else [robot.tail.amplitude]
+        listed += [((channel, w, a), robot) for w in wavelengths for a in amplitudes]
+    found = {(round(c, 9), round(w, 9), round(a, 9)): robot for (c, w, a), robot in listed}
+    if len(found) != len(listed):
+        raise InputError(
+            "two robots of the study share channel diameter, wavelength and amplitude, so that observations cannot "
+            "tell them apart; allowed: robots that differ in one of them"
+        )
+    return found
+
+
+def _check_signs(path: str | Path, item: Observation, robot: Robot) -> None:
+    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+    driven = -robot.hand if reverse else robot.hand
+    for name in ("tail_rate", "motor_rate"):
+        value = getattr(item, name)
+        if value * driven < 0:
+            raise InputError(
+                f"{path}, row {item.row}, column {name}_Hz: {value / (2 * np.pi):.4g}; allowed: "
+                f"{'positive' if driven > 0 else 'negative'}, as the {robot.tail.handedness}-handed tail is driven"
+            )
+
+
+def _column(rows: Sequence[Observed | None], name: str, item: int) -> PerRobot:
+    return np.array([np.nan if row is None else getattr(row, name)[item] for row in rows])
+
+
+def _trials(row: Observed | None) -> int:
+    return 0 if row is None else max(getattr(row, name).trials for name in _NAMES)

@@ -1,0 +1,133 @@
+"""Run a study: compute what is missing, assemble the Dataset, write the folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.answer import as_json
+from spirillum.errors import InputError
+from spirillum.files import output_folder, write_dataset, write_text
+from spirillum.motion.prediction import calibration_warnings
+from spirillum.studies.dataset import assembled, read_dataset
+from spirillum.studies.observed import ObservedArrays, observed_arrays
+from spirillum.studies.spec import LoadedStudy, load_study
+from spirillum.studies.work import Part, Task, answer, cautions, keep, kept, tasks
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Progress", "study"]
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, steps done and steps in all."""
+
+_RESULTS = ("dataset.nc", "figures", "report.html", "claims.json")
+
+
+def study(
+    source: str | Path | Mapping[str, Any] | None = None,
+    *,
+    observations: str | Path | None = None,
+    output: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a study of many robots.
+
+    Args:
+        source: study file (see `spirillum schema study`) or its tables; None: the paper's study.
+        observations: observations file; the study then also runs at the observed rates and infers B_eff.
+        output: folder for `dataset.nc`, `figures/`, `report.html` and `claims.json`; a rerun resumes there.
+            None: nothing is written.
+        overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
+        progress: called as the work goes on.
+
+    Returns:
+        Dataset with dimensions `channel`, `wavelength`, `amplitude` (or `robot`), `model`, `friction`.
+
+    Raises:
+        InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
+    """
+    loaded = load_study(source, overrides)
+    observed = observed_arrays(observations, loaded) if observations is not None else None
+    fingerprint = _fingerprint(loaded, observed)
+    tell = progress or (lambda _what, _done, _total: None)
+    if output is None:
+        return _computed(loaded, observed, fingerprint, None, tell)
+    folder = _claimed_folder(Path(output), loaded, fingerprint)
+    dataset = read_dataset(folder / "dataset.nc")
+    if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
+        parts = output_folder(folder / "parts")
+        dataset = _computed(loaded, observed, fingerprint, parts, tell)
+        write_dataset(dataset, folder / "dataset.nc")
+        shutil.rmtree(parts)
+    _write_report(dataset, folder, tell)
+    return dataset
+
+
+def _fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
+    """Hash of question and program: a dataset of another version is computed anew."""
+    from spirillum import __version__
+
+    question = [loaded.fingerprint, observed.question() if observed else None, __version__]
+    return hashlib.sha256(json.dumps(question).encode()).hexdigest()
+
+
+def _claimed_folder(folder: Path, loaded: LoadedStudy, fingerprint: str) -> Path:
+    """The folder of results, marked as this study's.
+
+    Raises:
+        InputError: if it holds another study, or results of unknown origin.
+    """
+    mark = folder / "study.json"
+    if mark.exists():
+        try:
+            found = json.loads(mark.read_text(encoding="utf-8"))
+            same, title = found["fingerprint"] == fingerprint, str(found["title"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{mark} is damaged; allowed: a new folder (-o DIR)") from error
+        if not same:
+            raise InputError(
+                f"{folder} holds another study ('{title[:80]}', or other settings); allowed: the same study, to resume "
+                "it, or a new folder (-o DIR)"
+            )
+        return folder
+    stray = [name for name in _RESULTS if (folder / name).exists()]
+    if stray:
+        raise InputError(f"{folder} holds {stray[0]} of unknown origin; allowed: a new folder (-o DIR)")
+    output_folder(folder)
+    content = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
+    write_text(mark, as_json(content))
+    return folder
+
+
+def _computed(
+    loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, parts: Path | None, tell: Progress
+) -> xr.Dataset:
+    todo = list(tasks(loaded))
+    answers: list[tuple[Task, Part]] = []
+    warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
+    for done, task in enumerate(todo):
+        tell(f"{task.model}, {task.batch.size} robots", done, len(todo))
+        part = kept(task, parts)
+        if part is None:
+            part = answer(task, loaded, observed)
+            keep(task, part, parts)
+        answers.append((task, part))
+        warnings += cautions(task, part)
+    tell("dataset", len(todo), len(todo))
+    for robot in loaded.robots:
+        for name in loaded.study.models:
+            warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]
+    return assembled(loaded, answers, observed, fingerprint, list(dict.fromkeys(warnings)))
+
+
+def _write_report(dataset: xr.Dataset, folder: Path, tell: Progress) -> None:
+    from spirillum.report import write_report
+
+    write_report(dataset, folder, tell)

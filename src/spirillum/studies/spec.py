@@ -1,0 +1,164 @@
+"""`STUDY.toml`: which robots, which models, which readings of the friction."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from spirillum.errors import InputError
+from spirillum.files import parse_toml, read_toml
+from spirillum.hydrodynamics import SWIMMER_MODELS
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.fields import Length, Rate, Section
+from spirillum.robot.load import load, problems_in
+from spirillum.robot.robot import Robot
+
+__all__ = ["Grid", "LoadedStudy", "Study", "load_study"]
+
+LARGEST_STUDY = 5_000_000
+"""Most results (robots times models times friction readings times rates) of one study."""
+
+_WHAT = "a study file (TOML, see `spirillum schema study`)"
+_Name = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class Grid(Section):
+    """Every wavelength with every amplitude in every channel."""
+
+    channels: Annotated[dict[_Name, _Name], Field(min_length=1, max_length=1000)]
+    """Name of each channel to its robot (preset or file), which carries channel, body, motor and calibration."""
+    wavelengths: Annotated[list[Length], Field(min_length=1)]
+    """Wavelengths of the tails."""
+    amplitudes: Annotated[list[Length], Field(min_length=1)]
+    """Amplitudes of the tails."""
+
+
+class Study(Section):
+    """A study: a grid or a list of robots, answered by some models under some friction readings."""
+
+    title: _Name = "Study"
+    """Title of report and figures."""
+    note: Annotated[str, Field(max_length=5000)] = ""
+    """What a reader has to know about the study, such as assumptions."""
+    models: Annotated[tuple[str, ...], Field(min_length=1)] = ("sbt", "rft")
+    """Hydrodynamic models."""
+    friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
+    """Readings of the friction."""
+    claims: Literal["none", "biorob2012"] = "none"
+    """Whose statements to hold the results against."""
+    assumed_motor_rates: Annotated[tuple[Rate, ...], Field(max_length=1000)] = ()
+    """Motor rates at which B_eff is inferred as a curve, where no rates were observed."""
+    grid: Grid | None = None
+    """A grid of robots."""
+    robots: Annotated[list[_Name], Field(min_length=1, max_length=100_000)] | None = None
+    """A list of robots (presets or files) instead of a grid."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems = []
+        if (self.grid is None) == (self.robots is None):
+            problems.append("grid and robots: allowed: exactly one of a [grid] table and a `robots` list")
+        problems += [
+            f"models = '{name}' is unknown; allowed: {', '.join(SWIMMER_MODELS)}"
+            for name in self.models
+            if name not in SWIMMER_MODELS
+        ]
+        lists: dict[str, tuple[Any, ...]] = {
+            "models": self.models,
+            "friction": self.friction,
+            "assumed_motor_rates": self.assumed_motor_rates,
+        }
+        if self.grid is not None:
+            lists |= {
+                "grid.wavelengths": tuple(self.grid.wavelengths),
+                "grid.amplitudes": tuple(self.grid.amplitudes),
+            }
+        problems += [
+            f"{name} holds a value twice; allowed: each once"
+            for name, items in lists.items()
+            if len(set(items)) < len(items)
+        ]
+        if 0.0 in self.assumed_motor_rates:
+            problems.append("assumed_motor_rates holds 0; allowed: rates other than 0")
+        if self.size > LARGEST_STUDY:
+            problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STUDY}")
+        if problems:
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+        return self
+
+    @property
+    def size(self) -> int:
+        """Number of results."""
+        grid = self.grid
+        robots = len(self.robots or ())
+        if grid is not None:
+            robots = len(grid.channels) * len(grid.wavelengths) * len(grid.amplitudes)
+        return robots * len(self.models) * len(self.friction) * (1 + len(self.assumed_motor_rates))
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A checked study with its robots."""
+
+    study: Study
+    robots: tuple[Robot, ...]
+    """One robot a channel of the grid, or the listed robots."""
+    question: Mapping[str, Any]
+    """All that decides the answer, for the fingerprint and the dataset's attributes."""
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the question."""
+        text = json.dumps(self.question, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels, or of the robots."""
+        if self.study.grid is not None:
+            return tuple(self.study.grid.channels)
+        return tuple(robot.name for robot in self.robots)
+
+
+def load_study(
+    source: str | Path | Mapping[str, Any] | None = None, overrides: Mapping[str, Any] | None = None
+) -> LoadedStudy:
+    """Load a study and its robots.
+
+    Args:
+        source: study file or the same tables as a mapping; None: the paper's study, built in.
+        overrides: dotted robot fields, applied to every robot.
+
+    Raises:
+        InputError: if the study or one of its robots is wrong.
+    """
+    folder = Path()
+    if source is None:
+        text = (files("spirillum.studies") / "biorob2012.toml").read_text(encoding="utf-8")
+        table, name = parse_toml(text, "the built-in study", _WHAT), "the built-in study"
+    elif isinstance(source, Mapping):
+        table, name = dict(source), "the study"
+    else:
+        table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
+    study = problems_in(Study, table)
+    if isinstance(study, list):
+        more = f" (and {len(study) - 1} more)" if len(study) > 1 else ""
+        raise InputError(f"{name}: {study[0]}{more}", [f"{name}: {problem}" for problem in study])
+    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
+    robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
+    question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
+    return LoadedStudy(study, robots, question)
+
+
+def _robot(entry: str, folder: Path, overrides: Mapping[str, Any]) -> Robot:
+    """A robot of the study; a file stands relative to the study's folder."""
+    beside = folder / entry
+    return load(beside if Path(entry).suffix and not Path(entry).is_absolute() else entry, **overrides)

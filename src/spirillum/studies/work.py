@@ -1,0 +1,179 @@
+"""The work of a study: blocks of robots, one model at a time, each kept on disk as soon as it is done."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.arrays import PerRobot, Values
+from spirillum.errors import InputError
+from spirillum.files import whole_file
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.motion.prediction import accuracy_limits
+from spirillum.motion.swimming import Swimming, requirements, swim
+from spirillum.robot.batch import RobotBatch, batches
+from spirillum.robot.limits import broken
+from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.spec import LoadedStudy
+
+__all__ = ["AT_RATES", "QUANTITIES", "REASONS", "Part", "Task", "answer", "cautions", "keep", "kept", "tasks"]
+
+QUANTITIES = tuple(f for f in fields(Swimming) if f.name != "valid")
+"""Quantities of free swimming."""
+AT_RATES = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "motor_current",
+    "tail_torque",
+    "effective_friction",
+)
+"""Quantities that are also given at observed and at assumed rates."""
+REASONS = (
+    "answered",
+    "body-wider-than-channel",
+    "coupling-wider-than-channel",
+    "tail-wider-than-channel",
+    "robot-longer-than-channel",
+    "turns-touch",
+    "wire-too-thick-for-coil",
+    "too-many-turns",
+    "coil-too-tight",
+    "outside-slender-body-theory",
+    "wire-too-thick-for-rft",
+    "wire-touches-floor",
+    "wire-too-close-to-floor",
+    "other",
+)
+"""Why a robot of a study has no answer; the place in this list is the value in the dataset."""
+
+_BLOCK = 100_000
+
+Places = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+
+Part = dict[str, Values]
+"""Arrays of one task: (robots, friction readings) or (robots, friction readings, rates)."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One model for one block of robots of the same kind."""
+
+    number: int
+    model: str
+    places: Places
+    """Places of the robots in the flat order of the study."""
+    batch: RobotBatch
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that keeps its answer."""
+        return f"part-{self.number:05d}.npz"
+
+
+def tasks(loaded: LoadedStudy) -> Iterator[Task]:
+    """All tasks of a study, always in the same order."""
+    number = 0
+    for places, batch in _groups(loaded):
+        for cut, block in batch.blocks(_BLOCK):
+            for model in loaded.study.models:
+                yield Task(number, model, places[cut], block)
+                number += 1
+
+
+def _groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
+    """Batches of robots with their places: one a channel of the grid, or one a kind of listed robots."""
+    grid = loaded.study.grid
+    if grid is None:
+        for indices, batch in batches(loaded.robots):
+            yield np.array(indices, dtype=np.intp), batch
+        return
+    wavelength, amplitude = (column.ravel() for column in np.meshgrid(grid.wavelengths, grid.amplitudes, indexing="ij"))
+    for index, robot in enumerate(loaded.robots):
+        tails = {"tail.wavelength": wavelength, "tail.amplitude": amplitude}
+        yield index * wavelength.size + np.arange(wavelength.size), RobotBatch.of(robot).with_values(tails)
+
+
+def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
+    """Compute one task."""
+    study = loaded.study
+    readings = study.friction
+    if task.batch.drive is None:
+        raise InputError("a robot of the study has no [drive]; allowed: a drive, by which it swims")
+    free = [swim(task.batch, task.model, friction=reading) for reading in readings]
+    part: Part = {f.name: _stacked(free, f.name) for f in QUANTITIES}
+    valid = np.stack([result.valid for result in free], axis=-1)
+    reason = _reasons(task.batch, task.model)[:, None]
+    part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
+    if observed is not None:
+        tail, motor = observed.tail_rate[task.places], observed.motor_rate_for_18[task.places]
+        found = [swim(task.batch, task.model, tail_rate=tail, motor_rate=motor, friction=r) for r in readings]
+        part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
+    if study.assumed_motor_rates and task.batch.electrics is not None:
+        part |= _at_assumed_rates(task, study.assumed_motor_rates, readings)
+    return part
+
+
+def _stacked(results: Sequence[Swimming], name: str) -> Values:
+    return np.stack([getattr(result, name) for result in results], axis=-1)
+
+
+def _at_assumed_rates(task: Task, rates: Sequence[float], readings: Sequence[str]) -> Part:
+    """The same quantities along a curve of assumed motor rates, turned the way that each motor drives."""
+    electrics = task.batch.electrics
+    assert electrics is not None  # noqa: S101 - the caller has asked
+    polarity = np.broadcast_to(electrics.polarity, (task.batch.size,))
+    curves = [
+        [swim(task.batch, task.model, motor_rate=rate * polarity, friction=reading) for rate in rates]  # type: ignore[arg-type]
+        for reading in readings
+    ]
+    return {
+        f"{name}_at_assumed_rate": np.stack([_stacked(curve, name) for curve in curves], axis=1) for name in AT_RATES
+    }
+
+
+def _reasons(batch: RobotBatch, model: str) -> PerRobot:
+    """For each robot the first requirement that it breaks, as its place in `REASONS`."""
+    reason = np.zeros(batch.size)
+    for limit in requirements(batch, find_swimmer_model(model)):
+        code = REASONS.index(limit.flag) if limit.flag in REASONS else REASONS.index("other")
+        reason = np.where((reason == 0) & ~np.broadcast_to(limit.holds, reason.shape), code, reason)
+    return reason
+
+
+def cautions(task: Task, part: Part) -> list[str]:
+    """What to be careful about in a task's answer, a sentence for each kind."""
+    size = task.batch.size
+    first = Swimming(**{f.name: part[f.name][:, 0] for f in QUANTITIES}, valid=part["outside"][:, 0] == 0)
+    found = []
+    for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
+        holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
+        if not np.all(holds):
+            found.append(
+                f"{np.count_nonzero(~holds)} of {size} robots ({task.model}), the first: "
+                f"{limit.sentence(int(np.argmin(holds)))}"
+            )
+    return found
+
+
+def kept(task: Task, folder: Path | None) -> Part | None:
+    """The answer that an earlier run has kept; None if there is none or it is damaged."""
+    if folder is None or not (folder / task.file_name).is_file():
+        return None
+    try:
+        with np.load(folder / task.file_name, allow_pickle=False) as stored:
+            return {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def keep(task: Task, part: Part, folder: Path | None) -> None:
+    """Keep a finished answer."""
+    if folder is not None:
+        with whole_file(folder / task.file_name) as path, path.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **part)
