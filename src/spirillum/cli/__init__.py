@@ -1,0 +1,57 @@
+"""The command line: verbs over files, tables for people, `--json` for machines."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+__all__ = ["main"]
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code.
+
+    0 done; 1 it ran and found the failure that it was asked to look for; 2 bad input or usage, one sentence on
+    standard error; 130 interrupted.
+    """
+    sys.exit(_run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    from spirillum.cli.app import app
+
+    try:
+        code = app(args=arguments, prog_name="spirillum", standalone_mode=False)
+    except BrokenPipeError:  # the reader of our output has left, as `| head` does
+        sys.stderr.close()
+        return 0
+    except BaseException as error:
+        code = _explained(error)
+        if code is None:
+            raise
+        return code
+    return _fail("interrupted", 130) if code == 130 else int(code or 0)
+
+
+def _explained(error: BaseException) -> int | None:
+    """Say an error that is the user's in a sentence; None for one that is ours."""
+    from typer import Abort
+
+    from spirillum.errors import InputError
+
+    if isinstance(error, (KeyboardInterrupt, Abort)):
+        return _fail("interrupted; what was done is kept", 130)
+    if isinstance(error, InputError):
+        return _fail(str(error), 2)
+    if isinstance(error, MemoryError):
+        return _fail("the request does not fit into memory; allowed: a smaller one", 2)
+    if hasattr(error, "format_message"):  # a usage error of the command-line library
+        return _fail(error.format_message(), 2)
+    return None
+
+
+def _fail(sentence: str, code: int) -> int:
+    line = " ".join(sentence.split())
+    printable = "".join(c if c.isprintable() else "?" for c in line)
+    sys.stderr.write(f"spirillum: {printable}\n")
+    return code

@@ -1,0 +1,269 @@
+"""The commands: each reads its options, calls the function of the same name, and prints the answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from spirillum.cli.options import (
+    Calibration,
+    Friction,
+    Json,
+    Model,
+    NoCalibration,
+    Output,
+    RobotArgument,
+    Settings,
+    complete_parts,
+    complete_presets,
+    complete_resistance_models,
+    complete_schemas,
+)
+
+__all__ = ["app"]
+
+app = typer.Typer(
+    name="spirillum",
+    help="Predict, measure and explain how a robot with a rotating helical tail swims in a fluid-filled channel.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
+app.add_typer(robot_app, name="robot")
+
+
+def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
+    if wanted:
+        from spirillum import __version__
+
+        typer.echo(f"spirillum {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    _version_wanted: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Predict, measure and explain how a robot with a rotating helical tail swims in a fluid-filled channel.
+
+    ROBOT is a preset (`biorob2012-wide`, `biorob2012-narrow`) or a TOML file (`spirillum robot new`).
+    """
+
+
+@app.command()
+def predict(
+    robot: RobotArgument,
+    model: Model = "sbt",
+    tail_rate: Annotated[
+        str | None,
+        typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
+    ] = None,
+    friction: Friction = None,
+    no_calibration: NoCalibration = False,
+    calibration: Calibration = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Predict the steady swimming of one robot.
+
+    Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --set tail.wavelength=20mm`
+    """
+    from spirillum.cli import text
+    from spirillum.motion.prediction import predict as answer
+
+    result = answer(
+        _loaded(robot, settings),
+        model=model,
+        tail_rate=tail_rate,
+        friction=friction,  # type: ignore[arg-type]  # checked by predict
+        calibrated=not no_calibration,
+        calibration=calibration,
+    )
+    text.show(result.to_dict(), text.prediction, json=json)
+
+
+@app.command()
+def resistance(
+    robot: RobotArgument,
+    part: Annotated[
+        str | None, typer.Option(autocompletion=complete_parts, help="body, tail, rotor or robot (joint locked).")
+    ] = None,
+    model: Annotated[
+        str, typer.Option(autocompletion=complete_resistance_models, help="perrin (body only), rft or sbt (axial).")
+    ] = "rft",
+    about: Annotated[str, typer.Option(help="Reference point: body (its mid-length) or tail-root.")] = "body",
+    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Give the 6x6 resistance matrix of a robot or one of its parts, never calibrated.
+
+    Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
+    """
+    from spirillum.cli import text
+    from spirillum.hydrodynamics.resistance import resistance as answer
+
+    result = answer(
+        _loaded(robot, settings),
+        part=part,
+        model=model,
+        about=about,  # type: ignore[arg-type]  # checked by resistance
+        phase=text.angle(phase),
+    )
+    text.show(result.to_dict(), text.resistance, json=json)
+
+
+@app.command()
+def study(
+    source: Annotated[Path | None, typer.Argument(help="Study file (TOML); without one, the paper's study.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "spirillum-study"
+    ),
+    observations: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Observed rates and speeds (CSV): B_eff is inferred from them.")
+    ] = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Run a study of many robots: dataset, figures, report. A rerun resumes.
+
+    Example: `spirillum study -o my-study`
+    """
+    from spirillum.cli import text
+
+    with text.progress_bar(quiet=json) as progress:
+        from spirillum.studies.run import study as answer
+
+        dataset = answer(
+            source, observations=observations, output=output, overrides=_overrides(settings), progress=progress
+        )
+    text.show(text.study_answer(dataset, output), text.study, json=json)
+
+
+@app.command()
+def simulate(
+    robot: RobotArgument,
+    output: Output,
+    model: Model = "sbt",
+    friction: Friction = None,
+    turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail.")] = 3.0,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.")
+    ] = None,
+    on: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FROM:TO", help="When the remote switches the motor on, such as 0s:2s; repeatable."),
+    ] = None,
+    no_calibration: NoCalibration = False,
+    calibration: Calibration = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Simulate axial swimming from rest (two degrees of freedom): motor transient, path, energies.
+
+    Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
+    """
+    from spirillum.cli import text
+    from spirillum.files import write_dataset
+    from spirillum.motion.transient import simulate as answer
+
+    dataset = answer(
+        _loaded(robot, settings),
+        model=model,
+        friction=friction,  # type: ignore[arg-type]  # checked by predict
+        turns=turns,
+        duration=duration,
+        on=[text.time_window(window) for window in on] if on else None,
+        calibrated=not no_calibration,
+        calibration=calibration,
+    )
+    write_dataset(dataset, output)
+    text.show(text.simulation_answer(dataset, output), text.simulation, json=json)
+
+
+@robot_app.command("new")
+def robot_new(
+    path: Annotated[Path, typer.Argument(help="Robot file to write.")],
+    preset: Annotated[
+        str, typer.Option("--from", autocompletion=complete_presets, help="Preset to start from.")
+    ] = "biorob2012-wide",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it is there.")] = False,
+) -> None:
+    """Write a robot file to edit, with every field of a preset.
+
+    Example: `spirillum robot new my-robot.toml --from biorob2012-wide`
+    """
+    from spirillum.robot.load import new_robot_file
+
+    new_robot_file(path, preset, overwrite=force)
+    typer.echo(f"{path} written; see what follows from it with: spirillum robot show {path}")
+
+
+@robot_app.command("show")
+def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
+    """Show a robot's fields and what follows from them: arc length, volumes, weight.
+
+    Example: `spirillum robot show biorob2012-narrow`
+    """
+    from spirillum.cli import text
+
+    text.show(text.robot_answer(_loaded(robot, settings)), text.robot, json=json)
+
+
+@robot_app.command("check")
+def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
+    """Check a robot file and list every problem at once; exit code 1 if there is one.
+
+    Example: `spirillum robot check biorob2012-wide`
+    """
+    from spirillum.cli import text
+
+    problems, warnings = text.checked(robot, _overrides(settings))
+    text.show(text.check_answer(robot, problems, warnings), text.check, json=json)
+    if problems:
+        raise typer.Exit(1)
+
+
+@app.command()
+def schema(
+    name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study or calibration.")],
+) -> None:
+    """Print the JSON schema of a file: robot, study or calibration.
+
+    Example: `spirillum schema robot`
+    """
+    from spirillum.answer import as_json
+    from spirillum.cli.schemas import schema_of
+
+    typer.echo(as_json(schema_of(name)))
+
+
+@app.command()
+def citation(
+    model: Annotated[str | None, typer.Argument(help="A model, for its references too.")] = None,
+) -> None:
+    """Print what to cite: the software, its paper, and a model's references.
+
+    Example: `spirillum citation sbt`
+    """
+    from spirillum.citations import citation as answer
+
+    typer.echo(answer(model))
+
+
+def _overrides(settings: list[str] | None) -> dict[str, Any]:
+    from spirillum.robot.load import parse_setting
+
+    return dict(parse_setting(text) for text in settings or [])
+
+
+def _loaded(robot: str, settings: list[str] | None) -> Any:
+    from spirillum.robot.load import load
+
+    return load(robot, **_overrides(settings))

@@ -1,0 +1,85 @@
+"""Options that several commands share, and what the shell completes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "Calibration",
+    "Friction",
+    "Json",
+    "Model",
+    "NoCalibration",
+    "Output",
+    "RobotArgument",
+    "Settings",
+    "complete_parts",
+    "complete_presets",
+    "complete_resistance_models",
+    "complete_schemas",
+]
+
+
+def _starting(words: tuple[str, ...], incomplete: str) -> list[str]:
+    return [word for word in words if word.startswith(incomplete)]
+
+
+def complete_presets(incomplete: str) -> list[str]:
+    """Names of presets."""
+    folder = Path(__file__).parent.parent / "robot" / "presets"
+    return _starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
+
+
+def _complete_robots(incomplete: str) -> list[str]:
+    folder = Path(incomplete).parent
+    files = sorted(str(path) for path in folder.glob("*.toml")) if folder.is_dir() else []
+    return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
+
+
+def _complete_models(incomplete: str) -> list[str]:
+    return _starting(("rft", "sbt"), incomplete)
+
+
+def complete_resistance_models(incomplete: str) -> list[str]:
+    """Names of models that give a resistance matrix."""
+    return _starting(("perrin", "rft", "sbt"), incomplete)
+
+
+def complete_parts(incomplete: str) -> list[str]:
+    """Parts of a robot."""
+    return _starting(("body", "coupling", "robot", "rotor", "tail"), incomplete)
+
+
+def complete_schemas(incomplete: str) -> list[str]:
+    """Names of schemas."""
+    return _starting(("calibration", "robot", "study"), incomplete)
+
+
+def _complete_friction(incomplete: str) -> list[str]:
+    return _starting(("body", "none", "paper", "rotor"), incomplete)
+
+
+RobotArgument = Annotated[str, typer.Argument(autocompletion=_complete_robots, help="A preset's name or a TOML file.")]
+Model = Annotated[str, typer.Option(autocompletion=_complete_models, help="Hydrodynamic model: sbt or rft.")]
+Friction = Annotated[
+    str | None,
+    typer.Option(
+        autocompletion=_complete_friction,
+        help="Where the rotary friction acts: none, rotor (in the joint), body (on the wall), paper (as printed).",
+    ),
+]
+NoCalibration = Annotated[bool, typer.Option("--no-calibration", help="Leave the calibration factors out.")]
+Calibration = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Calibration file whose factors replace the robot's.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
+Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]

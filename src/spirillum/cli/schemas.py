@@ -1,0 +1,31 @@
+"""JSON schemas of the files that users write."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel
+
+from spirillum.errors import InputError, did_you_mean
+
+__all__ = ["schema_of"]
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """JSON schema of a file.
+
+    Raises:
+        InputError: for an unknown name.
+    """
+    from spirillum.robot.options import CalibrationFile
+    from spirillum.robot.robot import Robot
+    from spirillum.studies.spec import Study
+
+    known: dict[str, type[BaseModel]] = {"robot": Robot, "study": Study, "calibration": CalibrationFile}
+    if name not in known:
+        raise InputError(f"schema {name!r}{did_you_mean(name, known)}; allowed: {', '.join(known)}")
+    schema = known[name].model_json_schema()
+    if name == "robot":
+        extends = {"type": "string", "description": "Preset that the file starts from.", "title": "Extends"}
+        schema["properties"]["extends"] = extends
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

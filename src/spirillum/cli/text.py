@@ -1,0 +1,253 @@
+"""Answers as tables for people, or as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from spirillum.answer import as_json, envelope, quantity
+from spirillum.errors import InputError
+from spirillum.units import KINDS, parse_quantity, shown_in
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spirillum.robot.robot import Robot
+
+Answer = Mapping[str, Any]
+
+# What people read beside the SI value.
+_FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
+_FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml", "s": "min"}
+
+
+def show(answer: Answer, table: Callable[[Answer, Console], None], *, json: bool) -> None:
+    """Print an answer as JSON, or as the table of its kind followed by its warnings."""
+    if json:
+        typer.echo(as_json(answer))
+        return
+    console = Console()
+    table(answer, console)
+    for warning in answer["warnings"]:
+        console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)
+
+
+def _grid(title: str, *columns: str) -> Table:
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right" if column in ("value", "SI") else "left")
+    return table
+
+
+def _friendly(value: float | None, unit: str) -> tuple[str, str]:
+    if value is None:
+        return "-", ""
+    shown = _FRIENDLY.get(unit)
+    if shown is None:
+        return f"{value:.4g}", "" if unit == "1" else unit
+    return f"{shown_in(value, shown):.4g}", shown
+
+
+def _add_quantities(table: Table, items: Mapping[str, Any]) -> None:
+    for name, item in items.items():
+        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
+            value, unit = _friendly(item["value"], item["unit"])
+            si = "" if unit in ("", item["unit"]) else f"{item['value']:.6g} {item['unit']}"
+            table.add_row(name.replace("_", " "), value, unit, si)
+
+
+def prediction(answer: Answer, console: Console) -> None:
+    """Table of `predict`."""
+    calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}"
+    table = _grid(title, "quantity", "value", "unit", "SI")
+    _add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
+    console.print(table)
+    console.print(f"known error: {escape(answer['error_estimate']['statement'])}", highlight=False, soft_wrap=True)
+
+
+def resistance(answer: Answer, console: Console) -> None:
+    """Table of `resistance`."""
+    title = f"{answer['robot']}: resistance of {answer['part']}, model {answer['model']}, about {answer['about']}"
+    names = ("U_x", "U_y", "U_z", "Omega_x", "Omega_y", "Omega_z")
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
+    table.add_column("", no_wrap=True, min_width=3)
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=True)
+    for name, row in zip(("F_x", "F_y", "F_z", "T_x", "T_y", "T_z"), answer["matrix"]["value"], strict=True):
+        table.add_row(name, *("-" if entry is None else f"{entry:.4g}" for entry in row))
+    console.print(table)
+    console.print("N s/m (upper left), N s, N m s (lower right); F = -B V", highlight=False)
+
+
+def robot_answer(robot: Robot) -> dict[str, Any]:
+    """Answer of `robot show`."""
+    derived = {name: quantity(item.value, item.unit, meaning=item.meaning) for name, item in robot.derived().items()}
+    content = {"robot": robot.name, "fields": robot.model_dump(), "fields_unit": "SI", "derived": derived}
+    return envelope("robot", content, robot.warnings)
+
+
+def robot(answer: Answer, console: Console) -> None:
+    """Table of `robot show`."""
+    fields = answer["fields"]
+    console.print(f"[bold]{escape(fields['name'])}[/bold]  {escape(fields['description'])}", highlight=False)
+    table = _grid("fields (SI)", "field", "value")
+    for name, value in _flat(fields):
+        if name not in ("name", "description", "reference") and value is not None:
+            table.add_row(name, f"{value:.6g}" if isinstance(value, float) else escape(str(value)))
+    console.print(table)
+    found = _grid("what follows", "quantity", "value", "unit", "meaning")
+    for name, item in answer["derived"].items():
+        value, unit = _friendly(item["value"], item["unit"])
+        found.add_row(name.replace("_", " "), value, unit, item["meaning"])
+    console.print(found)
+
+
+def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{path}{name}.")
+        else:
+            yield f"{path}{name}", value
+
+
+def checked(robot: str, overrides: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Problems and warnings of a robot file.
+
+    Raises:
+        InputError: if there is no such file, or it is not TOML.
+    """
+    from spirillum.robot.load import load, raw_table
+
+    raw_table(robot)
+    try:
+        return (), load(robot, **overrides).warnings
+    except InputError as error:
+        return error.problems, ()
+
+
+def check_answer(robot: str, problems: Sequence[str], warnings: Sequence[str]) -> dict[str, Any]:
+    """Answer of `robot check`."""
+    return envelope("check", {"robot": robot, "valid": not problems, "problems": list(problems)}, warnings)
+
+
+def check(answer: Answer, console: Console) -> None:
+    """Text of `robot check`."""
+    for problem in answer["problems"]:
+        console.print(f"[red]problem:[/red] {escape(problem)}", highlight=False, soft_wrap=True)
+    if answer["valid"]:
+        console.print(f"{escape(answer['robot'])}: valid", highlight=False)
+
+
+def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
+    """Answer of `study`."""
+    import numpy as np
+
+    from spirillum.studies.claims import evaluated
+
+    claims = evaluated(dataset)
+    verdicts = {
+        verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
+    }
+    content = {
+        "title": dataset.attrs["title"],
+        "folder": str(output),
+        "files": sorted(str(path.relative_to(output)) for path in output.rglob("*") if path.is_file()),
+        "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        "unanswered": int(np.count_nonzero(dataset["outside"].values)),
+        "claims": verdicts,
+        "observations": dataset.attrs["observations"],
+    }
+    return envelope("study", content, [line for line in dataset.attrs["warnings"].split("\n") if line])
+
+
+def study(answer: Answer, console: Console) -> None:
+    """Text of `study`."""
+    sizes = " x ".join(f"{size} {name}" for name, size in answer["dimensions"].items())
+    console.print(f"[bold]{escape(answer['title'])}[/bold]: {sizes}", highlight=False)
+    if answer["unanswered"]:
+        console.print(f"{answer['unanswered']} results are empty: variable `outside` says why", highlight=False)
+    if any(answer["claims"].values()):
+        claims = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
+        console.print(f"statements of the paper: {claims}", highlight=False)
+    console.print(f"observations: {escape(answer['observations'])}", highlight=False)
+    console.print(f"open {escape(answer['folder'])}/report.html", highlight=False, soft_wrap=True)
+
+
+def simulation_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
+    """Answer of `simulate`: averages over the last two thirds, and the end of the run."""
+    last = dataset.isel(time=-1)
+    ends = ("position", "tail_angle", "body_angle", "electrical_energy", "battery_charge_used")
+    content: dict[str, Any] = {
+        "robot": dataset.attrs["robot"],
+        "model": dataset.attrs["model"],
+        "friction": dataset.attrs["friction"],
+        "motion": dataset.attrs["motion"],
+        "file": str(output),
+        "duration": quantity(float(last["time"]), "s"),
+    }
+    scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]
+    content |= {name: quantity(float(dataset[name]), str(dataset[name].attrs["units"])) for name in scalars}
+    content |= {f"final_{name}": quantity(float(last[name]), str(last[name].attrs["units"])) for name in ends}
+    return envelope("simulation", content, [line for line in dataset.attrs["warnings"].split("\n") if line])
+
+
+def simulation(answer: Answer, console: Console) -> None:
+    """Table of `simulate`."""
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
+    table = _grid(title, "quantity", "value", "unit", "SI")
+    _add_quantities(table, answer)
+    console.print(table)
+    console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
+
+
+def angle(text: str) -> float:
+    """An angle with its unit, rad.
+
+    Raises:
+        InputError: if it is none.
+    """
+    try:
+        return parse_quantity(text, KINDS["angle"])
+    except InputError as error:
+        raise InputError(f"phase {error}") from error
+
+
+def time_window(text: str) -> tuple[float, float]:
+    """FROM:TO, such as ``0s:2s``, in s.
+
+    Raises:
+        InputError: if it is none.
+    """
+    start, colon, stop = text.partition(":")
+    if not colon:
+        raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
+    try:
+        return parse_quantity(start, KINDS["time"]), parse_quantity(stop, KINDS["time"])
+    except InputError as error:
+        raise InputError(f"on {error}") from error
+
+
+@contextmanager
+def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar on standard error; silent for `--json`."""
+    if quiet:
+        yield lambda _what, _done, _total: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=None)
+
+        def tell(what: str, done: int, total: int) -> None:
+            bar.update(task, description=escape(what), completed=done, total=total)
+
+        yield tell
