@@ -13,10 +13,12 @@ if TYPE_CHECKING:
 else:
     _Floats = _Truths = np.ndarray
 
-__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Values", "Vectors"]
+__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Values", "Vectors"]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
+Samples: TypeAlias = Float[_Floats, "..."]
+"""Floats of any shape, unrelated to others."""
 Vectors: TypeAlias = Float[_Floats, "*#n 3"]
 """Cartesian vectors."""
 PerRobot: TypeAlias = Float[_Floats, "#n"]

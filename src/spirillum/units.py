@@ -119,7 +119,7 @@ def _factor(unit: str, kind: Kind) -> float:
     Raises:
         InputError: if `unit` is unknown or measures something else.
     """
-    hint = f'use a unit of {kind.name}, for example "{kind.example}"'
+    hint = f'allowed: a unit of {kind.name}, as in "{kind.example}"'
     if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
         raise InputError(f'"{_clip(unit)}" is not a unit; {hint}')
     registry = _registry()
@@ -131,7 +131,7 @@ def _factor(unit: str, kind: Kind) -> float:
         if accepted is not None and one.is_compatible_with(accepted):
             return float(one.to(accepted).magnitude)
     if kind.unit == "rad/s" and one.is_compatible_with("1/s"):
-        raise InputError(f'"{unit}" does not say what turns: write rad/s, Hz, rpm or turn/s')
+        raise InputError(f'"{unit}" does not say what turns; allowed: rad/s, Hz, rpm, turn/s')
     raise InputError(f'"{unit}" is not a unit of {kind.name}; {hint}')
 
 
@@ -154,7 +154,9 @@ def parse_quantity(value: object, kind: Kind) -> float:
         value = f"{value.magnitude} {value.units}"
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         shown = "a table or list" if isinstance(value, (dict, list)) else _clip(str(value))
-        raise InputError(f'= {shown} is not a {kind.name}; write it with its unit, for example "{kind.example}"')
+        raise InputError(
+            f'= {shown} is not a {kind.name}; allowed: a number with its unit, for example "{kind.example}"'
+        )
     if not isinstance(value, str):
         number, unit = value if isinstance(value, float) else float(max(-(10**300), min(value, 10**300))), ""
         shown = f"{value:.6g}" if isinstance(value, float) else _clip(f"{value:d}" if abs(value) < 10**30 else "(huge)")
@@ -162,20 +164,30 @@ def parse_quantity(value: object, kind: Kind) -> float:
         found = _QUANTITY.fullmatch(value)
         shown = f'"{_clip(value)}"'
         if found is None or len(value) > 200:
-            raise InputError(f'= {shown} is not a {kind.name}; write it with its unit, for example "{kind.example}"')
+            raise InputError(
+                f'= {shown} is not a {kind.name}; allowed: a number with its unit, for example "{kind.example}"'
+            )
         number, unit = float(found["number"]), (found["unit"] or "").strip()
         unit = f"1{unit}" if unit.startswith("/") else unit
     if not math.isfinite(number):
         raise InputError(f"= {shown} is not finite; allowed: {kind.allowed}")
     if not unit:
-        raise InputError(f'= {shown} has no unit; write one, for example "{kind.example}"')
+        raise InputError(f'= {shown} has no unit; allowed: a number with its unit, for example "{kind.example}"')
     try:
-        si = number * _factor(unit, kind)
+        si = _scaled(number, _factor(unit, kind))
     except InputError as error:
         raise InputError(f"= {shown}: {error}") from error
     if not _bound(kind.low, kind) <= si <= _bound(kind.high, kind):
         raise InputError(f"= {shown} is out of range; allowed: {kind.allowed}")
     return si
+
+
+def _scaled(number: float, factor: float) -> float:
+    """number times factor; by division where 1/factor is whole, so that 18 mm is 0.018 and not its neighbour."""
+    whole = round(1.0 / factor)
+    if factor < 1.0 and math.isclose(whole * factor, 1.0, rel_tol=1e-14):
+        return number / whole
+    return number * factor
 
 
 @lru_cache(maxsize=128)

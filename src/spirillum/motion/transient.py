@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Values
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.motion.balance import friction_torques
 from spirillum.motion.motor import battery_voltage, winding_resistance
@@ -63,21 +63,21 @@ class AxialResponse(NamedTuple):
 class MotorTransient:
     """Solution of (17) in the motor's own sense (positive the way that the voltage drives), SI."""
 
-    time: Values
+    time: Samples
     """Sample times, s."""
-    duty: Values
+    duty: Samples
     """Duty of the voltage at each sample (0 while the remote is off)."""
-    current: Values
+    current: Samples
     """I, A."""
-    charge: Values
+    charge: Samples
     """Integral of I, A s."""
-    current_squared: Values
+    current_squared: Samples
     """Integral of I^2, A^2 s."""
-    resistive_energy: Values
+    resistive_energy: Samples
     """Integral of R(I) I^2, J."""
-    electrical_energy: Values
+    electrical_energy: Samples
     """Integral of duty V(I) I, J."""
-    battery_charge: Values
+    battery_charge: Samples
     """Integral of duty I: charge drawn from the battery, A s."""
 
 
@@ -102,7 +102,7 @@ def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
 
 
 def motor_transient(
-    motor: Electrics, slip: float, time: Values, switches: Sequence[tuple[float, float]]
+    motor: Electrics, slip: float, time: Samples, switches: Sequence[tuple[float, float]]
 ) -> MotorTransient:
     """Integrate (17) with variable-order Adams-Moulton predictor-corrector steps (VODE), as the paper does.
 
@@ -114,9 +114,9 @@ def motor_transient(
     """
     right_hand_side = _right_hand_side(motor, slip)
     _check_stiffness(motor, float(time[-1]))
-    rows: list[Values] = [np.zeros((1, 6))]
-    duties: list[Values] = [np.full(1, switches[0][1])]
-    state: Values = np.zeros(6)
+    rows: list[Samples] = [np.zeros((1, 6))]
+    duties: list[Samples] = [np.full(1, switches[0][1])]
+    state: Samples = np.zeros(6)
     ends = [*(start for start, _ in switches[1:]), float(time[-1])]
     for (start, duty), end in zip(switches, ends, strict=True):
         inside = time[(time > start) & (time <= end)]
@@ -137,7 +137,7 @@ def _check_stiffness(motor: Electrics, end: float) -> None:
         )
 
 
-def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Sequence[float], float], list[float]]:
+def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Samples, float], list[float]]:
     """d/dt of (I, int I, int I^2, int R I^2, int duty V I, int duty I); plain floats, since it is called often."""
     exp = math.exp
     constant, decay, decay_rate = float(motor.constant[0]), float(motor.decay[0]), float(motor.decay_rate[0])
@@ -146,8 +146,8 @@ def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Sequence
     inductance = float(motor.inductance[0])
     emf = float(motor.back_emf_constant[0] * motor.torque_constant[0]) * slip
 
-    def derivative(_t: float, y: Sequence[float], duty: float) -> list[float]:
-        i = y[0]
+    def derivative(_t: float, y: Samples, duty: float) -> list[float]:
+        i = float(y[0])
         size = abs(i)
         r = constant + decay * exp(-decay_rate * size) + growth * exp(growth_rate * size) + slope * size
         supply = duty * (voltage - internal * size)
@@ -157,8 +157,8 @@ def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Sequence
 
 
 def _segment(
-    derivative: Callable[..., list[float]], duty: float, start: float, end: float, state: Values, samples: Values
-) -> tuple[Values, Values]:
+    derivative: Callable[..., list[float]], duty: float, start: float, end: float, state: Samples, samples: Samples
+) -> tuple[Samples, Samples]:
     """Integrate between two switchings; states at the samples and at the end."""
     from scipy.integrate import ode
 
@@ -237,7 +237,7 @@ def _duration(turns: float, turn: float, duration: str | float | None) -> float:
     return end
 
 
-def _sample_times(end: float, turn: float, samples_per_turn: int) -> Values:
+def _sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
     count = math.ceil(end / turn * samples_per_turn)
     if not 1 <= samples_per_turn <= 10_000 or count > _LARGEST_SAMPLES:
         raise InputError(
@@ -276,7 +276,7 @@ def _dataset(prediction: Prediction, motor: Electrics, r: AxialResponse, m: Moto
     torque2 = k_m**2 * m.current_squared
     shaft = r.rotor_load * r.slip * torque**2
     voltage = battery_voltage(motor, m.current)
-    series: dict[str, tuple[Values, str, str, str]] = {
+    series: dict[str, tuple[Samples, str, str, str]] = {
         "position": (r.speed * impulse, "m", "distance swum along x", ""),
         "tail_angle": (r.tail_rate * impulse, "rad", "angle of the tail in the lab", ""),
         "body_angle": (r.body_rate * impulse, "rad", "roll angle of the body", ""),

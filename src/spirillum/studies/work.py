@@ -166,7 +166,7 @@ def kept(task: Task, folder: Path | None) -> Part | None:
     if folder is None or not (folder / task.file_name).is_file():
         return None
     try:
-        with np.load(folder / task.file_name, allow_pickle=False) as stored:
+        with (folder / task.file_name).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile):
         return None

@@ -1,0 +1,81 @@
+"""Observation files: what is read, and the sentence for everything that is wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spirillum import InputError
+from spirillum.measurement.observations import read_observations, summarised
+
+HEADER = "robot,channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
+
+
+def written(folder: Path, *lines: str) -> Path:
+    path = folder / "observations.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_trials_become_means_in_si(tmp_path: Path) -> None:
+    path = written(tmp_path, "# synthetic", HEADER, "a,40,25,2.5,1,1.0,1.2,-0.1", "", "a,40,25,2.5,2,1.2,1.4,")
+    trials = read_observations(path)
+    assert [item.row for item in trials] == [3, 5]
+    found = summarised(trials)[(0.04, 0.025, 0.0025)]
+    assert found.forward_velocity.value == pytest.approx(1.1e-3)
+    assert found.tail_rate.value == pytest.approx(1.3 * 2 * np.pi)
+    assert found.body_rate.value == pytest.approx(-0.1 * 2 * np.pi)
+    assert (found.forward_velocity.trials, found.body_rate.trials, found.motor_rate.trials) == (2, 1, 0)
+    assert np.isnan(found.motor_rate.value)
+
+
+def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "channel_diameter_mm,wavelength_mm,amplitude_mm,trials,forward_velocity_mm_s,forward_velocity_mm_s_ci95",
+        "30,20,1.5,5,0.7,0.05",
+    )
+    found = next(iter(summarised(read_observations(path)).values())).forward_velocity
+    assert (found.value, found.half_width, found.trials) == (pytest.approx(7e-4), pytest.approx(5e-5), 5)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ([HEADER], "no observations"),
+        (["# only a comment"], "no observations"),
+        (["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_hz", "40,25,2.5,1"], "tail_rate_Hz"),
+        (["channel_diameter_mm,wavelength_mm,tail_rate_Hz", "40,25,1"], "'amplitude_mm' is missing"),
+        (["channel_diameter_mm,wavelength_mm,amplitude_mm", "40,25,2.5"], "no measured column"),
+        ([HEADER + ",robot", "a,40,25,2.5,1,1.0,1.2,-0.1,a"], "'robot' stands twice"),
+        ([HEADER, "a,40,25,2.5,1,fast,1.2,-0.1"], "row 2, column forward_velocity_mm_s: 'fast'"),
+        ([HEADER, "a,40,25,2.5,1,nan,1.2,-0.1"], "row 2, column forward_velocity_mm_s: 'nan'"),
+        ([HEADER, "a,40,25,2.5,1,1e999,1.2,-0.1"], "column forward_velocity_mm_s"),
+        ([HEADER, "a,-40,25,2.5,1,1,1.2,-0.1"], "column channel_diameter_mm: '-40'"),
+        ([HEADER, "a,,25,2.5,1,1,1.2,-0.1"], "column channel_diameter_mm"),
+        ([HEADER, "a,40,25,2.5,1,,,"], "nothing was measured"),
+        ([HEADER, "a,40,25"], "row 2: 3 cells"),
+        (
+            ["channel_diameter_mm,wavelength_mm,amplitude_mm,trials,tail_rate_Hz", "40,25,2.5,5,1", "40,25,2.5,5,2"],
+            "rows 2 and 3",
+        ),
+        (["channel_diameter_mm,wavelength_mm,amplitude_mm,trials,tail_rate_Hz", "40,25,2.5,0,1"], "column trials"),
+        (
+            ["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,tail_rate_Hz_ci95", "40,25,2.5,1,-1"],
+            "tail_rate_Hz_ci95",
+        ),
+    ],
+)
+def test_wrong_files_are_refused_with_row_and_column(tmp_path: Path, lines: list[str], words: str) -> None:
+    with pytest.raises(InputError, match="allowed|needed") as caught:
+        read_observations(written(tmp_path, *lines))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_binary_empty_and_missing_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
+    (tmp_path / "empty.csv").touch()
+    for name in ("binary.csv", "empty.csv", "missing.csv", "."):
+        with pytest.raises(InputError, match="allowed"):
+            read_observations(tmp_path / name)

@@ -1,0 +1,109 @@
+"""The motor's transient: energy balance, the closed form of a linear circuit, and the steady state."""
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+
+LINEAR_CIRCUIT = {
+    "motor": {"resistance": {"constant": "10 ohm", "decay": "0 ohm", "growth": "0 ohm", "slope": "0 ohm/A"}},
+    "friction": {"effective": "2e-6 N m s/rad"},
+}
+ENERGIES = (
+    "resistive_energy",
+    "magnetic_energy",
+    "conversion_energy",
+    "friction_energy",
+    "dissipated_energy",
+)
+
+
+@pytest.mark.parametrize("reading", ["none", "rotor", "body", "paper"])
+@pytest.mark.parametrize("hand", ["right", "left"])
+@pytest.mark.parametrize("model", ["sbt", "rft"])
+def test_energy_is_balanced_at_every_sample(reading: str, hand: str, model: str) -> None:
+    robot = sp.load("biorob2012-narrow", **{"tail.handedness": hand, "drive.duty": 0.7})
+    run = sp.simulate(robot, model=model, friction=reading, on=[(0.0, 0.1), (0.15, 1.0)])
+    spent = sum(run[name] for name in ENERGIES)
+    scale = float(run["electrical_energy"][-1])
+    assert scale > 0
+    np.testing.assert_allclose(run["electrical_energy"] / scale, spent / scale, atol=1e-8)
+
+
+def test_energies_are_the_integrals_of_their_powers() -> None:
+    run = sp.simulate("biorob2012-wide", model="rft", duration="0.05 s", samples_per_turn=10_000)
+    for name in ("electrical", "friction", "dissipated"):
+        power, time = run[f"{name}_power"].values, run["time"].values
+        integral = np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(time))
+        assert integral == pytest.approx(float(run[f"{name}_energy"][-1]), rel=1e-5)
+
+
+def test_linear_circuit_rises_exponentially() -> None:
+    """With constant R, L dI/dt = V - (R + r + K_b K_m dw/dtau) I has a closed form."""
+    robot = sp.load("biorob2012-wide", **LINEAR_CIRCUIT)
+    run = sp.simulate(robot, model="rft", duration="0.05 s", samples_per_turn=1000)
+    steady = sp.predict(robot, model="rft")
+    rate_per_current = steady.motor_rotation_rate / steady.motor_current
+    resistance = 10.0 + 0.8 + 0.004 * rate_per_current
+    expected = 3.7 / resistance * (1.0 - np.exp(-run["time"].values * resistance / 0.082))
+    np.testing.assert_allclose(run["motor_current"].values, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("model", ["sbt", "rft"])
+def test_average_over_the_last_two_of_three_turns_is_the_steady_state(model: str) -> None:
+    """The electrical transient lasts milliseconds, so that the paper's averages are steady values."""
+    run, steady = sp.simulate("biorob2012-wide", model=model), sp.predict("biorob2012-wide", model=model)
+    assert float(run["mean_forward_velocity"]) == pytest.approx(steady.forward_velocity, rel=1e-7)
+    assert float(run["mean_tail_rotation_rate"]) == pytest.approx(steady.tail_rotation_rate, rel=1e-7)
+    assert float(run["mean_body_rotation_rate"]) == pytest.approx(steady.body_rotation_rate, rel=1e-7)
+    turns = float(run["tail_angle"][-1]) / (2 * np.pi)
+    assert 2.9 < turns < 3.0
+
+
+def test_left_handed_robot_is_the_mirror_image() -> None:
+    right = sp.simulate("biorob2012-wide", duration="0.1 s")
+    left = sp.simulate(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), duration="0.1 s")
+    np.testing.assert_allclose(left["position"], right["position"], rtol=1e-12)
+    for name in ("tail_angle", "body_angle", "motor_current", "motor_torque"):
+        np.testing.assert_allclose(left[name], -right[name], rtol=1e-12)
+
+
+def test_switching_off_stops_the_robot() -> None:
+    run = sp.simulate("biorob2012-wide", duration="1 s", on=[(0.0, 0.4)])
+    late = run.sel(time=slice(0.6, None))
+    assert float(abs(late["motor_current"]).max()) < 1e-9
+    assert float(late["position"][-1] - late["position"][0]) == pytest.approx(0.0, abs=1e-12)
+    assert float(run["position"][-1]) > 0
+
+
+def test_battery_gives_duty_times_the_motor_current() -> None:
+    half = sp.simulate(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), duration="0.5 s")
+    charge = np.trapezoid(0.5 * half["motor_current"].values, half["time"].values)
+    assert float(half["battery_charge_used"][-1]) == pytest.approx(charge, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"turns": 0.0}, "turns = 0.0"),
+        ({"turns": float("nan")}, "turns = nan"),
+        ({"duration": "2 m"}, "duration"),
+        ({"duration": "0 s"}, "duration = 0"),
+        ({"on": [(1.0, 0.5)]}, "on = 1 s to 0.5 s"),
+        ({"on": [(0.0, 1.0), (0.5, 2.0)]}, "on = 0.5 s to 2 s"),
+        ({"on": [(float("nan"), 1.0)]}, "on = nan"),
+        ({"samples_per_turn": 0}, "samples-per-turn"),
+        ({"turns": 1e5, "samples_per_turn": 10_000}, "samples-per-turn"),
+        ({"duration": "1e5 s", "samples_per_turn": 1}, "1e+05 s"),
+    ],
+)
+def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:
+    with pytest.raises(sp.InputError, match="allowed") as caught:
+        sp.simulate("biorob2012-wide", **options)
+    assert words in str(caught.value)
+
+
+def test_only_a_motor_has_a_transient() -> None:
+    robot = sp.load("biorob2012-wide", drive={"kind": "rate", "rate": "1 Hz"})
+    with pytest.raises(sp.InputError, match="dc-motor"):
+        sp.simulate(robot)

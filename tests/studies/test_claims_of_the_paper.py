@@ -1,0 +1,82 @@
+"""Verdicts: undecidable without observed rates, decided with them, never invented."""
+
+from collections import Counter
+
+import pytest
+
+import spirillum as sp
+from spirillum.studies.claims import Claim, evaluated
+
+
+@pytest.fixture(scope="module")
+def unobserved() -> list[Claim]:
+    """Claims of the paper's study without observations."""
+    return evaluated(sp.study())
+
+
+def by_words(claims: list[Claim], words: str) -> Claim:
+    """The one claim that contains the words."""
+    found = [claim for claim in claims if words in claim.claim]
+    assert len(found) == 1, [claim.claim for claim in found]
+    return found[0]
+
+
+def test_statements_about_lost_rates_are_undecidable(unobserved: list[Claim]) -> None:
+    for words in (
+        "Reynolds number, wide",
+        "Reynolds number, narrow",
+        "lowest velocity decrease",
+        "largest velocity decrease",
+        "Forward velocity increases with wavelength",
+        "Forward velocity decreases with amplitude",
+        "body rotation rates within 1 to 50 %",
+        "B_eff depends mostly on the amplitude",
+        "SBT predicts forward velocities better",
+    ):
+        claim = by_words(unobserved, words)
+        assert claim.verdict == "undecidable", claim
+        assert "observed rates are lost" in claim.reason
+
+
+def test_friction_free_bound_exceeds_the_stated_reynolds_numbers(unobserved: list[Claim]) -> None:
+    """2.9 to 4.3 times, as an independent evaluation of the models found."""
+    factors = []
+    for channel in ("wide", "narrow"):
+        words = by_words(unobserved, f"Reynolds number, {channel}").computed.rsplit("factor of ", 1)[1]
+        factors += [float(word.split()[1]) for word in words.split(", ")]
+    assert (min(factors), max(factors)) == (2.9, 4.3)
+
+
+def test_global_drop_is_judged_without_the_rates(unobserved: list[Claim]) -> None:
+    """With equal motor rates the global loss is a weighted mean of single losses, whatever the weights."""
+    assert by_words(unobserved, "wide to narrow, by SBT").verdict == "agrees"
+    assert by_words(unobserved, "wide to narrow, by RFT").verdict == "disagrees"
+
+
+def test_every_claim_is_complete(unobserved: list[Claim]) -> None:
+    assert len(unobserved) > 20
+    for claim in unobserved:
+        assert all(claim.to_dict().values()), claim
+    verdicts = Counter(claim.verdict for claim in unobserved)
+    assert set(verdicts) == {"agrees", "disagrees", "undecidable"}
+
+
+def test_synthetic_observations_decide(planted) -> None:
+    """Speeds made by SBT: SBT then explains them best, and statements about them are decided."""
+    claims = evaluated(sp.study(observations=planted(None, "sbt", "rotor", 1e-5)))
+    assert by_words(claims, "SBT predicts forward velocities better").verdict == "agrees"
+    assert by_words(claims, "Reynolds number, wide").verdict == "disagrees"
+    assert by_words(claims, "largest velocity decrease").verdict == "disagrees"
+    assert by_words(claims, "B_eff depends mostly on the amplitude").verdict in ("agrees", "disagrees")
+    assert by_words(claims, "body rotation rates within 1 to 50 %").verdict in ("agrees", "disagrees")
+    swapped = evaluated(sp.study(observations=planted(None, "rft", "rotor", 1e-5)))
+    assert by_words(swapped, "SBT predicts forward velocities better").verdict == "disagrees"
+
+
+def test_other_studies_make_no_claims(small: dict[str, object]) -> None:
+    assert evaluated(sp.study(small)) == []
+
+
+def test_paper_study_without_a_named_tail_leaves_its_claim_open(small: dict[str, object]) -> None:
+    claims = evaluated(sp.study({**small, "claims": "biorob2012"}))
+    assert by_words(claims, "lowest velocity decrease").computed == "this study has no such tail"

@@ -1,0 +1,85 @@
+"""A study's folder: resumes after an interruption, and is refused to another study."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+import spirillum as sp
+from spirillum.studies import run
+
+
+@pytest.fixture(autouse=True)
+def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures and report have tests of their own."""
+    monkeypatch.setattr(run, "_write_report", lambda *_: None)
+
+
+def test_interrupted_study_resumes_where_it_stopped(
+    small: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = sp.study(small)
+    done: list[int] = []
+    original = run.answer
+    most = 3
+
+    def counted(task, loaded, observed):
+        if len(done) == most:
+            raise KeyboardInterrupt
+        done.append(task.number)
+        return original(task, loaded, observed)
+
+    monkeypatch.setattr(run, "answer", counted)
+    with pytest.raises(KeyboardInterrupt):
+        sp.study(small, output=tmp_path / "out")
+    assert not (tmp_path / "out" / "dataset.nc").exists()
+    assert len(list((tmp_path / "out" / "parts").glob("*.npz"))) == 3
+
+    done.clear()
+    damaged = tmp_path / "out" / "parts" / "part-00001.npz"
+    damaged.write_bytes(damaged.read_bytes()[:100])
+    resumed = sp.study(small, output=tmp_path / "out")
+    assert done == [1, 3]
+    assert resumed.identical(whole)
+    assert not (tmp_path / "out" / "parts").exists()
+
+    done.clear()
+    assert sp.study(small, output=tmp_path / "out").identical(resumed)
+    assert done == []
+
+
+def test_folder_of_another_study_is_refused(small: dict[str, object], tmp_path: Path) -> None:
+    sp.study(small, output=tmp_path / "out")
+    before = (tmp_path / "out" / "dataset.nc").read_bytes()
+    for other in ({**small, "friction": ["none"]}, {**small, "title": "Other"}):
+        with pytest.raises(sp.InputError, match="another study"):
+            sp.study(other, output=tmp_path / "out")
+    with pytest.raises(sp.InputError, match="another study"):
+        sp.study(small, output=tmp_path / "out", overrides={"tail.taper": "none"})
+    assert (tmp_path / "out" / "dataset.nc").read_bytes() == before
+
+
+def test_results_of_unknown_origin_are_not_overwritten(small: dict[str, object], tmp_path: Path) -> None:
+    (tmp_path / "dataset.nc").write_text("precious")
+    with pytest.raises(sp.InputError, match="unknown origin"):
+        sp.study(small, output=tmp_path)
+    assert (tmp_path / "dataset.nc").read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["dataset.nc"]
+
+
+def test_damaged_mark_and_file_in_place_of_a_folder_are_refused(small: dict[str, object], tmp_path: Path) -> None:
+    (tmp_path / "study.json").write_text("{")
+    with pytest.raises(sp.InputError, match="damaged"):
+        sp.study(small, output=tmp_path)
+    (tmp_path / "file").touch()
+    with pytest.raises(sp.InputError, match="folder for results"):
+        sp.study(small, output=tmp_path / "file")
+
+
+def test_dataset_of_another_version_is_computed_anew(small: dict[str, object], tmp_path: Path) -> None:
+    sp.study(small, output=tmp_path / "a")
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    (tmp_path / "b" / "dataset.nc").write_bytes(b"not NetCDF")
+    assert sp.study(small, output=tmp_path / "b").identical(sp.study(small, output=tmp_path / "a"))
+    assert json.loads((tmp_path / "b" / "study.json").read_text())["title"] == "Four tails"
