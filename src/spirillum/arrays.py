@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 else:
     _Floats = _Truths = np.ndarray
 
-__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Values", "Vectors"]
+__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Tensors", "Values", "Vectors"]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
@@ -21,13 +21,15 @@ Samples: TypeAlias = Float[_Floats, "..."]
 """Floats of any shape, unrelated to others."""
 Vectors: TypeAlias = Float[_Floats, "*#n 3"]
 """Cartesian vectors."""
+Tensors: TypeAlias = Float[_Floats, "*#n 3 3"]
+"""Cartesian 3x3 matrices."""
 PerRobot: TypeAlias = Float[_Floats, "#n"]
 """One float for each robot, or one for all."""
 Flags: TypeAlias = Bool[_Truths, "#n"]
 """One truth value for each robot, or one for all."""
-Axial: TypeAlias = Float[_Floats, "#n 4 4"]
+Axial: TypeAlias = Float[_Floats, "*#n 4 4"]
 """Axial resistance of both parts: rows and columns (F_x, T_x; U_x, Omega_x) of body, then of rotor."""
-Matrix6: TypeAlias = Float[_Floats, "#n 6 6"]
+Matrix6: TypeAlias = Float[_Floats, "*#n 6 6"]
 """Resistance matrix of one rigid part: force then torque against velocity then rotation."""
-Matrix12: TypeAlias = Float[_Floats, "#n 12 12"]
+Matrix12: TypeAlias = Float[_Floats, "*#n 12 12"]
 """Resistance matrix of both parts: body, then rotor."""

@@ -183,7 +183,7 @@ def parse_quantity(value: object, kind: Kind) -> float:
 
 
 def _scaled(number: float, factor: float) -> float:
-    """number times factor; by division where 1/factor is whole, so that 18 mm is 0.018 and not its neighbour."""
+    """Number times factor; by division where 1/factor is whole, so that 18 mm is 0.018 and not its neighbour."""
     whole = round(1.0 / factor)
     if factor < 1.0 and math.isclose(whole * factor, 1.0, rel_tol=1e-14):
         return number / whole

@@ -16,6 +16,11 @@ from spirillum.hydrodynamics.lighthill_integrals import ALPHA_MIN, COEFFICIENTS,
 PERIODS = 90
 
 
+def integrals_at(alpha: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The three integrals of the module, for numbers as well."""
+    return lighthill_integrals(np.asarray(alpha, dtype=float))
+
+
 def definition(alpha: float) -> list[float]:
     """A_1, A_2, A_3 from the integrals that define them."""
     with mp.workdps(20):
@@ -61,27 +66,27 @@ def extrapolated_to_zero(places: list[mpf], values: list[mpf]) -> mpf:
 
 @pytest.mark.parametrize("alpha", [0.05, 0.0963, 0.35, 0.7, 0.99])
 def test_definition(alpha: float) -> None:
-    np.testing.assert_allclose(lighthill_integrals(alpha), definition(alpha), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(integrals_at(alpha), definition(alpha), rtol=1e-10, atol=1e-10)
 
 
 def test_straight_filament() -> None:
     exact = (1 - np.euler_gamma, 1.5 - np.euler_gamma - np.log(2), 0.0)
-    np.testing.assert_allclose(lighthill_integrals(1.0), exact, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(integrals_at(1.0), exact, rtol=0, atol=1e-12)
 
 
 def test_not_a_number_outside_the_range() -> None:
     outside = [-1.0, 0.0, np.nextafter(ALPHA_MIN, 0), np.nextafter(1.0, 2), 3.0, np.inf, -np.inf, np.nan]
-    assert np.isnan(lighthill_integrals(outside)).all()
-    assert np.isfinite(lighthill_integrals([ALPHA_MIN, 1.0])).all()
+    assert np.isnan(integrals_at(outside)).all()
+    assert np.isfinite(integrals_at([ALPHA_MIN, 1.0])).all()
 
 
 @pytest.mark.parametrize("shape", [(), (0,), (7,), (2, 3, 4), (3, 9000)])
 def test_every_shape(shape: tuple[int, ...]) -> None:
     alpha = np.linspace(ALPHA_MIN, 1, int(np.prod(shape))).reshape(shape)
-    together = lighthill_integrals(alpha)
+    together = integrals_at(alpha)
     assert [(values.shape, values.dtype) for values in together] == 3 * [(shape, np.float64)]
     if alpha.size:
-        last = lighthill_integrals(alpha.flat[-1])
+        last = integrals_at(alpha.flat[-1])
         np.testing.assert_allclose([values.flat[-1] for values in together], last, rtol=1e-14, atol=1e-14)
 
 
@@ -96,7 +101,7 @@ def test_expansion_has_converged() -> None:
 def test_logarithm_of_the_cut_off(alpha: float) -> None:
     """int_eps^inf theta sin(theta) / rho^3 = -log(eps) + A_1 + O(eps^2)."""
     cut_offs = np.array([0.2, 0.1, 0.05])
-    remainders = [integral_from(eps, alpha) + np.log(eps) - lighthill_integrals(alpha)[0] for eps in cut_offs]
+    remainders = [integral_from(eps, alpha) + np.log(eps) - integrals_at(alpha)[0] for eps in cut_offs]
     rates = np.log2(np.abs(remainders[:-1]) / np.abs(remainders[1:]))
     np.testing.assert_allclose(rates, 2, atol=0.03)
 

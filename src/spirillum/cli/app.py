@@ -81,7 +81,7 @@ def predict(
         _loaded(robot, settings),
         model=model,
         tail_rate=tail_rate,
-        friction=friction,  # type: ignore[arg-type]  # checked by predict
+        friction=friction,
         calibrated=not no_calibration,
         calibration=calibration,
     )
@@ -113,7 +113,7 @@ def resistance(
         _loaded(robot, settings),
         part=part,
         model=model,
-        about=about,  # type: ignore[arg-type]  # checked by resistance
+        about=about,
         phase=text.angle(phase),
     )
     text.show(result.to_dict(), text.resistance, json=json)
@@ -176,7 +176,7 @@ def simulate(
     dataset = answer(
         _loaded(robot, settings),
         model=model,
-        friction=friction,  # type: ignore[arg-type]  # checked by predict
+        friction=friction,
         turns=turns,
         duration=duration,
         on=[text.time_window(window) for window in on] if on else None,

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.errors import InputError
+from spirillum.robot.fields import field_values
 from spirillum.units import KINDS, parse_quantity, shown_in
 
 if TYPE_CHECKING:
@@ -90,7 +91,11 @@ def resistance(answer: Answer, console: Console) -> None:
 def robot_answer(robot: Robot) -> dict[str, Any]:
     """Answer of `robot show`."""
     derived = {name: quantity(item.value, item.unit, meaning=item.meaning) for name, item in robot.derived().items()}
-    content = {"robot": robot.name, "fields": robot.model_dump(), "fields_unit": "SI", "derived": derived}
+    fields = {
+        path: value if unit is None else quantity(value, unit.replace("**", "^"))
+        for path, value, unit in field_values(robot)
+    }
+    content = {"robot": robot.name, "fields": fields, "derived": derived}
     return envelope("robot", content, robot.warnings)
 
 
@@ -98,10 +103,11 @@ def robot(answer: Answer, console: Console) -> None:
     """Table of `robot show`."""
     fields = answer["fields"]
     console.print(f"[bold]{escape(fields['name'])}[/bold]  {escape(fields['description'])}", highlight=False)
-    table = _grid("fields (SI)", "field", "value")
-    for name, value in _flat(fields):
-        if name not in ("name", "description", "reference") and value is not None:
-            table.add_row(name, f"{value:.6g}" if isinstance(value, float) else escape(str(value)))
+    table = _grid("fields", "field", "value", "unit")
+    for name, item in fields.items():
+        value, unit = _friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (_word(item), "")
+        if name not in ("name", "description", "reference"):
+            table.add_row(name, value, unit)
     console.print(table)
     found = _grid("what follows", "quantity", "value", "unit", "meaning")
     for name, item in answer["derived"].items():
@@ -110,12 +116,10 @@ def robot(answer: Answer, console: Console) -> None:
     console.print(found)
 
 
-def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{path}{name}.")
-        else:
-            yield f"{path}{name}", value
+def _word(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
 
 
 def checked(robot: str, overrides: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -237,17 +241,22 @@ def time_window(text: str) -> tuple[float, float]:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """A progress bar on standard error; silent for `--json`."""
+    """A progress bar on standard error; silent for `--json` and where nobody watches."""
     if quiet:
         yield lambda _what, _done, _total: None
         return
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = bar.add_task("starting", total=None)
 
-        def tell(what: str, done: int, total: int) -> None:
-            bar.update(task, description=escape(what), completed=done, total=total)
+    def tell(what: str, done: int, total: int) -> None:
+        bar.start()  # not before there is work: an error in the input leaves nothing on the screen
+        bar.update(task, description=escape(what), completed=done, total=total)
 
+    try:
         yield tell
+    finally:
+        bar.stop()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Values, Vectors
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Vectors
 
 __all__ = [
     "about_point",
@@ -26,7 +26,7 @@ _AXIAL = np.array([0, 3])
 _AXIAL_BOTH = np.array([0, 3, 6, 9])
 
 
-def skew(vector: Vectors) -> Values:
+def skew(vector: Vectors) -> Tensors:
     """S of eq. (12): the matrix with S v = p x v."""
     x, y, z = np.moveaxis(np.asarray(vector), -1, 0)
     zero = np.zeros_like(x)
@@ -34,7 +34,7 @@ def skew(vector: Vectors) -> Values:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def transfer(offset: Vectors) -> Values:
+def transfer(offset: Vectors) -> Matrix6:
     """H of B' = H' B H: velocity at the old reference point from the twist about the new one.
 
     Args:
@@ -57,7 +57,7 @@ def about_point(matrix: Matrix6, point: Vectors) -> Matrix6:
     return np.swapaxes(h, -1, -2) @ matrix @ h
 
 
-def axis_rotation(angle: PerRobot) -> Values:
+def axis_rotation(angle: PerRobot) -> Tensors:
     """Rotation by `angle` about the x axis, 3x3."""
     cos, sin = np.cos(angle), np.sin(angle)
     q = np.zeros((*np.shape(angle), 3, 3))
@@ -67,7 +67,7 @@ def axis_rotation(angle: PerRobot) -> Values:
     return q
 
 
-def rotated(matrix: Matrix6, rotation: Values) -> Matrix6:
+def rotated(matrix: Matrix6, rotation: Tensors) -> Matrix6:
     """The matrix of the part turned by `rotation` (3x3) about the reference point, Q B Q'."""
     q = np.zeros((*np.shape(rotation)[:-2], 6, 6))
     q[..., :3, :3] = q[..., 3:, 3:] = rotation

@@ -1,16 +1,19 @@
 """Lighthill's helix integrals A_1, A_2, A_3: what the far turns of a helix add to the flow at one of its points."""
 
-import numpy as np
-import numpy.typing as npt
+from __future__ import annotations
 
-Array = npt.NDArray[np.float64]
+import numpy as np
+
+from spirillum.arrays import Samples, Values
+
+__all__ = ["ALPHA_MIN", "COEFFICIENTS", "lighthill_integrals"]
 
 ALPHA_MIN = 0.05
 """Smallest axial length over arc length that the expansion covers; the largest is 1, a straight filament."""
 
 # Chebyshev coefficients of alpha A_1, alpha A_2, alpha A_3 (columns) in log(alpha / (1 + alpha/2)), mapped from
 # [ALPHA_MIN, 1] to [-1, 1]; computed by tools/fit_lighthill_integrals.py.
-COEFFICIENTS: Array = np.array(
+COEFFICIENTS: Samples = np.array(
     [
         (0.06644399565963473, 0.277932868160248, 1.3111863027215107),
         (0.2516358158970127, -0.06741229920102942, -1.2099816538895019),
@@ -53,7 +56,7 @@ COEFFICIENTS: Array = np.array(
 _BLOCK = 8192
 
 
-def lighthill_integrals(alpha: npt.ArrayLike) -> tuple[Array, Array, Array]:
+def lighthill_integrals(alpha: Values) -> tuple[Values, Values, Values]:
     """Lighthill's integrals A_1, A_2, A_3 of a helix with axial length over arc length alpha.
 
     theta is the phase from one point to another point of the helix and rho their distance, in units of the
@@ -65,16 +68,12 @@ def lighthill_integrals(alpha: npt.ArrayLike) -> tuple[Array, Array, Array]:
 
     At alpha = 1: A_1 = 1 - gamma, A_2 = 3/2 - gamma - log 2, A_3 = 0.
 
-    Parameters
-    ----------
-    alpha
-        Axial length over arc length of the helix, any shape, dimensionless.
+    Args:
+        alpha: axial length over arc length of the helix, any shape, dimensionless.
 
     Returns:
-    -------
-    A_1, A_2, A_3, each of the shape of ``alpha``, dimensionless; NaN outside [0.05, 1].
-
-    The error is below 1e-13 max(1, abs(A)), found against a multiple-precision quadrature of the definitions.
+        A_1, A_2, A_3, each of the shape of ``alpha``, dimensionless; NaN outside [0.05, 1]. The error is below
+        1e-13 max(1, abs(A)), found against a multiple-precision quadrature of the definitions.
 
     Reference: J. Lighthill, Flagellar hydrodynamics, SIAM Review 18 (1976) 161-230.
     """
@@ -84,19 +83,19 @@ def lighthill_integrals(alpha: npt.ArrayLike) -> tuple[Array, Array, Array]:
     for start in range(0, flat.size, _BLOCK):
         block = slice(start, start + _BLOCK)
         integrals[:, block] = _expansion(flat[block])
-    a1, a2, a3 = integrals.reshape(3, *values.shape)
+    a1, a2, a3 = (row.reshape(values.shape) for row in integrals)
     return a1, a2, a3
 
 
-def _expansion(alpha: Array) -> Array:
+def _expansion(alpha: Samples) -> Samples:
     """The three integrals in rows; the factor alpha in the series takes away most of the growth at small alpha."""
     inside = np.where((alpha >= ALPHA_MIN) & (alpha <= 1.0), alpha, np.nan)
     low, high = _stretched(np.array([ALPHA_MIN, 1.0]))
     position = (2.0 * _stretched(inside) - low - high) / (high - low)
-    series: Array = np.polynomial.chebyshev.chebval(position, COEFFICIENTS)
+    series: Samples = np.polynomial.chebyshev.chebval(position, COEFFICIENTS)
     return series / inside
 
 
-def _stretched(alpha: Array) -> Array:
+def _stretched(alpha: Samples) -> Samples:
     """The variable in which the expansion converges fast: singularities sit near alpha = 0, off the real axis."""
     return np.log(alpha / (1.0 + alpha / 2.0))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from spirillum.answer import envelope, quantity
-from spirillum.arrays import Values
+from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.hydrodynamics.algebra import about_point
 from spirillum.hydrodynamics.model import PARTS, ResistanceModel
@@ -35,11 +35,11 @@ class Resistance:
     """The hydrodynamic model."""
     part: str
     """The part."""
-    about: Literal["body", "tail-root"]
+    about: str
     """Reference point: the body's mid-length, or the tail's root; both on the motor axis."""
     phase: float
     """Phase of the tail, rad."""
-    matrix: Values
+    matrix: Samples
     """B, 6x6, SI; NaN where the model does not know an entry."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
@@ -68,7 +68,7 @@ def resistance(
     *,
     part: str | None = None,
     model: str = "rft",
-    about: Literal["body", "tail-root"] = "body",
+    about: str = "body",
     phase: float = 0.0,
 ) -> Resistance:
     """Resistance matrix of one part alone in the same fluid.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Values
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values, Vectors
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import both_parts, skew, two_parts_axial
 from spirillum.hydrodynamics.coefficients import axis_height, coefficient_domain, local_coefficients
@@ -75,15 +75,15 @@ def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
     return (edges[:-1, None] + half * (1.0 + node)).ravel(), (half * weight).ravel()
 
 
-def _outer(vector: Values) -> Values:
+def _outer(vector: Vectors) -> Tensors:
     return vector[..., :, None] * vector[..., None, :]
 
 
-def _local_matrix(batch: RobotBatch, tangent: Values) -> Values:
+def _local_matrix(batch: RobotBatch, tangent: Vectors) -> Tensors:
     """R C R' of eq. (12): force per arc length and velocity, in body axes."""
     c = local_coefficients(batch)
     normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
-    local: Values = normal * np.eye(3) + (tangential - normal) * _outer(tangent)
+    local: Tensors = normal * np.eye(3) + (tangential - normal) * _outer(tangent)
     if c.floor_normal is not None:
         up = np.array([0.0, 0.0, 1.0]) - tangent[..., 2:] * tangent
         across = up / np.linalg.norm(up, axis=-1, keepdims=True)
@@ -167,7 +167,8 @@ class Rft(SwimmerModel):
     references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "perrin1934")
     known_error = (
         "against a resolved wire (25, 2.5 mm) the printed coefficients give about +57 % drag, +20 % thrust and "
-        "-31 % axial torque of the tail; body and tail do not interact, which alone adds some 15 % to the speed"
+        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +5 and -51 %; body and "
+        "tail do not interact, which alone adds some 15 % to the speed"
     )
     parts = ("body", "tail", "rotor", "robot")
 

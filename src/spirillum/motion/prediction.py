@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.hydrodynamics.coefficients import axis_height
-from spirillum.motion.swimming import Swimming, calibrated_balance, requirements, swim
+from spirillum.motion.swimming import Swimming, calibrated_balance, friction_reading, requirements, swim
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
@@ -98,7 +98,7 @@ def predict(
     *,
     model: str = "sbt",
     tail_rate: str | float | None = None,
-    friction: FrictionReading | None = None,
+    friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
 ) -> Prediction:
@@ -118,9 +118,7 @@ def predict(
         InputError: for wrong input, or a robot outside the model's domain.
     """
     ready, chosen, batch = prepared(robot, model, calibration)
-    reading = friction or ready.friction.reading
-    if reading not in get_args(FrictionReading):
-        raise InputError(f"friction = {reading!r}; allowed: {', '.join(get_args(FrictionReading))}")
+    reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import get_args
+from typing import cast, get_args
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 
-__all__ = ["Swimming", "calibrated_balance", "requirements", "swim"]
+__all__ = ["Swimming", "calibrated_balance", "friction_reading", "requirements", "swim"]
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
 
@@ -135,7 +135,7 @@ def swim(
     *,
     tail_rate: PerRobot | None = None,
     motor_rate: PerRobot | None = None,
-    friction: FrictionReading | None = None,
+    friction: str | None = None,
     calibrated: bool = True,
 ) -> Swimming:
     """Steady swimming of every robot of a batch.
@@ -160,14 +160,24 @@ def swim(
     chosen = find_swimmer_model(model)
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
     free = tail_rate is None and motor_rate is None
-    reading = friction or batch.friction
-    if reading not in get_args(FrictionReading):
-        raise InputError(f"friction = {reading!r}; allowed: {', '.join(get_args(FrictionReading))}")
+    reading = friction_reading(friction or batch.friction)
     parts = [
         _swim_block(block, chosen, tail[cut], motor[cut], reading, free=free, calibrated=calibrated)
         for cut, block in batch.blocks(_BLOCK)
     ]
     return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+
+
+def friction_reading(name: str) -> FrictionReading:
+    """The reading of that name.
+
+    Raises:
+        InputError: if there is none.
+    """
+    for reading in get_args(FrictionReading):
+        if name == reading:
+            return cast("FrictionReading", reading)
+    raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionReading))}")
 
 
 def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
@@ -227,8 +237,8 @@ def _driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> _
     t = friction_torques(friction, effective, rotor)
     none = np.full(1, np.nan)
     if batch.drive == "rate":
-        body_rate = -(s.br + t.br + s.rr + t.rr) / (s.bb + t.bb + s.rb + t.rb) * batch.drive_rate
-        return _State(body_rate, batch.drive_rate, none, effective, t, none)
+        body_rate, tail = _rates_by_torque_sum(s, t, batch.drive_rate, none)
+        return _State(body_rate, tail, none, effective, t, none)
     bb, br, rb, rr = s.bb + t.bb, s.br + t.br, s.rb + t.rb, s.rr + t.rr
     determinant = bb * rr - br * rb
     body_per_torque, tail_per_torque = -(rr + br) / determinant, (bb + rb) / determinant
@@ -284,6 +294,7 @@ def _rates_by_torque_sum(
 ) -> tuple[PerRobot, PerRobot]:
     """(Omega, omega) from the sum of both torque rows, in which the joint torque cancels."""
     on_body, on_tail = s.bb + t.bb + s.rb + t.rb, s.br + t.br + s.rr + t.rr
+    on_body = np.where(on_body > 0, on_body, np.nan)  # `paper` beyond E_x: as in `_driven`
     tail = np.where(np.isnan(tail_rate), motor_rate * on_body / (on_body + on_tail), tail_rate)
     return -on_tail / on_body * tail, tail
 

@@ -20,7 +20,6 @@ from spirillum.motion.balance import friction_torques
 from spirillum.motion.motor import battery_voltage, winding_resistance
 from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.swimming import calibrated_balance
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_quantity
@@ -180,7 +179,7 @@ def simulate(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = "sbt",
-    friction: FrictionReading | None = None,
+    friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
     turns: float = 3.0,

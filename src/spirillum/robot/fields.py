@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any, NamedTuple, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
@@ -16,6 +17,7 @@ __all__ = [
     "Charge",
     "Density",
     "Factor",
+    "FieldValue",
     "Inductance",
     "InverseCurrent",
     "Length",
@@ -30,6 +32,7 @@ __all__ = [
     "TorqueConstant",
     "Viscosity",
     "Voltage",
+    "field_values",
 ]
 
 
@@ -60,9 +63,41 @@ def _schema(kind: Kind) -> WithJsonSchema:
     )
 
 
-def _quantity(name: str) -> tuple[BeforeValidator, WithJsonSchema]:
+def _quantity(name: str) -> tuple[Kind, BeforeValidator, WithJsonSchema]:
+    """What makes a float a quantity; the kind stays with the field, so that `field_values` knows its unit."""
     kind = KINDS[name]
-    return BeforeValidator(_reader(kind)), _schema(kind)
+    return kind, BeforeValidator(_reader(kind)), _schema(kind)
+
+
+class FieldValue(NamedTuple):
+    """A field of a section with its value."""
+
+    path: str
+    """Dotted name in the file."""
+    value: Any
+    """Value; SI for a quantity, None where unset."""
+    unit: str | None
+    """SI unit of a quantity, None for anything else."""
+
+
+def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
+    """All fields of a section and the sections within it."""
+    for name, info in type(section).model_fields.items():
+        value = getattr(section, name)
+        kinds = [item for item in _all_metadata(info) if isinstance(item, Kind)]
+        if isinstance(value, Section):
+            yield from field_values(value, f"{path}{name}.")
+        elif isinstance(value, dict):
+            for key, item in value.items():
+                yield from field_values(item, f"{path}{name}.{key}.")
+        else:
+            yield FieldValue(f"{path}{name}", value, kinds[0].unit if kinds else None)
+
+
+def _all_metadata(info: FieldInfo) -> list[Any]:
+    """Metadata of a field, also of one that may be None (there it sits inside the union)."""
+    inside = [item for part in get_args(info.annotation) for item in getattr(part, "__metadata__", ())]
+    return [*info.metadata, *inside]
 
 
 Length = Annotated[float, *_quantity("length")]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from spirillum.robot.fields import Factor, Length, Section
 
@@ -18,6 +18,25 @@ __all__ = [
     "RftOptions",
     "SbtOptions",
 ]
+
+
+def _read_word(value: Any) -> Any:
+    """TOML reads an unquoted `true` as a truth value; here it is a word."""
+    return "true" if value is True else value
+
+
+def _read_switch(value: Any) -> bool:
+    if value in ("on", "off") or isinstance(value, bool):
+        return value in ("on", True)
+    raise ValueError("'on' or 'off' (true or false)")
+
+
+Switch = Annotated[
+    bool,
+    BeforeValidator(_read_switch),
+    WithJsonSchema({"anyOf": [{"type": "boolean"}, {"enum": ["on", "off"]}], "default": False}),
+]
+"""Something that is on or off."""
 
 
 class PerrinOptions(Section):
@@ -34,11 +53,11 @@ class RftOptions(Section):
     """Local resistance coefficients; `brennen-winet` are those near a plane floor."""
     axis_height: Length | None = None
     """For `brennen-winet`: height of the tail's axis above the floor; unset: the body's radius (lying on it)."""
-    arc_element: Literal["printed", "true"] = "printed"
+    arc_element: Annotated[Literal["printed", "true"], BeforeValidator(_read_word)] = "printed"
     """Arc element in (12): printed `(l/L_t) dx`, or the true `ds` on the tapered root."""
     row4: Literal["kept", "zeroed"] = "kept"
     """Row 4 of the tail's matrix in (15): kept (correct), or zeroed as printed, for comparison."""
-    spin: bool = Field(default=False, strict=True)
+    spin: Switch = False
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
 
 
@@ -47,7 +66,7 @@ class SbtOptions(Section):
 
     eps_constant: Literal["printed", "exact"] = "printed"
     """Constant of eps: the printed 2.6, or the exact `pi sqrt(e)/2` = 2.58981."""
-    spin: bool = Field(default=False, strict=True)
+    spin: Switch = False
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
 
 

@@ -112,6 +112,11 @@ def _computed(
     todo = list(tasks(loaded))
     answers: list[tuple[Task, Part]] = []
     warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
+    if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
+        warnings.append(
+            "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
+            "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
+        )
     for done, task in enumerate(todo):
         tell(f"{task.model}, {task.batch.size} robots", done, len(todo))
         part = kept(task, parts)

@@ -129,7 +129,7 @@ def _at_assumed_rates(task: Task, rates: Sequence[float], readings: Sequence[str
     assert electrics is not None  # noqa: S101 - the caller has asked
     polarity = np.broadcast_to(electrics.polarity, (task.batch.size,))
     curves = [
-        [swim(task.batch, task.model, motor_rate=rate * polarity, friction=reading) for rate in rates]  # type: ignore[arg-type]
+        [swim(task.batch, task.model, motor_rate=rate * polarity, friction=reading) for rate in rates]
         for reading in readings
     ]
     return {

@@ -1,0 +1,137 @@
+"""Bad input: one sentence on standard error, exit code 2, nothing on standard output, nothing written."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+WIDE = "biorob2012-wide"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["predict"], "Missing argument"),
+        (["swim"], "No such command"),
+        (["predict", WIDE, "--modle", "sbt"], "No such option"),
+        (["predict", "biorob2012-wild"], "did you mean biorob2012-wide?"),
+        (["predict", "missing.toml"], "missing.toml does not exist"),
+        (["predict", "."], "is a folder"),
+        (["predict", ""], "is a folder"),
+        (["predict", WIDE, "--model", "cfd"], "model = 'cfd'; allowed: sbt, rft"),
+        (["predict", WIDE, "--model", "perrin"], "model = 'perrin'"),
+        (["predict", WIDE, "--friction", "ice"], "friction = 'ice'; allowed: none, rotor, body, paper"),
+        (["predict", WIDE, "--tail-rate", "1"], 'tail-rate = "1" has no unit'),
+        (["predict", WIDE, "--tail-rate", "1/s"], "does not say what turns"),
+        (["predict", WIDE, "--tail-rate", "0 Hz"], "a tail at rest drives nothing"),
+        (["predict", WIDE, "--tail-rate", "nan Hz"], "is not finite"),
+        (["predict", WIDE, "--set", "tail.wavelength"], "is not PATH=VALUE"),
+        (["predict", WIDE, "--set", "tail.wavelength=20"], "tail.wavelength = 20 has no unit"),
+        (["predict", WIDE, "--set", "tail.wavelength=20 s"], '"s" is not a unit of length'),
+        (["predict", WIDE, "--set", "tail.wavelength=0mm"], "out of range"),
+        (["predict", WIDE, "--set", "tail.wavelenght=20mm"], "did you mean wavelength?"),
+        (["predict", WIDE, "--set", "tail.amplitude=21mm"], "tail.amplitude = 21 mm; allowed: less than 19.5 mm"),
+        (["predict", WIDE, "--set", "tail.wire_diameter=6mm", "--model", "rft"], "reversing the thrust"),
+        (["predict", WIDE, "--set", "a" * 5000 + "=1"], "is not a known field"),
+        (["predict", WIDE, "--set", "tail=" + "[" * 3000], "tail = "),
+        (["predict", WIDE, "--set", "tail.wavelength=\x1b[31m"], "tail.wavelength"),
+        (["predict", WIDE, "--set", "drive.kind=rate"], "drive.rate is missing"),
+        (
+            ["predict", WIDE, "--set", "friction.effective=1e-3 N m s/rad", "--friction", "paper"],
+            "friction.effective = 0.001 N m s/rad; allowed: less than E_x",
+        ),
+        (["resistance", WIDE, "--part", "tail", "--model", "perrin"], "allowed: body"),
+        (["resistance", WIDE, "--part", "coupling"], "allowed: body, tail, rotor, robot"),
+        (["resistance", WIDE, "--part", "wing"], "part = 'wing'"),
+        (["resistance", WIDE, "--about", "nose"], "allowed: body, tail-root"),
+        (["resistance", WIDE, "--phase", "1"], "has no unit"),
+        (["simulate", WIDE], "Missing option"),
+        (["simulate", WIDE, "-o", "no/such/folder/run.nc"], "cannot be written"),
+        (["simulate", WIDE, "-o", "run.nc", "--on", "2s"], "is not FROM:TO"),
+        (["simulate", WIDE, "-o", "run.nc", "--on", "2s:1s"], "start before stop"),
+        (["simulate", WIDE, "-o", "run.nc", "--turns", "many"], "--turns"),
+        (["study", "missing.toml"], "missing.toml does not exist"),
+        (["study", "--observations", "missing.csv"], "missing.csv does not exist"),
+        (["study", "--set", "tail.taper=1e9"], "tail.taper"),
+        (["schema", "robots"], "did you mean robot?"),
+        (["citation", "cfd"], "allowed"),
+        (["robot", "check", "missing.toml"], "does not exist"),
+        (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),
+        (["robot", "new", "no/such/folder/x.toml"], "cannot be written"),
+    ],
+)
+def test_one_sentence_and_code_2(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run(*arguments)
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert words in outcome.err
+    assert outcome.err.startswith("spirillum: ")
+    assert outcome.err.count("\n") == 1
+    assert outcome.err.rstrip("\n").isprintable()
+    assert len(outcome.err) < 500
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"\n \n", "is empty"),
+        (bytes(range(256)), "is not text"),
+        (b"[body", "is not TOML"),
+        (b"body = 1\n", "body = 1"),
+        (b"a = " + b"[" * 4000 + b"]" * 4000, "nested too deeply"),
+        (b"a." * 2000 + b"b = 1\n", "body is missing"),
+        (b'extends = "nothing"\n', "extends"),
+        (b'extends = "biorob2012-wide"\n[tail]\nwavelength = nan\n', "tail.wavelength = nan"),
+        (b'extends = "biorob2012-wide"\n[tail]\nwavelength = 1979-05-27\n', "tail.wavelength"),
+        (b'extends = "biorob2012-wide"\ntail.wavelength = 1' + b"0" * 5000, "too long"),
+    ],
+)
+def test_broken_robot_files(run: Callable[..., Any], tmp_path: Path, content: bytes, words: str) -> None:
+    path = tmp_path / "robot.toml"
+    path.write_bytes(content)
+    outcome = run("predict", str(path))
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert outcome.err.count("\n") == 1
+
+
+def test_huge_file_is_refused_unread(run: Callable[..., Any], tmp_path: Path) -> None:
+    path = tmp_path / "huge.toml"
+    with path.open("wb") as stream:
+        os.truncate(stream.fileno(), 100 * 2**20)
+    outcome = run("predict", str(path))
+    assert outcome.code == 2
+    assert "104857600 bytes" in outcome.err
+
+
+def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from spirillum.studies import run as study_run
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study_run, "answer", interrupted)
+    outcome = run("study", "-o", str(tmp_path / "out"))
+    assert outcome.code == 130
+    assert "interrupted" in outcome.err
+    assert not (tmp_path / "out" / "dataset.nc").exists()
+
+
+def test_our_own_errors_are_not_hidden(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A defect of ours must not look like bad input."""
+    from spirillum.cli import main
+    from spirillum.motion import prediction
+
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(prediction, "predict", broken)
+    with pytest.raises(ZeroDivisionError):
+        main(["predict", WIDE])
