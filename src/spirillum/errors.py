@@ -18,8 +18,14 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str, problems: Iterable[str] = ()) -> None:
-        self.problems: tuple[str, ...] = tuple(problems) or (message,)
-        super().__init__(message)
+        sentence = _one_line(message)
+        self.problems: tuple[str, ...] = tuple(_one_line(problem) for problem in problems) or (sentence,)
+        super().__init__(sentence)
+
+
+def _one_line(text: str) -> str:
+    """The text in one printable line, whatever a user's file put into it."""
+    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

@@ -24,8 +24,10 @@ _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
 )
 # Letters, products, quotients and one-digit powers: nothing that could be expensive to read.
-_UNIT = re.compile(r"(?:[^\W\d_]|[ */·().°²³⁻¹]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
+_UNIT = re.compile(r"(?:[^\W\d]|[ */·().°²³⁻¹]|\*\*-?\d(?!\d)|\^-?\d(?!\d)|(?<![\w.])1(?=\s*/))+")
+_POWER_OF_A_POWER = re.compile(r"[\d²³¹]\s*(?:\*\*|\^|[²³¹])")
 _LONGEST_UNIT = 40
+_OHM_SIGNS = {0x2126: " ohm", 0x03A9: " ohm"}
 
 Hz = 2 * math.pi
 """One turn per second in rad/s."""
@@ -57,6 +59,7 @@ _SHOWN: dict[str, float] = {
     "mm/turn": 1e-3 / (2 * math.pi),
     "m/rad": 1.0,
     "min": 60.0,
+    "turn": 2 * math.pi,
     "%": 1e-2,
 }
 
@@ -119,8 +122,9 @@ def _factor(unit: str, kind: Kind) -> float:
     Raises:
         InputError: if `unit` is unknown or measures something else.
     """
+    unit = unit.translate(_OHM_SIGNS)
     hint = f'allowed: a unit of {kind.name}, as in "{kind.example}"'
-    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit) or _POWER_OF_A_POWER.search(unit):
         raise InputError(f'"{_clip(unit)}" is not a unit; {hint}')
     registry = _registry()
     try:

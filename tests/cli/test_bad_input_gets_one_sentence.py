@@ -19,7 +19,7 @@ WIDE = "biorob2012-wide"
         (["predict", "biorob2012-wild"], "did you mean biorob2012-wide?"),
         (["predict", "missing.toml"], "missing.toml does not exist"),
         (["predict", "."], "is a folder"),
-        (["predict", ""], "is a folder"),
+        (["predict", ""], "robot = ''; allowed: a preset"),
         (["predict", WIDE, "--model", "cfd"], "model = 'cfd'; allowed: sbt, rft"),
         (["predict", WIDE, "--model", "perrin"], "model = 'perrin'"),
         (["predict", WIDE, "--friction", "ice"], "friction = 'ice'; allowed: none, rotor, body, paper"),

@@ -46,12 +46,10 @@ def _explained(error: BaseException) -> int | None:
     if isinstance(error, MemoryError):
         return _fail("the request does not fit into memory; allowed: a smaller one", 2)
     if hasattr(error, "format_message"):  # a usage error of the command-line library
-        return _fail(error.format_message(), 2)
+        return _fail(str(InputError(error.format_message())), 2)
     return None
 
 
 def _fail(sentence: str, code: int) -> int:
-    line = " ".join(sentence.split())
-    printable = "".join(c if c.isprintable() else "?" for c in line)
-    sys.stderr.write(f"spirillum: {printable}\n")
+    sys.stderr.write(f"spirillum: {sentence}\n")
     return code

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,7 +27,8 @@ Answer = Mapping[str, Any]
 
 # What people read beside the SI value.
 _FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
-_FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml", "s": "min"}
+_FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml"}
+_LONG = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
 
 
 def show(answer: Answer, table: Callable[[Answer, Console], None], *, json: bool) -> None:
@@ -51,6 +53,8 @@ def _friendly(value: float | None, unit: str) -> tuple[str, str]:
     if value is None:
         return "-", ""
     shown = _FRIENDLY.get(unit)
+    if unit in _LONG and abs(value) >= _LONG[unit][0]:
+        shown = _LONG[unit][1]
     if shown is None:
         return f"{value:.4g}", "" if unit == "1" else unit
     return f"{shown_in(value, shown):.4g}", shown

@@ -94,17 +94,19 @@ def coefficient_domain(batch: RobotBatch) -> list[Limit]:
     if chosen == "brennen-winet":
         height = axis_height(batch)
         return [
-            Limit.more_than(
+            Limit.of(
                 "model.rft.axis_height",
                 height,
+                "more than",
                 batch.amplitude + 0.5 * diameter,
                 "mm",
                 "the wire may not touch the floor",
                 "wire-touches-floor",
             ),
-            Limit.more_than(
+            Limit.of(
                 "model.rft.axis_height",
                 height,
+                "more than",
                 np.e * diameter / 4.0,
                 "mm",
                 "log(2 h/a) has to exceed 1",
@@ -117,4 +119,4 @@ def coefficient_domain(batch: RobotBatch) -> list[Limit]:
         "lighthill": np.exp(0.5) / 0.36 * diameter * batch.arc_fraction,
     }[chosen]
     why = f"the '{chosen}' coefficients give c_t > c_n for a wire so thick (tail.wire_diameter), reversing the thrust"
-    return [Limit.more_than("tail.wavelength", batch.wavelength, least, "mm", why, "wire-too-thick-for-rft")]
+    return [Limit.of("tail.wavelength", batch.wavelength, "more than", least, "mm", why, "wire-too-thick-for-rft")]

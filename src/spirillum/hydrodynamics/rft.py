@@ -164,7 +164,7 @@ class Rft(SwimmerModel):
 
     name = "rft"
     title = "RFT"
-    references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "perrin1934")
+    references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "katz1975", "jeffrey1981", "perrin1934")
     known_error = (
         "against a resolved wire (25, 2.5 mm) the printed coefficients give about +57 % drag, +20 % thrust and "
         "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +5 and -51 %; body and "
@@ -181,9 +181,10 @@ class Rft(SwimmerModel):
         cautions = thin_wire_cautions(batch, 2.6)
         if batch.options.rft.coefficients == "brennen-winet":
             cautions.append(
-                Limit.less_than(
+                Limit.of(
                     "model.rft.axis_height",
                     axis_height(batch),
+                    "less than",
                     batch.tail_length,
                     "mm",
                     "the near-floor coefficients hold for h well below the tail's length",

@@ -11,6 +11,7 @@ reproduces (1), (2), (4) and (5). `L_t` of the printed equations is the wire's a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -100,9 +101,10 @@ class Sbt(SwimmerModel):
         with np.errstate(divide="ignore", invalid="ignore"):
             f = helix_functions(batch)
         limits = [
-            Limit.at_most(
+            Limit.of(
                 "tail.amplitude",
                 batch.amplitude,
+                "at most",
                 batch.wavelength * np.sqrt(ALPHA_MIN**-2 - 1.0) / (2.0 * np.pi),
                 "mm",
                 f"slender-body theory is tabulated for alpha from {ALPHA_MIN:g} to 1",
@@ -112,8 +114,8 @@ class Sbt(SwimmerModel):
         inside = limits[0].holds
         why = "the wire (tail.wire_diameter) is too thick, or the helix too short, for slender-body theory"
         for name, value in (("1/chi", f.torque), ("q", f.q), ("Psi", f.Psi), ("psi", f.psi)):
-            limit = Limit.more_than(f"{name} of eqs (1)-(7)", value, 0.0, "1", why, "outside-slender-body-theory")
-            limits.append(Limit(**{**limit.__dict__, "holds": limit.holds | ~inside}))
+            limit = Limit.of(f"{name} of eqs (1)-(7)", value, "more than", 0.0, "1", why, "outside-slender-body-theory")
+            limits.append(replace(limit, holds=limit.holds | ~inside))
         return limits
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:

@@ -21,15 +21,20 @@ def winding_resistance(motor: Electrics, current: PerRobot) -> PerRobot:
     return (
         motor.constant
         + motor.decay * np.exp(-motor.decay_rate * i)
-        + motor.growth * np.exp(motor.growth_rate * i)
+        + motor.growth * np.exp(_bounded(motor.growth_rate * i))
         + motor.slope * i
     )
+
+
+def _bounded(exponent: PerRobot) -> PerRobot:
+    """An exponent whose exponential is still a number: far currents are tried on the way to a root."""
+    return np.minimum(exponent, 600.0)
 
 
 def _resistance_slope(motor: Electrics, i: PerRobot) -> PerRobot:
     return (
         -motor.decay * motor.decay_rate * np.exp(-motor.decay_rate * i)
-        + motor.growth * motor.growth_rate * np.exp(motor.growth_rate * i)
+        + motor.growth * motor.growth_rate * np.exp(_bounded(motor.growth_rate * i))
         + motor.slope
     )
 
@@ -48,8 +53,9 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
         back_emf_per_current: K_b d(omega_m)/dI of whatever the motor turns, V/A, not negative.
 
     Returns:
-        The current, A; negative where the tail drives the motor (back-emf above the voltage). It is the
-        single root (the robot file is checked for that), found by Newton steps kept inside a bracket.
+        The current, A; negative where the tail drives the motor (back-emf above the voltage), NaN where it
+        does so beyond any root. While the motor drives there is a single root (the robot file is checked for
+        that), found by Newton steps kept inside a bracket.
     """
     open_voltage = motor.duty * motor.voltage - back_emf
     sense = np.where(open_voltage < 0, -1.0, 1.0)
@@ -60,22 +66,25 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
         return (winding_resistance(motor, i) + linear) * i - drive
 
     low = np.zeros(np.broadcast_shapes(drive.shape, linear.shape, motor.constant.shape))
-    i = low + drive / (motor.constant + motor.growth + np.maximum(linear, 0.0))
+    at_rest = motor.constant + motor.decay + motor.growth + np.maximum(linear, 0.0)
+    i = low + drive / np.where(at_rest > 0, at_rest, 1.0)
     high = 2.0 * i + 1e-12
     for _ in range(60):
         short = excess(high) < 0
         if not np.any(short):
             break
         high = np.where(short, 2.0 * high, high)
-    for _ in range(100):
+    high = np.where(excess(high) < 0, np.nan, high)  # driven too fast: V(|I|) falls faster than R(I) I rises
+    last = high - low
+    for _ in range(200):
         f = excess(i)
         low, high = np.where(f < 0, i, low), np.where(f < 0, high, i)
-        slope = winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i
-        newton = i - f / slope
-        step = np.where((newton >= low) & (newton <= high), newton, 0.5 * (low + high))
-        settled = np.abs(step - i) <= 1e-9 * np.abs(i)  # Newton's next error is the square of this step
-        i = step
-        if np.all(settled | ~np.isfinite(f)):
+        newton = i - f / (winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i)
+        # Newton creeps along an exponential: a step that is not half the one before gives way to bisection.
+        good = (newton >= low) & (newton <= high) & (np.abs(newton - i) <= 0.5 * last)
+        new = np.where(good, newton, 0.5 * (low + high))
+        last, i = np.abs(new - i), new
+        if not np.any(last > 1e-9 * np.abs(i)):  # Newton's next error is the square of this step
             break
     return sense * i
 

@@ -187,17 +187,19 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
     inertia = "inertia is neglected (Stokes flow)"
     return [
         *model.cautions(batch),
-        Limit.at_most(
+        Limit.of(
             "Reynolds number (body diameter)",
             result.reynolds_number,
+            "at most",
             _LARGEST_REYNOLDS,
             "1",
             inertia,
             "reynolds-number",
         ),
-        Limit.at_most(
+        Limit.of(
             "Reynolds number (tail amplitude)",
             result.tail_reynolds_number,
+            "at most",
             _LARGEST_REYNOLDS,
             "1",
             inertia,
@@ -256,6 +258,11 @@ def _drive_warnings(
     return found + _prescribed_rate_warnings(robot, reading, result)
 
 
+def _against_the_drive(robot: Robot, result: Swimming) -> bool:
+    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+    return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
+
+
 def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]:
     if reading == "none":
         return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
@@ -272,7 +279,12 @@ def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Sw
     if reading in ("rotor", "paper"):
         if robot.friction.effective is not None:
             found.append("friction.effective is ignored: with a tail rate it is inferred from (17) and (18)")
-        if result.effective_friction[0] < 0:
+        if _against_the_drive(robot, result):
+            found.append(
+                "the tail turns against the way that its motor drives (motor.polarity, tail.handedness): the inferred "
+                "effective friction has no meaning"
+            )
+        elif result.effective_friction[0] < 0:
             found.append(
                 "the inferred effective friction is negative: at this rate the model's hydrodynamic torque exceeds "
                 "what the motor gives"

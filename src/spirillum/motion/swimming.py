@@ -158,6 +158,8 @@ def swim(
             leaves the motion open.
     """
     chosen = find_swimmer_model(model)
+    if batch.joint == "fixed" and motor_rate is not None:
+        raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
     free = tail_rate is None and motor_rate is None
     reading = friction_reading(friction or batch.friction)
@@ -309,6 +311,7 @@ def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, moto
     body_rate = np.where(np.isnan(tail_rate), from_motor, -(k * current + s.br * tail_rate) / s.bb)
     tail = np.where(np.isnan(tail_rate), body_rate + motor_rate, tail_rate)
     slip = np.where(observed, motor_rate, tail - body_rate)
+    tail = np.where(tail * slip > 0, tail, np.nan)  # B_eff beyond E_x pushes the tail backwards: as in `_driven`
     inferred = (k * current - s.rotor_load(body_rate, tail)) / slip
     t = friction_torques("paper", inferred, motor.rotor_friction)
     return _State(body_rate, tail, current, inferred, t, np.full(1, np.nan))

@@ -57,7 +57,7 @@ def _schema(kind: Kind) -> WithJsonSchema:
     return WithJsonSchema(
         {
             "type": "string",
-            "description": f"{kind.name} with its unit, {kind.allowed}",
+            "x-quantity": {"kind": kind.name, "unit": kind.unit, "minimum": kind.low, "maximum": kind.high},
             "examples": [kind.example],
         }
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -43,22 +43,27 @@ class Limit:
     flag: str
 
     @classmethod
-    def more_than(cls, field: str, value: PerRobot, bound: PerRobot | float, unit: str, why: str, flag: str) -> Limit:
-        """`value` has to exceed `bound`."""
+    def of(
+        cls,
+        field: str,
+        value: PerRobot,
+        relation: Literal["more than", "less than", "at least", "at most", "exactly"],
+        bound: PerRobot | float,
+        unit: str,
+        why: str,
+        flag: str,
+    ) -> Limit:
+        """The requirement that `value` stands in `relation` to `bound`; equality is read to rounding error."""
         limit = np.atleast_1d(np.asarray(bound, dtype=float))
-        return cls(field, value, "more than", limit, unit, why, value > limit, flag)
-
-    @classmethod
-    def less_than(cls, field: str, value: PerRobot, bound: PerRobot | float, unit: str, why: str, flag: str) -> Limit:
-        """`value` has to stay below `bound`."""
-        limit = np.atleast_1d(np.asarray(bound, dtype=float))
-        return cls(field, value, "less than", limit, unit, why, value < limit, flag)
-
-    @classmethod
-    def at_most(cls, field: str, value: PerRobot, bound: PerRobot | float, unit: str, why: str, flag: str) -> Limit:
-        """`value` may not exceed `bound`."""
-        limit = np.atleast_1d(np.asarray(bound, dtype=float))
-        return cls(field, value, "at most", limit, unit, why, value <= limit, flag)
+        slack = 1e-12 * np.abs(np.where(np.isinf(limit), 0.0, limit))
+        holds = {
+            "more than": value > limit,
+            "less than": value < limit,
+            "at least": value >= limit - slack,
+            "at most": value <= limit + slack,
+            "exactly": np.abs(value - limit) <= slack,
+        }[relation]
+        return cls(field, value, relation, limit, unit, why, holds, flag)
 
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
@@ -88,116 +93,107 @@ def all_hold(limits: Iterable[Limit]) -> Flags:
 
 def assembly_limits(batch: RobotBatch) -> list[Limit]:
     """What a robot needs so that it can be built and put into its channel."""
-    b = batch
-    limits = _body_limits(b) + _tail_limits(b)
-    total = b.body_length + b.coupling_length + b.tail_length
+    return [*_body_limits(batch), *_tail_limits(batch), *_channel_limits(batch)]
+
+
+def _channel_limits(b: RobotBatch) -> list[Limit]:
     fits = "has to fit into channel.diameter"
-    limits += [
-        Limit.less_than(
-            "body.diameter", b.body_diameter, b.channel_diameter, "mm", f"the body {fits}", "body-wider-than-channel"
+    across = 0.5 * (b.channel_diameter - b.wire_diameter)
+    along = b.channel_length - b.body_length - b.coupling_length
+    return [
+        Limit.of(
+            "body.diameter",
+            b.body_diameter,
+            "less than",
+            b.channel_diameter,
+            "mm",
+            f"the body {fits}",
+            "body-wider-than-channel",
         ),
-        Limit.less_than(
+        Limit.of(
             "coupling.diameter",
             b.coupling_diameter,
+            "less than",
             b.channel_diameter,
             "mm",
             f"the coupling {fits}",
             "coupling-wider-than-channel",
         ),
-        Limit.less_than(
+        Limit.of(
             "tail.amplitude",
             b.amplitude,
-            0.5 * (b.channel_diameter - b.wire_diameter),
+            "less than",
+            across,
             "mm",
             f"the tail with half its wire {fits}",
             "tail-wider-than-channel",
         ),
-        Limit.at_most(
+        Limit.of(
             "tail.length",
             b.tail_length,
-            b.channel_length - (total - b.tail_length),
+            "at most",
+            along,
             "mm",
             "body, coupling and tail together have to fit into channel.length",
             "robot-longer-than-channel",
         ),
     ]
-    return limits
 
 
 def _body_limits(b: RobotBatch) -> list[Limit]:
-    limits = []
-    if b.shape == "sphere":
-        wrong = np.abs(b.body_length - b.body_diameter) <= 1e-9 * b.body_diameter
-        limits.append(
-            Limit(
-                "body.length",
-                b.body_length,
-                "exactly",
-                b.body_diameter,
-                "mm",
-                "a sphere is as long as its diameter",
-                wrong,
-                "sphere-not-round",
-            )
-        )
-    elif b.shape != "spheroid":
-        limits.append(
-            Limit.less_than(
-                "body.fillet",
-                b.fillet,
-                0.5 * b.body_diameter * (1 + 1e-12),
-                "mm",
-                "an edge radius is at most the body's radius",
-                "fillet-too-large",
-            )
-        )
-        shortest = shortest_body(b.body_diameter, b.fillet, b.front, b.rear)
-        limits.append(
-            Limit.more_than(
-                "body.length",
-                b.body_length,
-                shortest * (1 - 1e-12),
-                "mm",
-                "both ends have to fit into the overall length",
-                "body-shorter-than-ends",
-            )
-        )
     coupled = b.coupling_length > 0
-    limits.append(
-        Limit.less_than(
-            "coupling.clearance",
-            np.where(coupled, b.coupling_clearance, 0.0),
-            np.where(coupled, 0.5 * b.coupling_length, np.inf),
-            "mm",
-            "it is left free on both sides within coupling.length",
-            "clearance-too-large",
-        )
+    clearance = Limit.of(
+        "coupling.clearance",
+        np.where(coupled, b.coupling_clearance, 0.0),
+        "less than",
+        np.where(coupled, 0.5 * b.coupling_length, np.inf),
+        "mm",
+        "it is left free on both sides within coupling.length",
+        "clearance-too-large",
     )
-    return limits
+    if b.shape == "spheroid":
+        return [clearance]
+    if b.shape == "sphere":
+        why = "a sphere is as long as its diameter"
+        return [
+            Limit.of("body.length", b.body_length, "exactly", b.body_diameter, "mm", why, "sphere-not-round"),
+            clearance,
+        ]
+    fillet = "an edge radius is at most the body's radius"
+    ends = "both ends have to fit into the overall length"
+    shortest = shortest_body(b.body_diameter, b.fillet, b.front, b.rear)
+    return [
+        Limit.of("body.fillet", b.fillet, "at most", 0.5 * b.body_diameter, "mm", fillet, "fillet-too-large"),
+        Limit.of("body.length", b.body_length, "at least", shortest, "mm", ends, "body-shorter-than-ends"),
+        clearance,
+    ]
 
 
 def _tail_limits(b: RobotBatch) -> list[Limit]:
     curvature = b.amplitude * (2 * np.pi / b.wavelength) ** 2 * b.arc_fraction**2
     return [
-        Limit.less_than(
+        Limit.of(
             "tail.wire_diameter",
             b.wire_diameter,
+            "less than",
             coil_spacing(b.wavelength, b.amplitude),
             "mm",
             "neighbouring turns of the coil (tail.wavelength, tail.amplitude) would touch",
             "turns-touch",
         ),
-        Limit.less_than(
+        Limit.of(
             "tail.wire_diameter",
             b.wire_diameter,
+            "less than",
             2.0 / curvature,
             "mm",
             "the wire's radius has to stay below the coil's radius of curvature",
             "wire-too-thick-for-coil",
         ),
-        Limit.less_than(
+        Limit.of(
             "tail.length",
             b.tail_length,
+            "less than",
             1000.0 * b.wavelength,
             "mm",
             "a tail has at most 1000 turns of tail.wavelength",

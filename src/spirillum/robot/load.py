@@ -81,10 +81,18 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, **overrides: Any) -> Rob
 def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """The raw tables of a preset, file or mapping, and what to call it in a sentence."""
     if isinstance(robot, Mapping):
-        return deepcopy(dict(robot)), "the robot"
+        try:
+            return deepcopy(dict(robot)), "the robot"
+        except RecursionError as error:
+            raise InputError(f"the robot's tables are nested without end; allowed: {_WHAT}") from error
     if isinstance(robot, str) and robot in preset_names():
         return tomllib.loads(preset_text(robot)), f"preset {robot}"
-    path = Path(robot)
+    try:
+        path = Path(robot)
+    except TypeError as error:
+        raise InputError(f"robot = {str(robot)[:60]!r}; allowed: {_WHAT}") from error
+    if not str(robot):
+        raise InputError(f"robot = ''; allowed: {_WHAT}")
     if _looks_like_a_name(robot) and not path.exists():
         presets = ", ".join(preset_names())
         hint = did_you_mean(str(robot), preset_names())
@@ -269,7 +277,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[s
     hint = ""
     if kind == "literal_error":
         allowed_words = str(context["expected"])
-        hint = did_you_mean(str(problem["input"])[:60], [word.strip("' ") for word in allowed_words.split(",")])
+        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", allowed_words))
     elif kind == "value_error":
         allowed_words = str(context["error"])
     elif kind == "model_type":
