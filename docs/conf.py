@@ -1,0 +1,57 @@
+"""How the documentation is built: `sphinx-build -W --keep-going -b html docs docs/_build/html`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+from spirillum import __version__, arrays
+from spirillum.robot import fields as robot_fields
+
+project = "spirillum"
+author = "The Spirillum developers"
+copyright = author
+version = release = __version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx.ext.mathjax",
+    "from_the_code",
+]
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+myst_dmath_double_inline = True
+
+html_theme = "furo"
+html_title = "spirillum"
+html_static_path = ["_static"]
+html_css_files = ["spirillum.css"]
+html_show_copyright = False
+html_show_sphinx = False
+
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "show-inheritance": False, "exclude-members": "model_config"}
+autodoc_typehints_format = "short"
+autodoc_type_aliases = {name: name for name in (*arrays.__all__, *robot_fields.__all__, "Switch", "Taper")}
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+viewcode_line_numbers = True
+
+# Types of other packages, and private or generic ones, which have no page here.
+nitpick_ignore_regex = [
+    ("py:.*", r"(numpy|np|npt|xarray|xr|pydantic|pathlib|collections|typing|jaxtyping|pint|types)(\..*)?"),
+    ("py:(class|obj|data)", r"[A-Z]\w*|_\w+|optional|default.*|abc\.ABC|annotated_types\..*"),
+    ("py:(class|obj)", r"spirillum\.arrays\..*|spirillum\..*\._\w+|spirillum\.robot\.fields\..*|ndarray|'?\d.*"),
+]

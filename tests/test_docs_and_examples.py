@@ -1,0 +1,155 @@
+"""The examples run, the commands of the documentation run and print what it shows, and its options exist."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+import typer
+
+import spirillum
+from spirillum.cli.app import app
+from spirillum.measurement.observations import COLUMNS
+
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+INSTALL = (
+    "python3 -m venv .venv && . .venv/bin/activate && pip install . && spirillum study",
+    'python3 -m venv .venv && . .venv/bin/activate && pip install -e ".[test]" && pytest',
+)
+
+
+def _loaded(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+BLOCKS = _loaded(DOCS / "run_blocks.py")
+RUNNABLE = [page for page in BLOCKS.pages() if re.search(r"^```(console|pycon)$", page.read_text("utf-8"), re.M)]
+WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
+
+
+def _commands(command: Any, path: str = "spirillum") -> dict[str, Any]:
+    """Every command by its words."""
+    found = {path: command}
+    for name, below in getattr(command, "commands", {}).items():
+        found |= _commands(below, f"{path} {name}")
+    return found
+
+
+COMMANDS = _commands(typer.main.get_command(app))
+
+
+def _options(path: str) -> set[str]:
+    return {name for parameter in COMMANDS[path].params for name in parameter.opts} | {"--help", "-h"}
+
+
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_and_its_assertion_holds(script: Path, tmp_path: Path) -> None:
+    environment = {**os.environ, "MPLBACKEND": "Agg", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script)],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert not list(tmp_path.iterdir())
+    assert "assert " in script.read_text("utf-8")
+
+
+@pytest.mark.parametrize("page", RUNNABLE, ids=lambda path: path.stem)
+def test_page_shows_what_its_commands_and_python_print(page: Path) -> None:
+    problems, _ = BLOCKS.run_page(page)
+    assert not problems, "\n\n".join(problems) + "\n\nIf the new output is meant: python docs/run_blocks.py --write"
+
+
+def test_readme_opens_with_a_picture_and_the_two_commands() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    places = [text.index("!["), *(text.index(f"```sh\n{command}\n```") for command in INSTALL), text.index("## ")]
+    assert places == sorted(places)
+
+
+def test_first_steps_have_the_same_two_commands() -> None:
+    text = (DOCS / "install.md").read_text("utf-8")
+    assert all(f"```sh\n{command}\n```" in text for command in INSTALL)
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.stem)
+def test_every_mentioned_option_of_a_command_exists(page: Path) -> None:
+    text = page.read_text("utf-8")
+    every = {option for path in COMMANDS for option in _options(path)}
+    for span in re.findall(r"^\$ (spirillum .*)$|`(spirillum [^`\n]*)`", text, re.M):
+        words = "".join(span).split()
+        path = max((p for p in COMMANDS if words[: len(p.split())] == p.split()), key=len)
+        mentioned = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}
+        assert mentioned <= _options(path), (path, mentioned - _options(path))
+    for option in re.findall(r"`(--[a-z][a-z-]*)", text):
+        assert option in every, option
+
+
+def test_commands_page_has_every_command() -> None:
+    text = (DOCS / "commands.md").read_text("utf-8")
+    listed = {f"spirillum {name}" for name in re.findall(r"^```\{command-options\} (.*)$", text, re.M)}
+    leaves = {path for path, command in COMMANDS.items() if not hasattr(command, "commands")}
+    same = {"spirillum robot check"}
+    assert listed | same == leaves
+    assert _options("spirillum robot check") == _options("spirillum robot show")
+
+
+def test_commands_page_has_every_column_of_observations() -> None:
+    text = (DOCS / "commands.md").read_text("utf-8")
+    assert [name for name in COLUMNS if f"`{name}`" not in text] == []
+
+
+def test_reference_lists_every_public_name() -> None:
+    text = (DOCS / "api.md").read_text("utf-8")
+    assert set(re.findall(r"`sp\.(\w+)`", text)) == set(spirillum.__all__)
+
+
+def test_reference_covers_every_module_of_the_layers_it_names() -> None:
+    text = "\n".join(page.read_text("utf-8") for page in (DOCS / "api").glob("*.md"))
+    documented = set(re.findall(r"automodule:: (\S+)", text))
+    layers = ("robot", "hydrodynamics", "motion", "measurement", "studies")
+    modules = {
+        f"spirillum.{layer}.{path.stem}"
+        for layer in layers
+        for path in (ROOT / "src" / "spirillum" / layer).glob("*.py")
+        if path.stem not in ("__init__", "fields")
+    }
+    assert modules - documented == set()
+
+
+def test_every_dependency_has_its_reason() -> None:
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    wanted = [
+        *project["dependencies"],
+        *(name for extra in project["optional-dependencies"].values() for name in extra),
+    ]
+    reasons = (DOCS / "dependencies.md").read_text("utf-8")
+    names = {match[0] for text in wanted if (match := re.match(r"[\w-]+", text))}
+    assert {name for name in names if f"| {name} |" not in reasons} == set()
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.stem)
+def test_links_to_files_and_pictures_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", page.read_text("utf-8"))
+    files = [target for target in targets if not target.startswith("http")]
+    assert [target for target in files if not (page.parent / target).exists()] == []
