@@ -14,10 +14,29 @@ import spirillum as sp
 from spirillum.robot import preset_names
 
 KEYS = (
-    "robot model forward_velocity advance_per_radian tail_rotation_rate body_rotation_rate motor_rotation_rate "
-    "tail_torque drive_torque motor_current battery_voltage effective_friction electrical_power shaft_power "
-    "friction_power dissipated_power hydrodynamic_efficiency reynolds_number placement error_estimate warnings schema"
-).split()
+    "robot",
+    "model",
+    "forward_velocity",
+    "advance_per_radian",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "tail_torque",
+    "drive_torque",
+    "motor_current",
+    "battery_voltage",
+    "effective_friction",
+    "electrical_power",
+    "shaft_power",
+    "friction_power",
+    "dissipated_power",
+    "hydrodynamic_efficiency",
+    "reynolds_number",
+    "placement",
+    "error_estimate",
+    "warnings",
+    "schema",
+)
 
 
 def quantities(answer: Any) -> Iterator[dict[str, Any]]:

@@ -67,7 +67,7 @@ def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_files_are_refused_with_row_and_column(tmp_path: Path, lines: list[str], words: str) -> None:
-    with pytest.raises(InputError, match="allowed|needed") as caught:
+    with pytest.raises(InputError, match=r"allowed|needed") as caught:
         read_observations(written(tmp_path, *lines))
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)

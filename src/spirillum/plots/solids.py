@@ -1,0 +1,147 @@
+"""Solids of a robot as seen from the side: shaded bodies of revolution and a wire with front and back."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
+
+from spirillum.arrays import Values
+from spirillum.robot.geometry import centreline
+from spirillum.robot.parts import Body, End
+from spirillum.robot.robot import Robot
+
+__all__ = ["Metal", "body_profile", "crests", "draw_solid", "draw_wire"]
+
+Metal = tuple[str, str, str]
+"""Colours of a shaded surface: shadow, middle, highlight."""
+
+_SHELLS = 48
+_LARGEST_WIRE = 4000
+_LIGHT_HEIGHT = 0.42
+
+
+def _end_profile(end: End | None, radius: float, fillet: float) -> tuple[Values, Values]:
+    """An end of a capsule or cylinder: distance from its tip and radius there, from the axis outwards."""
+    angle = np.linspace(0.0, 0.5 * np.pi, 40)
+    if end == "hemisphere":
+        return radius * (1.0 - np.cos(angle)), radius * np.sin(angle)
+    if end == "fillet":
+        height, out = fillet * (1.0 - np.cos(angle)), radius - fillet + fillet * np.sin(angle)
+        return np.concatenate([[0.0], height]), np.concatenate([[0.0], out])
+    return np.array([0.0, 0.0]), np.array([0.0, radius])
+
+
+def body_profile(body: Body) -> tuple[Values, Values]:
+    """Outline of the body, m: x from nose to rear about its mid-length, and the radius there."""
+    radius, half = 0.5 * body.diameter, 0.5 * body.length
+    if body.shape in ("sphere", "spheroid"):
+        angle = np.linspace(0.0, np.pi, 120)
+        return half * np.cos(angle), radius * np.sin(angle)
+    fillet = body.fillet or 0.0
+    front, front_radius = _end_profile(body.front_end, radius, fillet)
+    rear, rear_radius = _end_profile(body.rear_end, radius, fillet)
+    x = np.concatenate([half - front, (-half + rear)[::-1]])
+    return x, np.concatenate([front_radius, rear_radius[::-1]])
+
+
+def _shades(colours: Metal, amount: Values) -> Values:
+    """Colours from shadow (0) over middle (0.5) to highlight (1)."""
+    stops = np.array([to_rgb(colour) for colour in colours])
+    return np.stack([np.interp(amount, (0.0, 0.5, 1.0), stops[:, channel]) for channel in range(3)], axis=-1)
+
+
+def draw_solid(axes: Axes, x: Values, radius: Values, colours: Metal, *, order: float) -> None:
+    """A body of revolution about the horizontal axis, lit from above: nested shells, brighter inwards.
+
+    Args:
+        axes: where to draw, in the unit of `x`.
+        x: outline along the axis.
+        radius: outline across it.
+        colours: shadow, middle, highlight.
+        order: drawing order.
+    """
+    inward = np.linspace(0.0, 1.0, _SHELLS)
+    shells = []
+    for share in inward:
+        shift = _LIGHT_HEIGHT * share
+        upper, lower = radius * (1.0 - share + shift), radius * (share - 1.0 + shift)
+        shells.append(np.column_stack([np.concatenate([x, x[::-1]]), np.concatenate([upper, lower[::-1]])]))
+    axes.add_collection(
+        PolyCollection(shells, facecolors=_shades(colours, inward**1.3), edgecolors="none", zorder=order)
+    )
+    edge = np.concatenate([radius, -radius[::-1]])
+    axes.plot(np.concatenate([x, x[::-1]]), edge, color="#2b3a44", linewidth=0.8, zorder=order + 0.1)
+
+
+def _wire(robot: Robot, phase: float, unit: float) -> Values:
+    """Points (x, y, z) of the wire's centreline from its root on, in `unit`."""
+    tail = robot.tail
+    turns = tail.length / tail.wavelength
+    count = int(np.clip(90 * turns, 200, _LARGEST_WIRE))
+    found = centreline(
+        np.linspace(0.0, tail.length, count),
+        wavelength=np.array(tail.wavelength),
+        amplitude=np.array(tail.amplitude),
+        length=np.array(tail.length),
+        taper=np.array(np.inf if tail.taper is None else tail.taper),
+        root=np.array(0.5 * robot.body.length + robot.coupling.length),
+        hand=np.array(robot.hand),
+        phase=np.array(phase),
+    )
+    points: Values = found.position / unit
+    return points
+
+
+def crests(robot: Robot, phase: float, unit: float) -> Values:
+    """Places x of the wire's highest points, from the root to the tip, in `unit`; the rising root is left out."""
+    tail, hand = robot.tail, robot.hand
+    root = 0.5 * robot.body.length + robot.coupling.length
+    most = np.ceil((root + tail.length) / tail.wavelength) + 1
+    number = np.arange(-most, most + 1)
+    x = (0.5 * np.pi - phase + 2 * np.pi * number) * tail.wavelength / (2 * np.pi) * hand
+    settled = 0.0 if tail.taper is None else 4.0 * tail.length / tail.taper
+    inside = (x <= -root - min(settled, 0.5 * tail.length)) & (x >= -root - tail.length)
+    found: Values = np.sort(x[inside] / unit)[::-1]
+    return found
+
+
+def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: float, points: float) -> None:
+    """The tail's wire in true thickness, seen along +y: what lies behind is darker and hidden by what lies before.
+
+    Args:
+        axes: where to draw, in `unit`.
+        robot: the robot.
+        colours: shadow, middle, highlight.
+        phase: phase of the tail, rad.
+        unit: length of one drawing unit, m.
+        points: typographic points in one drawing unit.
+    """
+    path = _wire(robot, phase, unit)
+    thickness, amplitude = robot.tail.wire_diameter / unit, robot.tail.amplitude / unit
+    pieces = np.stack([path[:-1, [0, 2]], path[1:, [0, 2]]], axis=1)
+    depth = 0.5 * (path[:-1, 1] + path[1:, 1])
+    behind = np.clip(0.5 + 0.5 * depth / max(amplitude, 1e-12), 0.0, 1.0)
+    bias = min(thickness, 0.8 * amplitude)
+    layers = (  # share of the thickness, shade before and behind, depth before the centreline, height of the light
+        (1.0, 0.02, 0.0, -1.0, 0.0),
+        (0.78, 0.50, 0.10, 0.0, 0.0),
+        (0.26, 1.0, 0.30, 0.5, 0.14),
+    )
+    segments, shades, widths, depths = [], [], [], []
+    for share, front, back, before, height in layers:
+        segments.append(pieces + np.array([0.0, height * thickness]))
+        shades.append(_shades(colours, front + (back - front) * behind))
+        widths.append(np.full(depth.size, share * thickness * points))
+        depths.append(depth - before * bias)
+    order = np.argsort(-np.concatenate(depths), kind="stable")
+    axes.add_collection(
+        LineCollection(
+            list(np.concatenate(segments)[order]),
+            colors=np.concatenate(shades)[order],
+            linewidths=np.maximum(np.concatenate(widths)[order], 0.15),
+            capstyle="round",
+            zorder=6,
+        )
+    )

@@ -1,0 +1,171 @@
+"""One look for all figures: colours, fonts, units, and files that come out the same every time."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from spirillum.arrays import Values
+from spirillum.files import whole_file
+
+__all__ = ["COLOURS", "Look", "Scale", "look_of_model", "new_figure", "plain", "readable", "save", "styled"]
+
+COLOURS = {
+    "black": "#000000",
+    "orange": "#E69F00",
+    "sky": "#56B4E9",
+    "green": "#009E73",
+    "blue": "#0072B2",
+    "vermillion": "#D55E00",
+    "purple": "#CC79A7",
+}
+"""Palette of Okabe and Ito, which colour-blind readers can tell apart (without its yellow, too pale for lines)."""
+
+_STYLE: Any = {  # Any: the type of the keys differs between versions of matplotlib
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "mathtext.fontset": "dejavusans",
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": "#444444",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.5,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.color": "#333333",
+    "ytick.color": "#333333",
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4.5,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "spirillum",
+}
+_DPI = 200
+_FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
+_LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
+_PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"))
+
+
+@dataclass(frozen=True)
+class Look:
+    """Colour, line and marker by which a model is known in every figure."""
+
+    colour: str
+    line: Any
+    """A line style of matplotlib: text, or an offset with lengths of dashes."""
+    marker: str
+
+
+_LOOKS = {
+    "sbt": Look(COLOURS["blue"], "-", "o"),
+    "rft": Look(COLOURS["vermillion"], "--", "s"),
+    "slender": Look(COLOURS["green"], "-.", "^"),
+    "tube": Look(COLOURS["purple"], ":", "D"),
+}
+_OTHER = Look(COLOURS["orange"], (0, (5, 1, 1, 1, 1, 1)), "v")
+
+
+def look_of_model(name: str) -> Look:
+    """The look of a model by its name."""
+    return _LOOKS.get(name, _OTHER)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """A unit with a prefix that makes a set of values readable."""
+
+    factor: float
+    """SI value of one unit."""
+    unit: str
+
+    @classmethod
+    def of(cls, values: Values, unit: str) -> Scale:
+        """Prefix for SI `values` of an SI `unit`: the largest one is then between 0.1 and 100, if possible."""
+        finite = np.abs(values[np.isfinite(values)])
+        largest = float(finite.max()) if finite.size else 0.0
+        if largest == 0.0:
+            return cls(1.0, unit)
+        fitting = [(factor, prefix) for factor, prefix in _PREFIXES if largest >= 0.099 * factor]
+        factor, prefix = fitting[-1] if fitting else _PREFIXES[0]
+        return cls(factor, f"{prefix}{unit}")
+
+    def __call__(self, values: Values) -> Values:
+        """SI values in this unit."""
+        return values / self.factor
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw and save in the look of all figures; the caller's own settings are untouched.
+
+    Names may hold characters that the font lacks; they become boxes, not warnings.
+    """
+    with rc_context(_STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure, inches, that no global state knows of."""
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def plain(text: str, longest: int = 60) -> str:
+    """A user's text as one short line in which nothing is read as a formula."""
+    kept = "".join(letter if unicodedata.category(letter)[0] != "C" else " " for letter in text)
+    line = " ".join(kept.split())
+    line = line if len(line) <= longest else f"{line[: longest - 1]}…"
+    return line.replace("$", r"\$")
+
+
+def readable(text: str) -> str:
+    """A figure's text with its formulas spelled out: ``$B_{eff}$`` becomes ``B_eff``."""
+    spelled = _FORMULA.sub(lambda found: _spelled(found[1]), text)
+    return " ".join(spelled.replace(r"\$", "$").split())
+
+
+def _spelled(formula: str) -> str:
+    for command, letter in _LETTERS.items():
+        formula = formula.replace(command, letter)
+    return re.sub(r"[{}]", "", formula)
+
+
+def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
+    """Write a PNG (200 dpi) and an SVG (text as paths, no date), each whole or not at all.
+
+    Args:
+        figure: the figure.
+        path_without_suffix: folder and name; the suffixes are added.
+
+    Returns:
+        Paths of PNG and SVG.
+    """
+    folder, name = path_without_suffix.parent, path_without_suffix.name
+    png, svg = folder / f"{name}.png", folder / f"{name}.svg"
+    with styled():
+        with whole_file(png) as temporary:
+            figure.savefig(temporary, format="png", dpi=_DPI, metadata={"Software": None})
+        with whole_file(svg) as temporary:
+            figure.savefig(temporary, format="svg", metadata={"Date": None})
+    return png, svg
