@@ -36,7 +36,7 @@ class Swimming:
         metadata={
             "unit": "rad/s",
             "meaning": "rotation rate omega of the tail (lab)",
-            "source": "eqs (15), (18), or prescribed",
+            "source": "eqs (15), (18)",
         }
     )
     body_rotation_rate: PerRobot = field(

@@ -145,7 +145,7 @@ def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Samples,
     inductance = float(motor.inductance[0])
     emf = float(motor.back_emf_constant[0] * motor.torque_constant[0]) * slip
 
-    def derivative(_t: float, y: Samples, duty: float) -> list[float]:
+    def derivative(time: float, y: Samples, duty: float) -> list[float]:  # noqa: ARG001 - the solver's form
         i = float(y[0])
         size = abs(i)
         r = constant + decay * exp(-decay_rate * size) + growth * exp(growth_rate * size) + slope * size

@@ -155,5 +155,7 @@ class Sheet:
             axes = figure.add_axes(place, sharey=found[0] if found else None)
             axes.set_title(_letter(row * self.columns + column), loc="left", pad=3, weight="bold")
             axes.tick_params(labelleft=column == 0, length=2.5, width=0.6)
+            # Ticks are made when they are drawn, which a caller may do outside `styled`.
+            axes.tick_params(labelsize=8, colors="#333333", grid_color="#dddddd", grid_linewidth=0.5)
             found.append(axes)
         return found

@@ -122,11 +122,12 @@ def _attributes(name: str) -> dict[str, Any]:
         }
     base, _, at = name.partition("_at_")
     field = next(f for f in QUANTITIES if f.name == base)
+    source = field.metadata["source"]
     suffix = f", at the {at.replace('_rate', '').replace('_', ' ')} rate" if at else ", driven by its own drive"
     return {
         "units": field.metadata["unit"],
         "long_name": field.metadata["meaning"] + suffix,
-        "source": f"{field.metadata['source']} of {_PAPER}",
+        "source": f"{source} of {_PAPER}" if source.startswith(("eq", "Table")) else source,
     }
 
 

@@ -6,6 +6,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 
@@ -176,4 +177,4 @@ def keep(task: Task, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
         with whole_file(folder / task.file_name) as path, path.open("wb") as stream:
-            np.savez(stream, allow_pickle=False, **part)
+            np.savez(stream, **cast("dict[str, Any]", part))
