@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import platform
 from collections.abc import Iterable, Mapping
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-__all__ = ["as_json", "envelope", "quantity"]
+__all__ = ["as_json", "envelope", "quantity", "versions"]
 
 
 def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> dict[str, Any]:
@@ -37,3 +39,9 @@ def envelope(kind: str, content: Mapping[str, Any], warnings: Iterable[str]) -> 
 def as_json(answer: Mapping[str, Any]) -> str:
     """JSON text; refuses anything that is not valid JSON, such as NaN."""
     return json.dumps(answer, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+def versions() -> str:
+    """Versions of what a result was computed with."""
+    packages = ("spirillum", "numpy", "scipy", "xarray")
+    return ", ".join([f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in packages)])

@@ -25,8 +25,9 @@ def test_trials_become_means_in_si(tmp_path: Path) -> None:
     assert found.forward_velocity.value == pytest.approx(1.1e-3)
     assert found.tail_rate.value == pytest.approx(1.3 * 2 * np.pi)
     assert found.body_rate.value == pytest.approx(-0.1 * 2 * np.pi)
-    assert (found.forward_velocity.trials, found.body_rate.trials, found.motor_rate.trials) == (2, 1, 0)
-    assert np.isnan(found.motor_rate.value)
+    assert (found.forward_velocity.trials, found.body_rate.trials) == (2, 1)
+    # Not observed: tail less body rate, of the one trial that has both.
+    assert (found.motor_rate.value, found.motor_rate.trials) == (pytest.approx(1.3 * 2 * np.pi), 1)
 
 
 def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
@@ -60,6 +61,13 @@ def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
             "rows 2 and 3",
         ),
         (["channel_diameter_mm,wavelength_mm,amplitude_mm,trials,tail_rate_Hz", "40,25,2.5,0,1"], "column trials"),
+        (
+            [
+                "channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,body_rate_Hz,motor_rate_Hz",
+                "40,25,2.5,1,-0.1,5",
+            ],
+            "motor_rate_Hz: 5, but tail less body rate is 1.1",
+        ),
         (
             ["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,tail_rate_Hz_ci95", "40,25,2.5,1,-1"],
             "tail_rate_Hz_ci95",

@@ -91,7 +91,7 @@ def test_battery_gives_duty_times_the_motor_current() -> None:
         ({"duration": "0 s"}, "duration = 0"),
         ({"on": [(1.0, 0.5)]}, "on = 1 s to 0.5 s"),
         ({"on": [(0.0, 1.0), (0.5, 2.0)]}, "on = 0.5 s to 2 s"),
-        ({"on": [(float("nan"), 1.0)]}, "on = nan"),
+        ({"on": [(float("nan"), 1.0)]}, 'on = "nan s"'),
         ({"samples_per_turn": 0}, "samples-per-turn"),
         ({"turns": 1e5, "samples_per_turn": 10_000}, "samples-per-turn"),
         ({"duration": "1e5 s", "samples_per_turn": 1}, "1e+05 s"),
@@ -101,6 +101,13 @@ def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:
     with pytest.raises(sp.InputError, match="allowed") as caught:
         sp.simulate("biorob2012-wide", **options)
     assert words in str(caught.value)
+
+
+def test_switching_times_are_quantities_too() -> None:
+    in_words = sp.simulate("biorob2012-wide", duration="0.2 s", on=[("0 s", "100 ms")])
+    in_seconds = sp.simulate("biorob2012-wide", duration=0.2, on=[(0.0, 0.1)])
+    assert in_words.identical(in_seconds)
+    assert in_words.attrs["switches"] == "duty 1 from 0 s, duty 0 from 0.1 s"
 
 
 def test_only_a_motor_has_a_transient() -> None:

@@ -29,6 +29,8 @@ def test_statements_about_lost_rates_are_undecidable(unobserved: list[Claim]) ->
         "largest velocity decrease",
         "Forward velocity increases with wavelength",
         "Forward velocity decreases with amplitude",
+        "Motor rates are identical",
+        "motor's rate decreases with amplitude",
         "body rotation rates within 1 to 50 %",
         "B_eff depends mostly on the amplitude",
         "SBT predicts forward velocities better",
@@ -71,6 +73,22 @@ def test_synthetic_observations_decide(planted) -> None:
     assert by_words(claims, "body rotation rates within 1 to 50 %").verdict in ("agrees", "disagrees")
     swapped = evaluated(sp.study(observations=planted(None, "rft", "rotor", 1e-5)))
     assert by_words(swapped, "SBT predicts forward velocities better").verdict == "disagrees"
+
+
+@pytest.mark.parametrize("columns", ["forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz", "forward_velocity_mm_s"])
+def test_a_few_tails_decide_nothing_about_all_of_them(tmp_path, columns: str, unobserved: list[Claim]) -> None:
+    """Synthetic rows of two wide tails: statements about all tails stay open, and say what is missing."""
+    path = tmp_path / "observations.csv"
+    values = "1.0,1.2,-0.1"[: 3 if "," not in columns else None]
+    rows = [f"40,25,{amplitude},{values}" for amplitude in ("2.5", "3.5")]
+    path.write_text("\n".join([f"channel_diameter_mm,wavelength_mm,amplitude_mm,{columns}", *rows]) + "\n")
+    claims = evaluated(sp.study(observations=path))
+    assert [claim.claim for claim in claims] == [claim.claim for claim in unobserved]
+    for few, none in zip(claims, unobserved, strict=True):
+        assert "nan" not in few.computed
+        if "Reynolds number, wide" not in few.claim:
+            assert few.verdict == none.verdict, few
+    assert "of 2 of 32 robots" in by_words(claims, "largest velocity decrease").reason
 
 
 def test_other_studies_make_no_claims(small: dict[str, object]) -> None:

@@ -160,6 +160,7 @@ def simulate(
         list[str] | None,
         typer.Option(metavar="FROM:TO", help="When the remote switches the motor on, such as 0s:2s; repeatable."),
     ] = None,
+    samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
     settings: Settings = None,
@@ -180,6 +181,7 @@ def simulate(
         turns=turns,
         duration=duration,
         on=[text.time_window(window) for window in on] if on else None,
+        samples_per_turn=samples_per_turn,
         calibrated=not no_calibration,
         calibration=calibration,
     )

@@ -109,7 +109,8 @@ def robot(answer: Answer, console: Console) -> None:
     console.print(f"[bold]{escape(fields['name'])}[/bold]  {escape(fields['description'])}", highlight=False)
     table = _grid("fields", "field", "value", "unit")
     for name, item in fields.items():
-        value, unit = _friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (_word(item), "")
+        word = "none" if name in ("tail.taper", "channel") and item is None else _word(item)
+        value, unit = _friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (word, "")
         if name not in ("name", "description", "reference"):
             table.add_row(name, value, unit)
     console.print(table)
@@ -213,6 +214,7 @@ def simulation(answer: Answer, console: Console) -> None:
     table = _grid(title, "quantity", "value", "unit", "SI")
     _add_quantities(table, answer)
     console.print(table)
+    console.print("means are over the last two thirds of the run", highlight=False)
     console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 
 

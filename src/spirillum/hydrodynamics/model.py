@@ -13,6 +13,7 @@ from typing import ClassVar
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
+from spirillum.robot.options import ModelOptions
 
 __all__ = ["PARTS", "ResistanceModel", "SwimmerModel"]
 
@@ -35,6 +36,10 @@ class ResistanceModel(ABC):
     """Parts whose matrix it can give."""
     axial_only: ClassVar[bool] = False
     """True where only the entries along and about the motor axis are known; the others are NaN."""
+
+    def stated_error(self, options: ModelOptions) -> str:
+        """What the model leaves out with these options, and what that costs."""
+        return self.known_error
 
     @abstractmethod
     def domain(self, batch: RobotBatch) -> list[Limit]:

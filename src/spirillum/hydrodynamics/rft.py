@@ -20,6 +20,7 @@ from spirillum.hydrodynamics.thin_wire import thin_wire_cautions
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.limits import Limit
+from spirillum.robot.options import ModelOptions
 
 __all__ = ["Rft", "tail_axial", "tail_matrix"]
 
@@ -171,6 +172,16 @@ class Rft(SwimmerModel):
         "tail do not interact, which alone adds some 15 % to the speed"
     )
     parts = ("body", "tail", "rotor", "robot")
+
+    def stated_error(self, options: ModelOptions) -> str:
+        """See `ResistanceModel.stated_error`; only two of the coefficient sets were compared with a resolved wire."""
+        chosen = options.rft.coefficients
+        if chosen in ("printed", "gray-hancock"):
+            return self.known_error
+        return (
+            f"the '{chosen}' coefficients have not been compared with a resolved wire here; sets differ from each "
+            "other by a factor of up to two in speed; body and tail do not interact, which alone adds some 15 % to it"
+        )
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """0 < c_t < c_n, and a wire clear of the floor."""

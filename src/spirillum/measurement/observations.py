@@ -26,6 +26,7 @@ COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 _NEEDED = tuple(_KEYS)
 _WHAT = "an observations file (CSV)"
 _LARGEST = 64 << 20
+_CONTRADICTION = 0.2
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class Observation:
     tail_rate: float
     body_rate: float
     motor_rate: float
+    """Observed, else tail less body rate."""
     trials: int
     """1 for a trial, more for a mean."""
     intervals: tuple[float, float, float, float]
@@ -117,6 +119,7 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
     if all(math.isnan(value) for value in rates):
         raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
     velocity, tail, body, motor = rates
+    motor = _motor_rate(place, tail, body, motor)
     a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     return Observation(
         row=number,
@@ -131,6 +134,19 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         trials=_trials(path, number, row),
         intervals=(a, b, c, d),
     )
+
+
+def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
+    """omega_m = omega - Omega_x where it was not observed; where it was, both have to agree."""
+    difference = tail - body
+    if math.isnan(motor):
+        return difference
+    if abs(difference - motor) > _CONTRADICTION * abs(motor):
+        raise InputError(
+            f"{place}, column motor_rate_Hz: {motor / Hz:.4g}, but tail less body rate is {difference / Hz:.4g}; "
+            f"allowed: equal within {100 * _CONTRADICTION:.0f} %"
+        )
+    return motor
 
 
 def _number(place: str, row: dict[str, str], name: str, factor: float, least: float | None = None) -> float:

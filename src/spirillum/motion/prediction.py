@@ -78,7 +78,7 @@ class Prediction:
             "calibrated": self.calibrated,
             **quantities,
             "placement": self.placement,
-            "error_estimate": quantity(None, "1", statement=self.model.known_error),
+            "error_estimate": quantity(None, "1", statement=self.model.stated_error(self.robot.model)),
             "references": list(self.references),
         }
         return envelope("prediction", content, self.warnings)
@@ -137,7 +137,8 @@ def predict(
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
         *_drive_warnings(ready, chosen, reading, result, rate),
     ]
-    return Prediction(ready, chosen, reading, calibrated, result, tuple(warnings))
+    applied = calibrated and chosen.name in ready.calibration
+    return Prediction(ready, chosen, reading, applied, result, tuple(warnings))
 
 
 def prepared(

@@ -6,6 +6,7 @@ only state with dynamics of its own. Path, angles and energies are its integrals
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.motion.balance import friction_torques
@@ -184,7 +186,7 @@ def simulate(
     calibration: str | Path | None = None,
     turns: float = 3.0,
     duration: str | float | None = None,
-    on: Sequence[tuple[float, float]] | None = None,
+    on: Sequence[tuple[str | float, str | float]] | None = None,
     samples_per_turn: int = 100,
 ) -> xr.Dataset:
     """Simulate axial swimming (two degrees of freedom) from rest.
@@ -197,7 +199,8 @@ def simulate(
         calibration: calibration file whose factors replace the robot's.
         turns: length of the run in turns of the tail at its steady rate (the paper's three periods).
         duration: length of the run instead, with its unit (``"2 s"``) or a float in s.
-        on: times (start, stop) in s between which the remote switches the motor on; None: on throughout.
+        on: times (start, stop) between which the remote switches the motor on, each with its unit (``"2 s"``) or a
+            float in s; None: on throughout.
         samples_per_turn: samples of the output per steady turn of the tail.
 
     Returns:
@@ -214,10 +217,11 @@ def simulate(
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
     end = _duration(turns, turn, duration)
     time = _sample_times(end, turn, samples_per_turn)
-    switches = _switches(on, float(batch.electrics.duty[0]), end)
+    windows = None if on is None else [(_time(start, "on"), _time(stop, "on")) for start, stop in on]
+    switches = _switches(windows, float(batch.electrics.duty[0]), end)
     response = axial_response(batch, prediction)
     transient = motor_transient(batch.electrics, response.slip, time, switches)
-    return _dataset(prediction, batch.electrics, response, transient)
+    return _dataset(prediction, batch.electrics, response, transient, switches)
 
 
 def _duration(turns: float, turn: float, duration: str | float | None) -> float:
@@ -225,15 +229,20 @@ def _duration(turns: float, turn: float, duration: str | float | None) -> float:
         if not 0 < turns <= 1e5:
             raise InputError(f"turns = {turns}; allowed: more than 0, at most 1e5")
         return turns * turn
-    if isinstance(duration, (int, float)) and not isinstance(duration, bool):
-        duration = f"{float(duration)!r} s"
-    try:
-        end = parse_quantity(duration, KINDS["time"])
-    except InputError as error:
-        raise InputError(f"duration {error}") from error
+    end = _time(duration, "duration")
     if end <= 0:
         raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
     return end
+
+
+def _time(value: str | float, name: str) -> float:
+    """A time with its unit, or a float in s."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        value = f"{float(value)!r} s"
+    try:
+        return parse_quantity(value, KINDS["time"])
+    except InputError as error:
+        raise InputError(f"{name} {error}") from error
 
 
 def _sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
@@ -253,7 +262,7 @@ def _switches(on: Sequence[tuple[float, float]] | None, duty: float, end: float)
     switches: list[tuple[float, float]] = [(0.0, 0.0)]
     before = 0.0
     for start, stop in on:
-        if not (math.isfinite(start) and math.isfinite(stop) and before <= start < stop):
+        if not before <= start < stop:
             raise InputError(f"on = {start:g} s to {stop:g} s; allowed: increasing times from 0 s, start before stop")
         before = stop
         for time, value in ((start, duty), (stop, 0.0)):
@@ -264,10 +273,14 @@ def _switches(on: Sequence[tuple[float, float]] | None, duty: float, end: float)
     return switches
 
 
-def _dataset(prediction: Prediction, motor: Electrics, r: AxialResponse, m: MotorTransient) -> xr.Dataset:
+def _dataset(
+    prediction: Prediction,
+    motor: Electrics,
+    r: AxialResponse,
+    m: MotorTransient,
+    switches: Sequence[tuple[float, float]],
+) -> xr.Dataset:
     import xarray as xr
-
-    from spirillum import __version__
 
     sign, k_m, k_b = float(motor.polarity[0]), float(motor.torque_constant[0]), float(motor.back_emf_constant[0])
     torque = sign * k_m * m.current
@@ -321,10 +334,12 @@ def _dataset(prediction: Prediction, motor: Electrics, r: AxialResponse, m: Moto
             "effective_friction": prediction.effective_friction,
             "calibrated": int(prediction.calibrated),
             "motion": "axial",
+            "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
+            "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
             "integrator": f"VODE Adams, order up to {_HIGHEST_ORDER}, relative tolerance {_TOLERANCE:g}",
             "references": " ".join(prediction.references),
             "warnings": "\n".join(prediction.warnings),
-            "spirillum_version": __version__,
+            "versions": versions(),
         },
     )
     return dataset.assign(_averages(dataset, prediction))
@@ -348,18 +363,26 @@ def _averages(dataset: xr.Dataset, prediction: Prediction) -> dict[str, Any]:
     }
     note = "average over the last two thirds of the run"
     found = {
-        name: ((), value, {"units": unit, "long_name": f"{name.replace('_', ' ')}, {note}"})
+        name: (
+            (),
+            value,
+            {"units": unit, "long_name": f"{name.replace('_', ' ')}, {note}", "source": "Section III of BioRob 2012"},
+        )
         for name, (value, unit) in averages.items()
     }
     found["hydrodynamic_efficiency"] = (
         (),
         prediction.hydrodynamic_efficiency,
-        {"units": "1", "long_name": "isolated uncalibrated body drag times U^2 over shaft power (constant in time)"},
+        {
+            "units": "1",
+            "long_name": "isolated uncalibrated body drag times U^2 over shaft power (constant in time)",
+            "source": "eq. (16) of BioRob 2012",
+        },
     )
     return found
 
 
 def _source(equation: str) -> str:
     if not equation:
-        return "derived from the quantities above"
+        return "integral or product of motor current and the robot's linear response (8), (9)"
     return equation if equation.startswith("Table") else f"eq. {equation} of BioRob 2012"

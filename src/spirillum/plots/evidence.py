@@ -95,6 +95,11 @@ class Shown:
         drives = [robot.get("drive") or {} for robot in self.robots]
         return bool(drives) and all(drive.get("kind") == "dc-motor" for drive in drives)
 
+    @property
+    def upper_bound(self) -> bool:
+        """Whether rates and speeds under the robots' own drive are upper bounds: a motor without contact friction."""
+        return self.motor_driven and self.friction_unset
+
     @cached_property
     def friction_unset(self) -> bool:
         """Whether reading `rotor` holds the rotor's own B_m alone."""
@@ -109,8 +114,8 @@ class Shown:
         """Words for a reading of the friction in a legend."""
         if reading == "none":
             return "no contact friction (upper bound)" if self.motor_driven else "no friction"
-        if reading == "rotor" and self.friction_unset:
-            return "rotor friction $B_m$ only (upper bound)" if self.motor_driven else "rotor friction $B_m$ only"
+        if reading == "rotor" and self.upper_bound:
+            return "rotor friction $B_m$ only (upper bound)"
         return f"friction reading '{reading}'"
 
     @property

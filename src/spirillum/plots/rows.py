@@ -99,19 +99,19 @@ def _own_drive(axes: Axes, part: Shown, x: Values, name: str, scale: Scale) -> N
 
 
 def _own_rate_row(shown: Shown) -> Row:
-    what = "motor rate, upper bound" if shown.motor_driven else "motor rate, own drive"
+    what = "motor rate, upper bound" if shown.upper_bound else "motor rate, own drive"
     hertz = Scale(Hz, "Hz")
 
     def draw(axes: Axes, part: Shown, x: Values) -> None:
         _own_drive(axes, part, x, "motor_rotation_rate", hertz)
 
-    tells = "Motor rates are upper bounds: no contact friction." if shown.motor_driven else ""
+    tells = "Motor rates are upper bounds: no contact friction." if shown.upper_bound else ""
     return Row(f"{what}\n$\\omega_m$ (Hz)", draw, tells=tells)
 
 
 def bound_row(shown: Shown) -> Row:
     """Forward velocity with what friction is known to be there: an upper bound for a motor's robot."""
-    what = "forward velocity\nupper bound" if shown.motor_driven else "forward velocity\nown drive"
+    what = "forward velocity\nupper bound" if shown.upper_bound else "forward velocity\nown drive"
     labels = {"friction": list(shown.own_drive_readings)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
 
@@ -121,7 +121,7 @@ def bound_row(shown: Shown) -> Row:
             seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
             _bars(axes, x, scale(seen), scale(half))
 
-    tells = "Speeds are upper bounds: no contact friction." if shown.motor_driven else ""
+    tells = "Speeds are upper bounds: no contact friction." if shown.upper_bound else ""
     return Row(f"{what} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
@@ -163,8 +163,8 @@ def _assumed_friction_row(shown: Shown) -> Row:
             axes.axhline(part.rotor_friction, color="#555555", linewidth=0.9, linestyle=":")
 
     tells = (
-        "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends where the "
-        "motor could not turn faster even without friction."
+        "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends with the "
+        "assumed rates, or where the motor could not turn faster even without friction."
     )
     return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 

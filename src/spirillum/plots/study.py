@@ -244,7 +244,7 @@ def _finish_row(panels: Sequence[Axes], row: Row) -> None:
 def _bound_picture(shown: Shown) -> Picture:
     channels = spread(shown.whole.sizes["channel"], MOST_CHANNELS)
     wavelengths = spread(shown.whole.sizes["wavelength"], MOST_COLUMNS)
-    bound = shown.motor_driven
+    bound = shown.upper_bound
     title = "Forward velocity without contact friction: an upper bound" if bound else "Forward velocity, own drive"
     notes = []
     if bound:
@@ -279,7 +279,7 @@ def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title
     scale = Scale.of(values, "m")
     x = scale(values[amplitudes])
     row = bound_row(shown)
-    what = "upper bound" if shown.motor_driven else "own drive"
+    what = "upper bound" if shown.upper_bound else "own drive"
     for number, channel in enumerate(channels):
         name = plain(str(shown.whole["channel"].values[channel]), 24)
         for axes, wavelength in zip(panels[number], wavelengths, strict=True):

@@ -232,10 +232,21 @@ def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str,
     return (f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew",)
 
 
+def _floating(robot: Robot) -> tuple[str, ...]:
+    """Warn where buoyancy lifts the robot off the floor, which holds its lateral motion and tilt."""
+    weight = robot.derived().get("submerged_weight")
+    if weight is None or weight.value > 0:
+        return ()
+    return (
+        f"the robot floats: its submerged weight is {weight.value:.3g} N, while axial motion rests on a robot that "
+        "its weight keeps on the channel's floor",
+    )
+
+
 def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> Robot:
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
-        problems._warnings = warnings  # noqa: SLF001 - the private attribute is the loader's to set
+        problems._warnings = (*warnings, *_floating(problems))  # noqa: SLF001 - it is the loader's to set
         return problems
     more = f" (and {len(problems) - 1} more: `spirillum robot check` lists them)" if len(problems) > 1 else ""
     raise InputError(f"{source}: {problems[0]}{more}", [f"{source}: {problem}" for problem in problems])

@@ -66,6 +66,20 @@ class Evidence:
         values: Values = chosen.sel(channel=channel or ["wide", "narrow"]).values
         return values
 
+    def complete(self, *names: str) -> bool:
+        """Whether these quantities were observed of every tail in both channels."""
+        return self.observed and all(bool(np.all(np.isfinite(self.seen(name)))) for name in names)
+
+    def lacking(self, *names: str) -> str:
+        """Why a statement about all tails stays open: no observations, or not of all of them."""
+        if not self.observed:
+            return NO_RATES
+        counts = []
+        for name in names:
+            seen = np.isfinite(self.seen(name))
+            counts.append(f"{name.replace('_', ' ')} of {np.count_nonzero(seen)} of {seen.size} robots")
+        return f"it speaks of all tails in both channels; the observations have {', '.join(counts)}"
+
     def tail(self, wavelength_mm: float, amplitude_mm: float) -> tuple[int, int] | None:
         """Place of a tail in the grid, if it is there."""
         places = []

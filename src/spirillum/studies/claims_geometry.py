@@ -14,14 +14,15 @@ from spirillum.units import Hz
 __all__ = ["calibration_factors", "method", "robot_and_channel"]
 
 
-def calibration_factors(_evidence: Evidence) -> Iterator[Claim]:
+def calibration_factors(evidence: Evidence) -> Iterator[Claim]:
     """Table III."""
     yield Claim(
         "Body drag factors that stand for the walls (Table III)",
         "1.95 D_x wide, 3.6 D_x narrow; 0.6 E_x (SBT), 1 E_x (RFT)",
         "used as given, as named calibrations of the preset robots",
         "undecidable",
-        "they come from inverting (15) with the observations, which are lost",
+        "they come from inverting (15) with the paper's observations, which are lost"
+        + ("; inverting it with others is not part of this version" if evidence.observed else ""),
     )
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import platform
 from collections.abc import Iterable, Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.answer import versions
 from spirillum.arrays import Values
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.studies.observed import ObservedArrays
@@ -59,7 +58,7 @@ def assembled(
         "claims": study.claims,
         "references": " ".join(dict.fromkeys(references)),
         "warnings": "\n".join(warnings),
-        "versions": _versions(),
+        "versions": versions(),
         "Conventions": "CF-1.11",
     }
     return dataset
@@ -85,24 +84,28 @@ def _robot_dimensions(loaded: LoadedStudy) -> tuple[tuple[str, ...], tuple[int, 
 
 
 def _coordinates(loaded: LoadedStudy) -> dict[str, Any]:
-    study, robots = loaded.study, loaded.robots
+    study, robots, source = loaded.study, loaded.robots, "input of the study"
     channel = [robot.channel.diameter if robot.channel else np.inf for robot in robots]
     first = "channel" if study.grid else "robot"
     coordinates: dict[str, Any] = {
-        first: (first, _text(loaded.names), {"long_name": first}),
+        first: (first, _text(loaded.names), {"units": "1", "long_name": f"name of the {first}", "source": source}),
         "channel_diameter": (first, channel, {"units": "m", "long_name": "channel diameter D_ch", "source": "Table I"}),
-        "model": ("model", _text(study.models), {"long_name": "hydrodynamic model"}),
-        "friction": ("friction", _text(study.friction), {"long_name": "reading of the effective friction"}),
+        "model": ("model", _text(study.models), {"units": "1", "long_name": "hydrodynamic model", "source": source}),
+        "friction": (
+            "friction",
+            _text(study.friction),
+            {"units": "1", "long_name": "reading of the effective friction", "source": source},
+        ),
     }
     tail = {
         "wavelength": (study.grid.wavelengths if study.grid else [r.tail.wavelength for r in robots], "lambda"),
         "amplitude": (study.grid.amplitudes if study.grid else [r.tail.amplitude for r in robots], "B_o"),
     }
     for name, (values, symbol) in tail.items():
-        attributes = {"units": "m", "long_name": f"tail {name} {symbol}", "source": "input of the study"}
+        attributes = {"units": "m", "long_name": f"tail {name} {symbol}", "source": source}
         coordinates[name] = (name if study.grid else first, values, attributes)
     if study.assumed_motor_rates:
-        attributes = {"units": "rad/s", "long_name": "assumed motor rate omega_m", "source": "input of the study"}
+        attributes = {"units": "rad/s", "long_name": "assumed motor rate omega_m", "source": source}
         coordinates["assumed_motor_rate"] = ("assumed_motor_rate", list(study.assumed_motor_rates), attributes)
     return coordinates
 
@@ -136,7 +139,7 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
         "forward_velocity": ("m/s", "observed forward velocity"),
         "tail_rate": ("rad/s", "observed rotation rate of the tail (lab)"),
         "body_rate": ("rad/s", "observed rotation rate of the body"),
-        "motor_rate": ("rad/s", "observed motor rate"),
+        "motor_rate": ("rad/s", "observed motor rate, else tail less body rate"),
     }
     source = f"observations file {observed.source}"
     found: dict[str, Any] = {}
@@ -148,11 +151,6 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
     trials = {"units": "1", "long_name": "number of trials", "source": source}
     found["trials"] = (robots, observed.trials.reshape(shape).astype("int32"), trials)
     return found
-
-
-def _versions() -> str:
-    packages = ("spirillum", "numpy", "scipy", "xarray")
-    return ", ".join([f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in packages)])
 
 
 def read_dataset(path: Path) -> xr.Dataset | None:

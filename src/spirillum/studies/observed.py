@@ -32,11 +32,6 @@ class ObservedArrays:
     trials: PerRobot
     source: str
 
-    @property
-    def motor_rate_for_18(self) -> PerRobot:
-        """omega_m for (17) and (18): observed, else tail less body rate where both were observed."""
-        return np.where(np.isnan(self.motor_rate), self.tail_rate - self.body_rate, self.motor_rate)
-
     def question(self) -> dict[str, Any]:
         """What of the observations decides the answer."""
         columns = {name: getattr(self, name).tolist() for name in _NAMES}

@@ -16,7 +16,7 @@ from spirillum.motion.prediction import calibration_warnings
 from spirillum.studies.dataset import assembled, read_dataset
 from spirillum.studies.observed import ObservedArrays, observed_arrays
 from spirillum.studies.spec import LoadedStudy, load_study
-from spirillum.studies.work import Part, Task, answer, cautions, keep, kept, tasks
+from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -111,6 +111,7 @@ def _computed(
 ) -> xr.Dataset:
     todo = list(tasks(loaded))
     answers: list[tuple[Task, Part]] = []
+    found: list[Caution] = []
     warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         warnings.append(
@@ -124,8 +125,10 @@ def _computed(
             part = answer(task, loaded, observed)
             keep(task, part, parts)
         answers.append((task, part))
-        warnings += cautions(task, part)
+        found += cautions(task, part)
     tell("dataset", len(todo), len(todo))
+    robots = sum(task.batch.size for task in todo) // len(loaded.study.models)
+    warnings += summed(found, robots)
     for robot in loaded.robots:
         for name in loaded.study.models:
             warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]

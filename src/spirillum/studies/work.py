@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -21,7 +21,20 @@ from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 
-__all__ = ["AT_RATES", "QUANTITIES", "REASONS", "Part", "Task", "answer", "cautions", "keep", "kept", "tasks"]
+__all__ = [
+    "AT_RATES",
+    "QUANTITIES",
+    "REASONS",
+    "Caution",
+    "Part",
+    "Task",
+    "answer",
+    "cautions",
+    "keep",
+    "kept",
+    "summed",
+    "tasks",
+]
 
 QUANTITIES = tuple(f for f in fields(Swimming) if f.name != "valid")
 """Quantities of free swimming."""
@@ -112,7 +125,7 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     reason = _reasons(task.batch, task.model)[:, None]
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
     if observed is not None:
-        tail, motor = observed.tail_rate[task.places], observed.motor_rate_for_18[task.places]
+        tail, motor = observed.tail_rate[task.places], observed.motor_rate[task.places]
         found = [swim(task.batch, task.model, tail_rate=tail, motor_rate=motor, friction=r) for r in readings]
         part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
     if study.assumed_motor_rates and task.batch.electrics is not None:
@@ -147,19 +160,39 @@ def _reasons(batch: RobotBatch, model: str) -> PerRobot:
     return reason
 
 
-def cautions(task: Task, part: Part) -> list[str]:
-    """What to be careful about in a task's answer, a sentence for each kind."""
+class Caution(NamedTuple):
+    """A requirement of accuracy that robots of a task break."""
+
+    model: str
+    flag: str
+    robots: int
+    """How many."""
+    sentence: str
+    """The first of them in words."""
+
+
+def cautions(task: Task, part: Part) -> list[Caution]:
+    """What to be careful about in a task's answer, one for each kind."""
     size = task.batch.size
     first = Swimming(**{f.name: part[f.name][:, 0] for f in QUANTITIES}, valid=part["outside"][:, 0] == 0)
     found = []
     for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
-        if not np.all(holds):
-            found.append(
-                f"{np.count_nonzero(~holds)} of {size} robots ({task.model}), the first: "
-                f"{limit.sentence(int(np.argmin(holds)))}"
-            )
+        count = int(np.count_nonzero(~holds))
+        if count:
+            found.append(Caution(task.model, limit.flag, count, limit.sentence(int(np.argmin(holds)))))
     return found
+
+
+def summed(found: Iterable[Caution], robots: int) -> list[str]:
+    """A sentence for each kind of caution, over all tasks of a study."""
+    groups: dict[tuple[str, str], list[Caution]] = {}
+    for caution in found:
+        groups.setdefault((caution.model, caution.flag), []).append(caution)
+    return [
+        f"{sum(caution.robots for caution in group)} of {robots} robots ({model}), the first: {group[0].sentence}"
+        for (model, _), group in groups.items()
+    ]
 
 
 def kept(task: Task, folder: Path | None) -> Part | None:
