@@ -8,6 +8,9 @@ from difflib import get_close_matches
 __all__ = ["InputError", "did_you_mean"]
 
 
+_LONGEST = 800
+
+
 class InputError(ValueError):
     """Bad input or usage: one sentence with the field or file, its value, and what is allowed.
 
@@ -25,7 +28,8 @@ class InputError(ValueError):
 
 def _one_line(text: str) -> str:
     """The text in one printable line, whatever a user's file put into it."""
-    return "".join(c if c.isprintable() else "?" for c in " ".join(text.split()))
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(text[:_LONGEST].split()))
+    return line if len(text) <= _LONGEST else f"{line}…"
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

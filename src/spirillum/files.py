@@ -15,7 +15,16 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["output_folder", "parse_toml", "read_text", "read_toml", "whole_file", "write_dataset", "write_text"]
+__all__ = [
+    "netcdf_target",
+    "output_folder",
+    "parse_toml",
+    "read_text",
+    "read_toml",
+    "whole_file",
+    "write_dataset",
+    "write_text",
+]
 
 _LARGEST_TEXT = 1 << 20
 
@@ -84,6 +93,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     Raises:
         InputError: if the folder cannot be written to.
     """
+    path = _regular(path)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
     except OSError as error:
@@ -102,6 +112,36 @@ def whole_file(path: Path) -> Iterator[Path]:
             raise InputError(f"{path} cannot be written ({error.strerror}); allowed: a file name") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _regular(path: Path) -> Path:
+    """The file behind a path, links followed.
+
+    Raises:
+        InputError: if something is there that is no regular file, such as a folder or a device.
+    """
+    try:
+        real = path.resolve()
+        wrong = real.exists() and not real.is_file()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{str(path)[:200]!r} cannot be written; allowed: a file name") from error
+    if wrong:
+        raise InputError(f"{path} is not a regular file; allowed: a new file, or one to replace")
+    return real
+
+
+def netcdf_target(path: str | Path) -> Path:
+    """The path of a NetCDF file to write, checked before any work is done.
+
+    Raises:
+        InputError: if it does not end in `.nc`, is no regular file, or its folder is not there.
+    """
+    path = Path(path)
+    if path.suffix != ".nc":
+        raise InputError(f"{str(path)[:200]!r} does not end in .nc; allowed: a NetCDF file, for example run.nc")
+    if not _regular(path).parent.is_dir():
+        raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
+    return path
 
 
 def write_text(path: Path, text: str) -> None:

@@ -56,6 +56,14 @@ WIDE = "biorob2012-wide"
         (["study", "--observations", "missing.csv"], "missing.csv does not exist"),
         (["study", "--set", "tail.taper=1e9"], "tail.taper"),
         (["schema", "robots"], "did you mean robot?"),
+        (["simulate", WIDE, "-o", "run.txt"], "does not end in .nc"),
+        (["simulate", WIDE, "-o", "run.nc", "--set", "drive.duty=0"], "drive.duty = 0"),
+        (["predict", WIDE, "--set", 'tail.wavelength="20 mm"\nfluid.viscosity="1 Pa s"'], "tail.wavelength = "),
+        (["predict", WIDE, "--set", 'name="a\\u0000b"'], "text without control characters"),
+        (["predict", WIDE, "--set", "calibration.typo.body_drag=2.0"], "calibration.typo"),
+        (["predict", WIDE, "--friction", "paper", "--tail-rate=-0.001Hz"], "tail-rate = -0.006283 rad/s"),
+        (["predict", WIDE, "--tail-rate=238671 rad/s"], "positive battery voltage"),
+        (["predict", WIDE, "--model", "x" * 50_000], "model = 'xxx"),
         (["citation", "cfd"], "allowed"),
         (["robot", "check", "missing.toml"], "does not exist"),
         (["robot", "new", "x.toml", "--from", "nothing"], "preset 'nothing'"),
@@ -73,7 +81,7 @@ def test_one_sentence_and_code_2(
     assert outcome.err.startswith("spirillum: ")
     assert outcome.err.count("\n") == 1
     assert outcome.err.rstrip("\n").isprintable()
-    assert len(outcome.err) < 500
+    assert len(outcome.err) < 900
     assert list(tmp_path.iterdir()) == []
 
 
@@ -109,6 +117,21 @@ def test_huge_file_is_refused_unread(run: Callable[..., Any], tmp_path: Path) ->
     outcome = run("predict", str(path))
     assert outcome.code == 2
     assert "104857600 bytes" in outcome.err
+
+
+def test_devices_are_not_replaced(run: Callable[..., Any], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.nc")
+    outcome = run("simulate", WIDE, "-o", str(tmp_path / "pipe.nc"))
+    assert outcome.code == 2
+    assert "is not a regular file" in outcome.err
+    assert (tmp_path / "pipe.nc").is_fifo()
+
+
+def test_a_link_keeps_pointing_to_its_file(run: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "link.nc").symlink_to("real.nc")
+    assert run("simulate", WIDE, "-o", str(tmp_path / "link.nc"), "--duration", "0.1s").code == 0
+    assert (tmp_path / "link.nc").is_symlink()
+    assert (tmp_path / "real.nc").is_file()
 
 
 def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,6 +56,10 @@ def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
         ([HEADER, "a,,25,2.5,1,1,1.2,-0.1"], "column channel_diameter_mm"),
         ([HEADER, "a,40,25,2.5,1,,,"], "nothing was measured"),
         ([HEADER, "a,40,25"], "row 2: 3 cells"),
+        ([HEADER, "a,40,25,2.5,1,1,0,-0.1"], "column tail_rate_Hz: 0; allowed: a rate other than 0"),
+        ([HEADER, "a,40,25,2.5,1,1e7,1,-0.1"], "a number up to 1e+06"),
+        ([HEADER, "a,40,25,2.5,1,1_0,1,-0.1"], "'1_0'"),
+        ([HEADER, "a,40,25,2.5,1,1,1,-0.1", "a,40,25,2.5,1,2,1,-0.1"], "rows 2 and 3 are both trial 1"),
         (
             ["channel_diameter_mm,wavelength_mm,amplitude_mm,trials,tail_rate_Hz", "40,25,2.5,5,1", "40,25,2.5,5,2"],
             "rows 2 and 3",

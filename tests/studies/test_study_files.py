@@ -22,7 +22,7 @@ GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\
         ("models = []\n" + GRID, "models"),
         ('friction = ["ice"]\n' + GRID, "friction.0 = 'ice'"),
         ('assumed_motor_rates = ["1 1/s"]\n' + GRID, "does not say what turns"),
-        ('assumed_motor_rates = ["0 Hz"]\n' + GRID, "assumed_motor_rates holds 0"),
+        ('assumed_motor_rates = ["0 Hz"]\n' + GRID, "assumed_motor_rates holds a rate out of range"),
         (GRID.replace("20 mm", "-20 mm"), "grid.wavelengths.0"),
         (GRID.replace('["20 mm"]', '["20 mm", "2 cm"]'), "grid.wavelengths holds a value twice"),
         (GRID.replace("biorob2012-wide", "biorob2012-wise"), "did you mean biorob2012-wide?"),

@@ -4,6 +4,7 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import spirillum as sp
@@ -34,19 +35,38 @@ def test_interrupted_study_resumes_where_it_stopped(
     with pytest.raises(KeyboardInterrupt):
         sp.study(small, output=tmp_path / "out")
     assert not (tmp_path / "out" / "dataset.nc").exists()
-    assert len(list((tmp_path / "out" / "parts").glob("*.npz"))) == 3
+    (parts,) = (tmp_path / "out").glob("parts-*")
+    assert len(list(parts.glob("*.npz"))) == 3
 
     done.clear()
-    damaged = tmp_path / "out" / "parts" / "part-00001.npz"
+    damaged = parts / "part-00001.npz"
     damaged.write_bytes(damaged.read_bytes()[:100])
     resumed = sp.study(small, output=tmp_path / "out")
     assert done == [1, 3]
     assert resumed.identical(whole)
-    assert not (tmp_path / "out" / "parts").exists()
+    assert not parts.exists()
 
     done.clear()
     assert sp.study(small, output=tmp_path / "out").identical(resumed)
     assert done == []
+
+
+def test_parts_of_another_shape_or_study_are_not_taken(small: dict[str, object], tmp_path: Path) -> None:
+    """Arrays that a file happens to hold are only taken if they are those of the task."""
+    whole = sp.study(small)
+    fingerprint = whole.attrs["fingerprint"]
+    for name, arrays in {
+        "part-00000.npz": {"forward_velocity": np.zeros(1)},
+        "part-00001.npz": {"outside": np.array(["x"])},
+        "part-00002.npz": {},
+    }.items():
+        folder = tmp_path / "out" / f"parts-{fingerprint[:16]}"
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez(folder / name, **arrays)
+    stale = tmp_path / "out" / "parts-0123456789abcdef"
+    stale.mkdir()
+    np.savez(stale / "part-00003.npz", forward_velocity=np.zeros((4, 3)))
+    assert sp.study(small, output=tmp_path / "out").identical(whole)
 
 
 def test_folder_of_another_study_is_refused(small: dict[str, object], tmp_path: Path) -> None:

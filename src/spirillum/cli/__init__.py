@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 __all__ = ["main"]
 
@@ -20,6 +22,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _run(arguments: Sequence[str] | None) -> int:
     from spirillum.cli.app import app
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without box characters shows others instead
     try:
         code = app(args=arguments, prog_name="spirillum", standalone_mode=False)
     except BrokenPipeError:  # the reader of our output has left, as `| head` does
@@ -45,11 +50,14 @@ def _explained(error: BaseException) -> int | None:
         return _fail(str(error), 2)
     if isinstance(error, MemoryError):
         return _fail("the request does not fit into memory; allowed: a smaller one", 2)
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return _fail("no space is left for the output; allowed: a place with space", 2)
     if hasattr(error, "format_message"):  # a usage error of the command-line library
         return _fail(str(InputError(error.format_message())), 2)
     return None
 
 
 def _fail(sentence: str, code: int) -> int:
-    sys.stderr.write(f"spirillum: {sentence}\n")
+    if sentence:
+        sys.stderr.write(f"spirillum: {sentence}\n")
     return code

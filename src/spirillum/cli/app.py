@@ -171,9 +171,10 @@ def simulate(
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
     from spirillum.cli import text
-    from spirillum.files import write_dataset
+    from spirillum.files import netcdf_target, write_dataset
     from spirillum.motion.transient import simulate as answer
 
+    target = netcdf_target(output)
     dataset = answer(
         _loaded(robot, settings),
         model=model,
@@ -185,7 +186,7 @@ def simulate(
         calibrated=not no_calibration,
         calibration=calibration,
     )
-    write_dataset(dataset, output)
+    write_dataset(dataset, target)
     text.show(text.simulation_answer(dataset, output), text.simulation, json=json)
 
 

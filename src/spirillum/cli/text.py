@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
 
 Answer = Mapping[str, Any]
+_NARROWEST = 80
 
 # What people read beside the SI value.
 _FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
@@ -37,6 +38,8 @@ def show(answer: Answer, table: Callable[[Answer, Console], None], *, json: bool
         typer.echo(as_json(answer))
         return
     console = Console()
+    if console.width < _NARROWEST:
+        console = Console(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
     table(answer, console)
     for warning in answer["warnings"]:
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)

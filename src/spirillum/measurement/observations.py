@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,9 @@ _NEEDED = tuple(_KEYS)
 _WHAT = "an observations file (CSV)"
 _LARGEST = 64 << 20
 _CONTRADICTION = 0.2
+_LARGEST_NUMBER = 1e6
+_SMALLEST_RATE = 1e-6 * Hz
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class Observation:
     """1 for a trial, more for a mean."""
     intervals: tuple[float, float, float, float]
     """Half widths of a mean's 95 % intervals in the same order."""
+    trial: str = ""
+    """Number or name of the trial, where the file gives one."""
 
     @property
     def tail(self) -> tuple[float, float, float]:
@@ -120,6 +126,9 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
     velocity, tail, body, motor = rates
     motor = _motor_rate(place, tail, body, motor)
+    for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
+        if abs(rate) < _SMALLEST_RATE:
+            raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
     a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     return Observation(
         row=number,
@@ -133,6 +142,7 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         motor_rate=motor,
         trials=_trials(path, number, row),
         intervals=(a, b, c, d),
+        trial=row.get("trial", ""),
     )
 
 
@@ -162,12 +172,10 @@ def _number(place: str, row: dict[str, str], name: str, factor: float, least: fl
     text = row.get(name, "")
     if not text and not (least is not None and least > 0):
         return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or (least is not None and value < least):
-        wanted = "a finite number, or empty" if least is None else f"a number of at least {least:g}"
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not abs(value) <= _LARGEST_NUMBER or (least is not None and value < least):
+        wanted = f"a number up to {_LARGEST_NUMBER:g}"
+        wanted += ", or empty" if least is None else f" of at least {least:g}"
         raise InputError(f"{place}, column {name}: '{text[:40]}'; allowed: {wanted}")
     return value * factor
 
@@ -182,9 +190,15 @@ def _trials(path: Path, number: int, row: dict[str, str]) -> int:
 
 
 def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
-    """A robot's mean stands alone: another row of the same robot would count it twice."""
+    """A robot's mean stands alone, and a trial stands once: else something would count twice."""
     seen: dict[tuple[float, float, float], Observation] = {}
+    trials: dict[tuple[object, ...], int] = {}
     for item in observations:
+        first = trials.setdefault((item.tail, item.trial or item.row), item.row)
+        if first != item.row:
+            raise InputError(
+                f"{path}, rows {first} and {item.row} are both trial {item.trial[:20]}; allowed: once a robot"
+            )
         other = seen.setdefault(item.tail, item)
         if other is not item and max(item.trials, other.trials) > 1:
             raise InputError(

@@ -18,7 +18,7 @@ import numpy as np
 from spirillum.arrays import Axial, PerRobot
 from spirillum.robot.actuation import FrictionReading
 
-__all__ = ["FrictionTorques", "TorqueBalance", "force_free", "friction_torques"]
+__all__ = ["FrictionTorques", "TorqueBalance", "force_free", "friction_torques", "rates_per_torque"]
 
 
 class TorqueBalance(NamedTuple):
@@ -53,12 +53,27 @@ class FrictionTorques(NamedTuple):
     br: PerRobot
     rb: PerRobot
     rr: PerRobot
+    determinant: PerRobot
+    """bb rr - br rb, without the cancellation."""
 
     def power(self, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
         """Power that friction takes, W."""
-        return (self.bb * body_rate + self.br * tail_rate) * body_rate + (
-            self.rb * body_rate + self.rr * tail_rate
-        ) * tail_rate
+        on_body = self.bb * body_rate + self.br * tail_rate
+        return on_body * body_rate + (self.rb * body_rate + self.rr * tail_rate) * tail_rate
+
+
+def rates_per_torque(s: TorqueBalance, t: FrictionTorques) -> tuple[PerRobot, PerRobot]:
+    """(Omega, omega) per joint torque: the solution of both torque rows with tau = 1.
+
+    Friction is kept apart from the fluid's torques, since most of it cancels: added to them first, a large
+    one would take their digits away.
+    """
+    fluid = s.bb * s.rr - s.br * s.rb
+    mixed = s.bb * t.rr + t.bb * s.rr - s.br * t.rb - t.br * s.rb
+    determinant = fluid + mixed + t.determinant
+    body = -((s.rr + s.br) + (t.rr + t.br))
+    tail = (s.bb + s.rb) + (t.bb + t.rb)
+    return body / determinant, tail / determinant
 
 
 def force_free(r: Axial) -> TorqueBalance:
@@ -89,9 +104,10 @@ def friction_torques(reading: FrictionReading, effective: PerRobot, rotor_fricti
     """
     zero = np.zeros(1)
     if reading == "rotor":
-        return FrictionTorques(effective, -effective, -effective, effective)
+        return FrictionTorques(effective, -effective, -effective, effective, zero)
     if reading == "body":
-        return FrictionTorques(rotor_friction + effective, -rotor_friction, -rotor_friction, rotor_friction)
+        joint, wall = rotor_friction, effective
+        return FrictionTorques(joint + wall, -joint, -joint, joint, joint * wall)
     if reading == "paper":
-        return FrictionTorques(zero, zero, -effective, effective)
-    return FrictionTorques(zero, zero, zero, zero)
+        return FrictionTorques(zero, zero, -effective, effective, zero)
+    return FrictionTorques(zero, zero, zero, zero, zero)

@@ -54,8 +54,8 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
 
     Returns:
         The current, A; negative where the tail drives the motor (back-emf above the voltage), NaN where it
-        does so beyond any root. While the motor drives there is a single root (the robot file is checked for
-        that), found by Newton steps kept inside a bracket.
+        does so beyond any root, or beyond what the battery's voltage allows. While the motor drives there is a
+        single root (the robot file is checked for that), found by Newton steps kept inside a bracket.
     """
     open_voltage = motor.duty * motor.voltage - back_emf
     sense = np.where(open_voltage < 0, -1.0, 1.0)
@@ -86,7 +86,7 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
         last, i = np.abs(new - i), new
         if not np.any(last > 1e-9 * np.abs(i)):  # Newton's next error is the square of this step
             break
-    return sense * i
+    return np.where(battery_voltage(motor, i) < 0, np.nan, sense * i)
 
 
 def run_time(motor: Electrics, current: PerRobot) -> PerRobot:

@@ -130,7 +130,7 @@ def predict(
         calibrated=calibrated,
     )
     if not result.valid[0]:
-        raise InputError(_why_not(batch, chosen, reading, calibrated=calibrated))
+        raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
     warnings = [
         *ready.warnings,
         *(calibration_warnings(ready, chosen.name) if calibrated else ()),
@@ -209,7 +209,15 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
     ]
 
 
-def _why_not(batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, *, calibrated: bool) -> str:
+def _why_not(
+    batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, rate: float | None, *, calibrated: bool
+) -> str:
+    if rate is not None:
+        slow = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x" if reading == "paper" else ""
+        return (
+            f"tail-rate = {rate:.4g} rad/s: motor and battery have no steady state there; allowed: a rate at which "
+            f"(17) has a root with a positive battery voltage{slow}"
+        )
     if reading == "paper":
         limit = calibrated_balance(batch, model, calibrated=calibrated).bb[0]
         return (

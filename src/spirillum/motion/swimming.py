@@ -11,7 +11,7 @@ from spirillum.arrays import Flags, PerRobot
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.motion.balance import FrictionTorques, TorqueBalance, force_free, friction_torques
+from spirillum.motion.balance import FrictionTorques, TorqueBalance, force_free, friction_torques, rates_per_torque
 from spirillum.motion.motor import battery_voltage, run_time, steady_current
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
@@ -212,7 +212,7 @@ def _swim_block(
     free: bool,
     calibrated: bool,
 ) -> Swimming:
-    valid = all_hold(requirements(batch, model))
+    valid = batch.known & all_hold(requirements(batch, model))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         balance = calibrated_balance(batch, model, calibrated=calibrated)
         if batch.joint == "fixed":
@@ -241,9 +241,7 @@ def _driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> _
     if batch.drive == "rate":
         body_rate, tail = _rates_by_torque_sum(s, t, batch.drive_rate, none)
         return _State(body_rate, tail, none, effective, t, none)
-    bb, br, rb, rr = s.bb + t.bb, s.br + t.br, s.rb + t.rb, s.rr + t.rr
-    determinant = bb * rr - br * rb
-    body_per_torque, tail_per_torque = -(rr + br) / determinant, (bb + rb) / determinant
+    body_per_torque, tail_per_torque = rates_per_torque(s, t)
     if batch.drive == "torque":
         torque, current = batch.drive_torque, none
     elif batch.drive == "dc-motor" and batch.electrics is not None:
@@ -295,7 +293,7 @@ def _rates_by_torque_sum(
     s: TorqueBalance, t: FrictionTorques, tail_rate: PerRobot, motor_rate: PerRobot
 ) -> tuple[PerRobot, PerRobot]:
     """(Omega, omega) from the sum of both torque rows, in which the joint torque cancels."""
-    on_body, on_tail = s.bb + t.bb + s.rb + t.rb, s.br + t.br + s.rr + t.rr
+    on_body, on_tail = (s.bb + s.rb) + (t.bb + t.rb), (s.br + s.rr) + (t.br + t.rr)
     on_body = np.where(on_body > 0, on_body, np.nan)  # `paper` beyond E_x: as in `_driven`
     tail = np.where(np.isnan(tail_rate), motor_rate * on_body / (on_body + on_tail), tail_rate)
     return -on_tail / on_body * tail, tail
@@ -329,7 +327,7 @@ def _one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> _Sta
     rate = np.where(np.isnan(tail_rate), own, tail_rate)
     zero = np.zeros(1)
     none = np.full(1, np.nan)
-    return _State(rate, rate, none, none, FrictionTorques(zero, zero, zero, zero), none)
+    return _State(rate, rate, none, none, FrictionTorques(zero, zero, zero, zero, zero), none)
 
 
 def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) -> Swimming:
@@ -372,7 +370,10 @@ def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) ->
         "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
         "battery_run_time": lasting,
     }
-    moving = valid & np.isfinite(speed)
+    # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
+    moving = valid & np.isfinite(speed) & ~np.isinf(state.effective)
+    if motor is not None and batch.drive == "dc-motor" and batch.joint == "revolute":
+        moving = moving & np.isfinite(current)
     shaped = {name: np.where(moving, value, np.nan) for name, value in values.items()}
     size = batch.size
     return Swimming(

@@ -18,7 +18,7 @@ import numpy as np
 from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.motion.balance import friction_torques
+from spirillum.motion.balance import friction_torques, rates_per_torque
 from spirillum.motion.motor import battery_voltage, winding_resistance
 from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.swimming import calibrated_balance
@@ -87,9 +87,7 @@ def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
     s = calibrated_balance(batch, prediction.model, calibrated=prediction.calibrated)
     rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
     t = friction_torques(prediction.friction, np.array([prediction.effective_friction]), rotor)
-    bb, br, rb, rr = s.bb + t.bb, s.br + t.br, s.rb + t.rb, s.rr + t.rr
-    determinant = bb * rr - br * rb
-    body, tail = -(rr + br) / determinant, (bb + rb) / determinant
+    body, tail = rates_per_torque(s, t)
     load = s.rotor_load(body, tail)
     values = (
         body,
@@ -214,6 +212,8 @@ def simulate(
     batch = RobotBatch.of(prediction.robot)
     if batch.drive != "dc-motor" or batch.electrics is None:
         raise InputError(f"drive.kind = '{batch.drive}'; allowed: 'dc-motor', which alone has a transient")
+    if prediction.tail_rotation_rate == 0:
+        raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
     end = _duration(turns, turn, duration)
     time = _sample_times(end, turn, samples_per_turn)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
 
 import numpy as np
 
-from spirillum.arrays import PerRobot
+from spirillum.arrays import Flags, PerRobot
 from spirillum.errors import InputError
 from spirillum.robot import geometry
 from spirillum.robot.actuation import FrictionReading
@@ -174,7 +174,7 @@ class RobotBatch:
         unknown = [path for path in values if path not in attribute]
         if unknown:
             raise InputError(f"{unknown[0]} is not a number that a batch can vary; allowed: {', '.join(attribute)}")
-        arrays = {attribute[path]: np.atleast_1d(np.asarray(value, dtype=float)) for path, value in values.items()}
+        arrays = {attribute[path]: _checked_column(path, value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
@@ -195,6 +195,15 @@ class RobotBatch:
         if len(lengths - {1}) > 1:
             raise InputError(f"columns of a batch have lengths {sorted(lengths)}; allowed: one length, or 1")
         return int(max(lengths))
+
+    @cached_property
+    def known(self) -> Flags:
+        """Whether every number that a robot needs is one."""
+        result: Flags = np.ones(1, dtype=bool)
+        for name, (path, _) in _COLUMNS.items():
+            if path not in _MAY_BE_UNSET:
+                result = result & ~np.isnan(getattr(self, name))
+        return result
 
     @cached_property
     def arc_fraction(self) -> PerRobot:
@@ -235,6 +244,35 @@ def _cut(struct: _S, cut: slice) -> _S:
         return value
 
     return type(struct)(**{f.name: part(getattr(struct, f.name)) for f in fields(struct)})
+
+
+_MAY_BE_UNSET = ("model.rft.axis_height", "friction.effective", "drive.rate", "drive.torque")
+_MAY_BE_ZERO = ("coupling.diameter", "coupling.length", "coupling.clearance", "body.fillet", "friction.effective")
+_OF_ANY_SIGN = ("drive.rate", "drive.torque")
+_INFINITE = ("tail.taper", "channel.diameter", "channel.length")
+
+
+def _checked_column(path: str, value: np.ndarray | Sequence[float] | float) -> PerRobot:
+    """One column of a batch.
+
+    Raises:
+        InputError: if it is not one axis of numbers that the field may have.
+    """
+    try:
+        column = np.atleast_1d(np.asarray(value, dtype=float))
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path} = {str(value)[:60]}; allowed: numbers in SI units") from error
+    if column.ndim != 1 or column.size == 0:
+        raise InputError(f"{path} has shape {column.shape}; allowed: one value, or one for each robot")
+    finite = np.isfinite(column) & (np.abs(column) < 1e30)
+    positive = (column > 0) | ((column == 0) & (path in _MAY_BE_ZERO)) | (path in _OF_ANY_SIGN)
+    allowed = (finite & positive) | np.isnan(column)  # an unknown robot gets no answer, the others do
+    allowed |= np.isposinf(column) & (path in _INFINITE)
+    if not np.all(allowed):
+        wrong = int(np.argmin(allowed))
+        least = "0 or more" if path in _MAY_BE_ZERO else "any sign" if path in _OF_ANY_SIGN else "above 0"
+        raise InputError(f"{path} of robot {wrong} = {column[wrong]:.6g}; allowed: finite SI numbers, {least}")
+    return column
 
 
 def _value(robot: Robot, path: str, unset: float) -> float:

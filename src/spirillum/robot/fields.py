@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, NamedTuple, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -28,6 +28,7 @@ __all__ = [
     "ResistancePerCurrent",
     "RotaryFriction",
     "Section",
+    "Text",
     "Torque",
     "TorqueConstant",
     "Viscosity",
@@ -67,6 +68,16 @@ def _quantity(name: str) -> tuple[Kind, BeforeValidator, WithJsonSchema]:
     """What makes a float a quantity; the kind stays with the field, so that `field_values` knows its unit."""
     kind = KINDS[name]
     return kind, BeforeValidator(_reader(kind)), _schema(kind)
+
+
+def _printable(text: str) -> str:
+    if not all(c.isprintable() or c == "\n" for c in text):
+        raise ValueError("text without control characters")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_printable)]
+"""Words for people; they end up in files, figures and on terminals."""
 
 
 class FieldValue(NamedTuple):

@@ -138,9 +138,10 @@ def parse_setting(text: str) -> tuple[str, Any]:
     if not equals or not path or not value:
         raise InputError(f"--set {text[:80]!r} is not PATH=VALUE; for example --set tail.wavelength=20mm")
     try:
-        return path, parse_toml(f"value = {value}", "--set", "PATH=VALUE")["value"]
+        parsed = parse_toml(f"value = {value}", "--set", "PATH=VALUE")
     except InputError:
         return path, value
+    return path, parsed["value"] if set(parsed) == {"value"} else value
 
 
 def with_calibration(robot: Robot, path: str | Path) -> Robot:
@@ -271,7 +272,7 @@ def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
 def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[str]:
     """Our sentences for one of pydantic's findings."""
     kind, context = problem["type"], problem.get("ctx", {})
-    names = [str(name) for name in problem["loc"]]
+    names = [str(name) for name in problem["loc"] if name != "[key]"]
     if kind == "assembly":
         return str(context["sentences"]).split("\n")
     field = ".".join(names)

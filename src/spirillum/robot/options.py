@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from spirillum.robot.fields import Factor, Length, Section
+from spirillum.robot.fields import Factor, Length, Section, Text
 
 __all__ = [
     "Calibration",
@@ -99,13 +99,20 @@ class Calibration(Section):
     """Factor on the axial translational drag D_x."""
     body_rotation: Factor = 1.0
     """Factor on the axial rotational drag E_x."""
-    source: str = Field(min_length=1, max_length=500)
+    source: Text = Field(min_length=1, max_length=500)
     """Where the factors come from."""
     fitted_to: FittedTo
     """Geometry that they were fitted to."""
 
 
-Calibrations = dict[Annotated[str, Field(pattern="^[a-z][a-z0-9-]*$")], Calibration]
+def _known_model(name: str) -> str:
+    if name not in _CALIBRATED:
+        raise ValueError(f"a model that swims: {', '.join(_CALIBRATED)}")
+    return name
+
+
+_CALIBRATED = ("sbt", "rft")
+Calibrations = dict[Annotated[str, AfterValidator(_known_model)], Calibration]
 """Calibration factors by model."""
 
 

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from spirillum.robot import geometry
 from spirillum.robot.actuation import Battery, Drive, Friction, Motor
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.fields import Section
+from spirillum.robot.fields import Section, Text
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.options import Calibrations, ModelOptions
 from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, Tail
@@ -36,11 +36,11 @@ class Robot(Section):
     Made by `spirillum.load` from a preset or a TOML file; the fields are the tables of that file.
     """
 
-    name: str = Field(default="robot", min_length=1, max_length=200)
+    name: Text = Field(default="robot", min_length=1, max_length=200)
     """Name of the robot, for tables and figures."""
-    description: str = Field(default="", max_length=2000)
+    description: Text = Field(default="", max_length=2000)
     """What it is, in a sentence."""
-    reference: str = Field(default="", max_length=2000)
+    reference: Text = Field(default="", max_length=2000)
     """Where its numbers come from."""
     body: Body
     """The body."""

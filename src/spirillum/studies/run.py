@@ -62,10 +62,10 @@ def study(
     folder = _claimed_folder(Path(output), loaded, fingerprint)
     dataset = read_dataset(folder / "dataset.nc")
     if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
-        parts = output_folder(folder / "parts")
+        parts = output_folder(folder / f"parts-{fingerprint[:16]}")
         dataset = _computed(loaded, observed, fingerprint, parts, tell)
         write_dataset(dataset, folder / "dataset.nc")
-        shutil.rmtree(parts)
+        shutil.rmtree(parts, ignore_errors=True)  # another run of the same study may be at it too
     _write_report(dataset, folder, tell)
     return dataset
 
@@ -120,7 +120,7 @@ def _computed(
         )
     for done, task in enumerate(todo):
         tell(f"{task.model}, {task.batch.size} robots", done, len(todo))
-        part = kept(task, parts)
+        part = kept(task, parts, len(loaded.study.friction))
         if part is None:
             part = answer(task, loaded, observed)
             keep(task, part, parts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -17,9 +17,10 @@ from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
 from spirillum.hydrodynamics import SWIMMER_MODELS
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.fields import Length, Rate, Section
+from spirillum.robot.fields import Length, Rate, Section, Text
 from spirillum.robot.load import load, problems_in
 from spirillum.robot.robot import Robot
+from spirillum.units import Hz
 
 __all__ = ["Grid", "LoadedStudy", "Study", "load_study"]
 
@@ -27,7 +28,7 @@ LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
 
 _WHAT = "a study file (TOML, see `spirillum schema study`)"
-_Name = Annotated[str, Field(min_length=1, max_length=200)]
+_Name = Annotated[Text, Field(min_length=1, max_length=200)]
 
 
 class Grid(Section):
@@ -46,7 +47,7 @@ class Study(Section):
 
     title: _Name = "Study"
     """Title of report and figures."""
-    note: Annotated[str, Field(max_length=5000)] = ""
+    note: Annotated[Text, Field(max_length=5000)] = ""
     """What a reader has to know about the study, such as assumptions."""
     models: Annotated[tuple[str, ...], Field(min_length=1)] = ("sbt", "rft")
     """Hydrodynamic models."""
@@ -86,8 +87,8 @@ class Study(Section):
             for name, items in lists.items()
             if len(set(items)) < len(items)
         ]
-        if 0.0 in self.assumed_motor_rates:
-            problems.append("assumed_motor_rates holds 0; allowed: rates other than 0")
+        if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
+            problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         if self.size > LARGEST_STUDY:
             problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STUDY}")
         if problems:
@@ -154,8 +155,21 @@ def load_study(
         raise InputError(f"{name}: {study[0]}{more}", [f"{name}: {problem}" for problem in study])
     sources = list(study.grid.channels.values()) if study.grid else study.robots or []
     robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
+    _check_drives(study, sources, robots, name)
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     return LoadedStudy(study, robots, question)
+
+
+def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:
+    """Every robot needs a drive to swim by, and a joint that turns where motor rates are assumed."""
+    for source, robot in zip(sources, robots, strict=True):
+        if robot.drive is None:
+            raise InputError(f"{name}: robot {source} has no [drive]; allowed: robots with a drive, by which they swim")
+        if study.assumed_motor_rates and robot.drive.joint == "fixed":
+            raise InputError(
+                f"{name}: robot {source} has drive.joint = 'fixed', but the study names assumed_motor_rates; "
+                "allowed: 'revolute', or no assumed_motor_rates"
+            )
 
 
 def _robot(entry: str, folder: Path, overrides: Mapping[str, Any]) -> Robot:

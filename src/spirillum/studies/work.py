@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
-from spirillum.errors import InputError
 from spirillum.files import whole_file
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.prediction import accuracy_limits
@@ -117,8 +116,6 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     """Compute one task."""
     study = loaded.study
     readings = study.friction
-    if task.batch.drive is None:
-        raise InputError("a robot of the study has no [drive]; allowed: a drive, by which it swims")
     free = [swim(task.batch, task.model, friction=reading) for reading in readings]
     part: Part = {f.name: _stacked(free, f.name) for f in QUANTITIES}
     valid = np.stack([result.valid for result in free], axis=-1)
@@ -195,15 +192,19 @@ def summed(found: Iterable[Caution], robots: int) -> list[str]:
     ]
 
 
-def kept(task: Task, folder: Path | None) -> Part | None:
-    """The answer that an earlier run has kept; None if there is none or it is damaged."""
+def kept(task: Task, folder: Path | None, readings: int) -> Part | None:
+    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
     if folder is None or not (folder / task.file_name).is_file():
         return None
     try:
         with (folder / task.file_name).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+            part = {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
         return None
+    whole = {"outside", *(f.name for f in QUANTITIES)} <= set(part)
+    known = {"outside", *(f.name + at for f in QUANTITIES for at in ("", "_at_observed_rate", "_at_assumed_rate"))}
+    fits = all(array.dtype == np.float64 and array.shape[:2] == (task.batch.size, readings) for array in part.values())
+    return part if whole and fits and set(part) <= known else None
 
 
 def keep(task: Task, part: Part, folder: Path | None) -> None:
