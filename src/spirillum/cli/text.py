@@ -85,10 +85,12 @@ def resistance(answer: Answer, console: Console) -> None:
     """Table of `resistance`."""
     title = f"{answer['robot']}: resistance of {answer['part']}, model {answer['model']}, about {answer['about']}"
     names = ("U_x", "U_y", "U_z", "Omega_x", "Omega_y", "Omega_z")
-    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
-    table.add_column("", no_wrap=True, min_width=3)
+    table = Table(
+        title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False, padding=0
+    )
+    table.add_column("", no_wrap=True)
     for name in names:
-        table.add_column(name, justify="right", no_wrap=True)
+        table.add_column(name, justify="right", no_wrap=True, min_width=10)
     for name, row in zip(("F_x", "F_y", "F_z", "T_x", "T_y", "T_z"), answer["matrix"]["value"], strict=True):
         table.add_row(name, *("-" if entry is None else f"{entry:.4g}" for entry in row))
     console.print(table)
