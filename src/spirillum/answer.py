@@ -6,6 +6,7 @@ import json
 import math
 import platform
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from importlib.metadata import version
 from typing import Any
 
@@ -41,6 +42,7 @@ def as_json(answer: Mapping[str, Any]) -> str:
     return json.dumps(answer, indent=2, allow_nan=False, ensure_ascii=False)
 
 
+@lru_cache(maxsize=1)
 def versions() -> str:
     """Versions of what a result was computed with."""
     packages = ("spirillum", "numpy", "scipy", "xarray")
