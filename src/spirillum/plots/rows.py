@@ -211,7 +211,7 @@ def _observed_rows(shown: Shown) -> list[Row]:
         Row(
             "motor rate\n$\\omega_m$ (Hz)",
             rate,
-            tells="Where tail and body alone were observed, the motor rate is their difference, half widths added; "
+            tells="Where tail and body alone were observed, the motor rate is their difference, trial by trial; "
             "a model's motor rate stands only where the tail's rate alone was observed.",
         ),
     ]
