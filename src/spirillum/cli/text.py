@@ -32,14 +32,25 @@ _FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml"}
 _LONG = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
 
 
+class _PipedConsole(Console):
+    """A console that leaves a reader who has gone, as `| head` does, to the caller."""
+
+    def on_broken_pipe(self) -> None:
+        """Hand the error on: the library would end the program with exit code 1."""
+        raise BrokenPipeError
+
+
 def show(answer: Answer, table: Callable[[Answer, Console], None], *, json: bool) -> None:
     """Print an answer as JSON, or as the table of its kind followed by its warnings."""
     if json:
-        typer.echo(as_json(answer))
+        try:
+            typer.echo(as_json(answer))
+        except BrokenPipeError as error:
+            raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
         return
-    console = Console()
+    console = _PipedConsole()
     if console.width < _NARROWEST:
-        console = Console(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
+        console = _PipedConsole(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
     table(answer, console)
     for warning in answer["warnings"]:
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)

@@ -1,0 +1,16 @@
+"""A reader that closes the pipe, as `| head` does, is no failure."""
+
+import subprocess
+import sys
+
+import pytest
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_closed_pipe_ends_quietly(more: list[str]) -> None:
+    command = [sys.executable, "-m", "spirillum", "robot", "show", "biorob2012-wide", *more]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()  # before anything is written
+        errors = process.stderr.read()
+        code = process.wait(timeout=60)
+    assert (code, errors) == (0, b"")
