@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["KINDS", "Kind", "parse_quantity", "show", "shown_in"]
+__all__ = ["KINDS", "Kind", "parse_option", "parse_quantity", "show", "shown_in"]
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
@@ -184,6 +184,20 @@ def parse_quantity(value: object, kind: Kind) -> float:
     if not _bound(kind.low, kind) <= si <= _bound(kind.high, kind):
         raise InputError(f"= {shown} is out of range; allowed: {kind.allowed}")
     return si
+
+
+def parse_option(name: str, value: str | float, kind: Kind) -> float:
+    """Read an option of a function or command: text with its unit, or a float in SI.
+
+    Raises:
+        InputError: as `parse_quantity`; the sentence starts with the option's name.
+    """
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        value = f"{float(value)!r} {kind.unit}"
+    try:
+        return parse_quantity(value, kind)
+    except InputError as error:
+        raise InputError(f"{name} {error}") from error
 
 
 def _scaled(number: float, factor: float) -> float:

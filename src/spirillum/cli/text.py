@@ -16,7 +16,7 @@ from rich.table import Table
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.errors import InputError
 from spirillum.robot.fields import field_values
-from spirillum.units import KINDS, parse_quantity, shown_in
+from spirillum.units import KINDS, parse_option, shown_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -240,10 +240,7 @@ def angle(text: str) -> float:
     Raises:
         InputError: if it is none.
     """
-    try:
-        return parse_quantity(text, KINDS["angle"])
-    except InputError as error:
-        raise InputError(f"phase {error}") from error
+    return parse_option("phase", text, KINDS["angle"])
 
 
 def time_window(text: str) -> tuple[float, float]:
@@ -255,10 +252,7 @@ def time_window(text: str) -> tuple[float, float]:
     start, colon, stop = text.partition(":")
     if not colon:
         raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
-    try:
-        return parse_quantity(start, KINDS["time"]), parse_quantity(stop, KINDS["time"])
-    except InputError as error:
-        raise InputError(f"on {error}") from error
+    return parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])
 
 
 @contextmanager

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values, Vectors
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.algebra import both_parts, skew, two_parts_axial
+from spirillum.hydrodynamics.algebra import both_parts, joint_locked, skew, two_parts_axial
 from spirillum.hydrodynamics.coefficients import axis_height, coefficient_domain, local_coefficients
 from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.hydrodynamics.perrin import body_axial, body_matrix
@@ -223,7 +223,5 @@ class Rft(SwimmerModel):
         if part in ("tail", "rotor"):
             return tail_matrix(batch, phase)
         if part == "robot":
-            body, tail = np.broadcast_arrays(body_matrix(batch), tail_matrix(batch, phase))
-            whole: Matrix6 = body + tail
-            return whole
+            return joint_locked(self.resistance(batch, phase))
         raise InputError(f"part = {part!r} with model 'rft'; allowed: {', '.join(self.parts)} (it has no coupling)")

@@ -20,7 +20,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
 from spirillum.robot.load import load, with_calibration
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, parse_quantity, show
+from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["Prediction", "accuracy_limits", "calibration_warnings", "checked_batch", "predict", "prepared"]
 
@@ -172,12 +172,7 @@ def checked_batch(robot: Robot, model: SwimmerModel) -> RobotBatch:
 def _rate(value: str | float | None) -> float | None:
     if value is None:
         return None
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        value = f"{float(value)!r} rad/s"
-    try:
-        rate = parse_quantity(value, KINDS["rate"])
-    except InputError as error:
-        raise InputError(f"tail-rate {error}") from error
+    rate = parse_option("tail-rate", value, KINDS["rate"])
     if rate == 0:
         raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
     return rate

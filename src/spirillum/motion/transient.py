@@ -24,7 +24,7 @@ from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.swimming import calibrated_balance
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, parse_quantity
+from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -217,7 +217,11 @@ def simulate(
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
     end = _duration(turns, turn, duration)
     time = _sample_times(end, turn, samples_per_turn)
-    windows = None if on is None else [(_time(start, "on"), _time(stop, "on")) for start, stop in on]
+    windows = (
+        None
+        if on is None
+        else [(parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in on]
+    )
     switches = _switches(windows, float(batch.electrics.duty[0]), end)
     response = axial_response(batch, prediction)
     transient = motor_transient(batch.electrics, response.slip, time, switches)
@@ -229,20 +233,10 @@ def _duration(turns: float, turn: float, duration: str | float | None) -> float:
         if not 0 < turns <= 1e5:
             raise InputError(f"turns = {turns}; allowed: more than 0, at most 1e5")
         return turns * turn
-    end = _time(duration, "duration")
+    end = parse_option("duration", duration, KINDS["time"])
     if end <= 0:
         raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
     return end
-
-
-def _time(value: str | float, name: str) -> float:
-    """A time with its unit, or a float in s."""
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        value = f"{float(value)!r} s"
-    try:
-        return parse_quantity(value, KINDS["time"])
-    except InputError as error:
-        raise InputError(f"{name} {error}") from error
 
 
 def _sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
