@@ -5,20 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Complex, Float
 
 if TYPE_CHECKING:
     _Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+    _Complexes = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
     _Truths = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 else:
-    _Floats = _Truths = np.ndarray
+    _Floats = _Complexes = _Truths = np.ndarray
 
-__all__ = ["Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Tensors", "Values", "Vectors"]
+__all__ = ["Amplitudes", "Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Tensors", "Values", "Vectors"]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
 Samples: TypeAlias = Float[_Floats, "..."]
 """Floats of any shape, unrelated to others."""
+Amplitudes: TypeAlias = Complex[_Complexes, "..."]
+"""Complex amplitudes of Fourier modes."""
 Vectors: TypeAlias = Float[_Floats, "*#n 3"]
 """Cartesian vectors."""
 Tensors: TypeAlias = Float[_Floats, "*#n 3 3"]

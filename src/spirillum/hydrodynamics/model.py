@@ -34,6 +34,8 @@ class ResistanceModel(ABC):
     """What it leaves out, and what that costs."""
     parts: ClassVar[tuple[str, ...]]
     """Parts whose matrix it can give."""
+    closed_form: ClassVar[bool] = True
+    """False for a model that solves for the flow, which takes a tenth of a second for each robot."""
     axial_only: ClassVar[bool] = False
     """True where only the entries along and about the motor axis are known; the others are NaN."""
 
@@ -62,6 +64,13 @@ class ResistanceModel(ABC):
 
 class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
+
+    def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
+        """The same flow resolved otherwise: the relative difference of the forward velocities is the error estimate.
+
+        None for a model in closed form, which has a known error only.
+        """
+        return None
 
     @abstractmethod
     def axial(self, batch: RobotBatch) -> Axial:

@@ -7,10 +7,11 @@ from spirillum.hydrodynamics.model import ResistanceModel, SwimmerModel
 from spirillum.hydrodynamics.perrin import Perrin
 from spirillum.hydrodynamics.rft import Rft
 from spirillum.hydrodynamics.sbt import Sbt
+from spirillum.hydrodynamics.slender import Slender
 
 __all__ = ["MODELS", "SWIMMER_MODELS", "find_model", "find_swimmer_model"]
 
-SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft())}
+SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender())}
 """Models that make a robot swim."""
 MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
 """Models that give a resistance matrix."""

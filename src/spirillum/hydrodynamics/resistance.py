@@ -17,7 +17,7 @@ from spirillum.hydrodynamics.model import PARTS, ResistanceModel
 from spirillum.hydrodynamics.models import find_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.load import load
+from spirillum.robot.load import load, with_accuracy
 from spirillum.robot.robot import Robot
 
 __all__ = ["Resistance", "resistance"]
@@ -70,20 +70,24 @@ def resistance(
     model: str = "rft",
     about: str = "body",
     phase: float = 0.0,
+    accuracy: str | None = None,
 ) -> Resistance:
     """Resistance matrix of one part alone in the same fluid.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        part: `body`, `tail`, `rotor` or `robot` (joint locked); None: the robot, or what the model knows.
-        model: `perrin` (body only), `rft`, or `sbt` (axial entries only).
+        part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked); None: the robot, or what the model knows.
+        model: `perrin` (body only), `rft`, `slender`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, rad.
+        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a part that the model cannot do.
     """
     ready, chosen = load(robot), find_model(model)
+    if accuracy is not None:
+        ready = with_accuracy(ready, accuracy)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in PARTS:

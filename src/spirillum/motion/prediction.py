@@ -18,7 +18,7 @@ from spirillum.motion.swimming import Swimming, calibrated_balance, friction_rea
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
-from spirillum.robot.load import load, with_calibration
+from spirillum.robot.load import load, with_accuracy, with_calibration
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option, show
 
@@ -44,6 +44,8 @@ class Prediction:
     """Whether calibration factors were applied."""
     swimming: Swimming
     """The quantities, as arrays of length one."""
+    error_estimate: float
+    """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
 
@@ -78,7 +80,7 @@ class Prediction:
             "calibrated": self.calibrated,
             **quantities,
             "placement": self.placement,
-            "error_estimate": quantity(None, "1", statement=self.model.stated_error(self.robot.model)),
+            "error_estimate": quantity(self.error_estimate, "1", statement=self.model.stated_error(self.robot.model)),
             "references": list(self.references),
         }
         return envelope("prediction", content, self.warnings)
@@ -101,34 +103,35 @@ def predict(
     friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
+    accuracy: str | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `sbt` or `rft`.
+        model: `sbt`, `rft` or `slender`.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
             the effective friction from (18).
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
+        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
     """
-    ready, chosen, batch = prepared(robot, model, calibration)
+    ready, chosen, batch = prepared(robot, model, calibration, accuracy)
     reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
-    result = swim(
-        batch,
-        chosen.name,
-        tail_rate=None if rate is None else np.array([rate]),
-        friction=reading,
-        calibrated=calibrated,
-    )
+
+    def answer(of: SwimmerModel) -> Swimming:
+        rates = None if rate is None else np.array([rate])
+        return swim(batch, of, tail_rate=rates, friction=reading, calibrated=calibrated)
+
+    result = answer(chosen)
     if not result.valid[0]:
         raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
     warnings = [
@@ -138,11 +141,21 @@ def predict(
         *_drive_warnings(ready, chosen, reading, result, rate),
     ]
     applied = calibrated and chosen.name in ready.calibration
-    return Prediction(ready, chosen, reading, applied, result, tuple(warnings))
+    check = chosen.checked_by(ready.model)
+    error = np.nan if check is None else _difference(answer(check), result)
+    return Prediction(ready, chosen, reading, applied, result, error, tuple(warnings))
+
+
+def _difference(check: Swimming, result: Swimming) -> float:
+    """Relative difference of the forward velocities."""
+    return float(np.abs(check.forward_velocity[0] / result.forward_velocity[0] - 1.0))
 
 
 def prepared(
-    robot: str | Path | Mapping[str, Any] | Robot, model: str, calibration: str | Path | None = None
+    robot: str | Path | Mapping[str, Any] | Robot,
+    model: str,
+    calibration: str | Path | None = None,
+    accuracy: str | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
     """A loaded robot with its model and batch, inside the model's domain.
 
@@ -152,6 +165,8 @@ def prepared(
     ready = load(robot)
     if calibration is not None:
         ready = with_calibration(ready, calibration)
+    if accuracy is not None:
+        ready = with_accuracy(ready, accuracy)
     chosen = find_swimmer_model(model)
     return ready, chosen, checked_batch(ready, chosen)
 

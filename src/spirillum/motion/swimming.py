@@ -131,7 +131,7 @@ def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bo
 
 def swim(
     batch: RobotBatch,
-    model: str = "sbt",
+    model: str | SwimmerModel = "sbt",
     *,
     tail_rate: PerRobot | None = None,
     motor_rate: PerRobot | None = None,
@@ -142,7 +142,7 @@ def swim(
 
     Args:
         batch: the robots; a million is one call.
-        model: name of a hydrodynamic model.
+        model: a hydrodynamic model, or its name.
         tail_rate: prescribed lab rates of the tail, rad/s; without them the robots' drive decides. With a
             DC-motor the current then follows from (17) and the effective friction from (18).
         motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
@@ -157,7 +157,7 @@ def swim(
         InputError: for an unknown model or reading, rates that do not match the batch, or robots whose drive
             leaves the motion open.
     """
-    chosen = find_swimmer_model(model)
+    chosen = find_swimmer_model(model) if isinstance(model, str) else model
     if batch.joint == "fixed" and motor_rate is not None:
         raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")

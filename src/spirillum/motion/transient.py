@@ -191,7 +191,7 @@ def simulate(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
-        model: `sbt` or `rft`.
+        model: `sbt`, `rft` or `slender`.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import parse_toml, read_toml, write_text
-from spirillum.robot.options import CalibrationFile
+from spirillum.robot.options import CalibrationFile, SlenderOptions
 from spirillum.robot.robot import Robot
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "preset_text",
     "problems_in",
     "raw_table",
+    "with_accuracy",
     "with_calibration",
 ]
 
@@ -159,6 +160,22 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
     if isinstance(checked, list):
         raise InputError(f"{path}: {checked[0]}", [f"{path}: {problem}" for problem in checked])
     return robot.model_copy(update={"calibration": checked.calibration})
+
+
+def with_accuracy(robot: Robot, accuracy: str) -> Robot:
+    """The robot with another accuracy of the model `slender`.
+
+    Args:
+        robot: a checked robot.
+        accuracy: `standard` or `high`.
+
+    Raises:
+        InputError: for any other.
+    """
+    checked = problems_in(SlenderOptions, {"accuracy": accuracy})
+    if isinstance(checked, list):
+        raise InputError(f"accuracy = {accuracy!r}; allowed: standard, high")
+    return robot.model_copy(update={"model": robot.model.model_copy(update={"slender": checked})})
 
 
 def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:

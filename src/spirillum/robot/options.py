@@ -17,6 +17,7 @@ __all__ = [
     "PerrinOptions",
     "RftOptions",
     "SbtOptions",
+    "SlenderOptions",
 ]
 
 
@@ -70,6 +71,13 @@ class SbtOptions(Section):
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
 
 
+class SlenderOptions(Section):
+    """Options of the resolved tail and body."""
+
+    accuracy: Literal["standard", "high"] = "standard"
+    """Form of the wire and resolution of the surfaces."""
+
+
 class ModelOptions(Section):
     """Options of the hydrodynamic models."""
 
@@ -79,6 +87,8 @@ class ModelOptions(Section):
     """Resistive force theory."""
     sbt: SbtOptions = SbtOptions()
     """Slender-body theory."""
+    slender: SlenderOptions = SlenderOptions()
+    """Resolved tail and body."""
 
 
 class FittedTo(Section):
@@ -111,7 +121,7 @@ def _known_model(name: str) -> str:
     return name
 
 
-_CALIBRATED = ("sbt", "rft")
+_CALIBRATED = ("sbt", "rft", "slender")
 Calibrations = dict[Annotated[str, AfterValidator(_known_model)], Calibration]
 """Calibration factors by model."""
 

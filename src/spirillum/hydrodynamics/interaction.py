@@ -1,0 +1,256 @@
+"""Body, coupling and tail together: the flow between them, for all rigid motions of both parts at once.
+
+Unknowns are the Fourier modes of the traction on the solids of revolution (`revolution`) and the forces along the
+wires (`wire`). The modes decouple on the solids; eliminating them one by one leaves a symmetric positive definite
+system for the wires' forces. Its solution gives the 12x12 resistance matrix, constant in the tail's frame.
+
+Real fields are written as Re sum_m c_m exp(i m theta), m >= 0, with f_theta = i g; see `kernels.rings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar, cast
+
+import numpy as np
+
+from spirillum.arrays import Amplitudes, Samples
+from spirillum.hydrodynamics.revolution import Panels, panels_of
+from spirillum.hydrodynamics.wire import Accuracy, Wire, wire_system
+from spirillum.robot.outline import Outline
+
+__all__ = ["Resolution", "Solution", "solve"]
+
+_EIGHT_PI = 8.0 * np.pi
+_M = TypeVar("_M", Samples, Amplitudes)
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely the flow is resolved."""
+
+    wire: Accuracy = "standard"
+    """Form of the wires."""
+    spacing: float = 1.0
+    """Spacing of the wires' stations, relative to the usual one."""
+    order: int = 10
+    """Gauss nodes of a panel."""
+    tolerance: float = 1e-5
+    """Fourier modes are kept until their share in the interaction of wires and solids falls below this."""
+    most_modes: int = 40
+    """Largest number of modes."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Tractions and forces for each of the 12 unit twists (of the body, then of the rotor), viscosity 1."""
+
+    matrix: Samples
+    """R, 12x12, made symmetric; zero for a part that is not there."""
+    asymmetry: float
+    """What it lacked in symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
+    panels: Panels | None
+    """Nodes on the solids."""
+    wires: tuple[Wire, ...]
+    """The wires."""
+    densities: Amplitudes
+    """Modes (f_x, f_rho, g) ds/du of the traction on the nodes, complex, (modes, 3 nodes, 12)."""
+    forces: Samples
+    """Forces at the wires' stations, (3 stations, 12)."""
+
+
+def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Resolution) -> Solution:
+    """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin.
+
+    Args:
+        solids: solids of revolution about the x axis, and the part (0 body, 1 rotor) with which each moves.
+        wires: wires, and the part with which each moves.
+        resolution: how finely.
+    """
+    lines = tuple(wire for wire, _ in wires)
+    points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
+    system = wire_system(wires, resolution.wire)
+    if not solids:
+        forces = _solved(system.mobility, system.motion)
+        matrix = system.motion.T @ forces + system.own
+        return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), forces)
+    panels = panels_of([outline for outline, _ in solids], _longest(solids, points, lines), resolution.order)
+    modes = _mode_count(panels, points, lines, resolution)
+    images = _Images.of(panels, np.array([part for _, part in solids]), points, lines, modes)
+    forces = _solved(system.mobility - images.mobility, system.motion - images.drift)
+    matrix = images.resistance + (system.motion - images.drag).T @ forces + system.own
+    return _solution(matrix, panels, lines, images.densities(forces), forces)
+
+
+def _solved(mobility: Samples, motion: Samples) -> Samples:
+    """Forces from velocities, by Cholesky factors: the matrix is symmetric positive definite."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    if mobility.size == 0:
+        return np.zeros_like(motion)
+    forces: Samples = cho_solve(cho_factor(mobility, lower=True, check_finite=False), motion, check_finite=False)
+    return forces
+
+
+def _solution(
+    matrix: Samples,
+    panels: Panels | None,
+    wires: tuple[Wire, ...],
+    densities: Amplitudes,
+    forces: Samples,
+) -> Solution:
+    matrix = _EIGHT_PI * matrix
+    scale = np.sqrt(np.diag(matrix))
+    there = scale > 0
+    lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale[there], scale[there])
+    symmetric = 0.5 * (matrix + matrix.T)
+    return Solution(symmetric, float(np.max(np.abs(lack))), panels, wires, _EIGHT_PI * densities, _EIGHT_PI * forces)
+
+
+def _longest(solids: Sequence[tuple[Outline, int]], points: Samples, wires: tuple[Wire, ...]):  # type: ignore[no-untyped-def]
+    """Longest panels allowed: against the solid's own size, the gap to other solids, and the wires."""
+    blob = min((wire.blob for wire in wires), default=np.inf)
+    line_x, line_rho = points[:, 0], np.hypot(points[:, 1], points[:, 2])
+
+    def longest(solid: int, x: Samples, rho: Samples) -> Samples:
+        found = np.full(np.shape(x), np.inf)
+        for other, (outline, _) in enumerate(solids):
+            if other != solid:
+                found = np.minimum(found, 3.0 * outline.distance(x, rho))
+        if len(points):
+            near = np.min(np.hypot(x[:, None] - line_x, rho[:, None] - line_rho), axis=1)
+            found = np.minimum(found, 4.0 * np.hypot(near, blob))
+        return found
+
+    return longest
+
+
+def _mode_count(panels: Panels, points: Samples, wires: tuple[Wire, ...], resolution: Resolution) -> int:
+    """Number of modes to keep.
+
+    With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
+    falls off as exp(-2 m zeta).
+    """
+    if not wires:
+        return 2
+    e2 = min(wire.blob for wire in wires) ** 2
+    rho = np.hypot(points[:, 1], points[:, 2])[:, None]
+    near2 = (points[:, :1] - panels.x.ravel()) ** 2 + (rho - panels.rho.ravel()) ** 2 + e2
+    zeta = float(np.min(np.arccosh(1.0 + near2 / (2.0 * np.maximum(rho * panels.rho.ravel(), 1e-300)))))
+    return int(np.clip(np.ceil(-np.log(resolution.tolerance) / (2.0 * zeta)) + 1, 2, resolution.most_modes))
+
+
+def _surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
+    """Modes 0 and 1 of the surfaces' velocities for each unit twist, complex, (2, 3 nodes, 12)."""
+    x, rho, part = panels.x.ravel(), panels.rho.ravel(), part_of_solid[panels.solid_of_node]
+    motion = np.zeros((2, panels.size, 3, 12), complex)
+    for which in (0, 1):
+        there, first = part == which, 6 * which
+        x_p, rho_p = x[there, None], rho[there]
+        along, across = np.array([0.0, 1.0, 1.0]), np.concatenate([-rho_p[:, None], x_p, x_p], axis=1)
+        motion[0, there, 0, first] = 1.0
+        motion[0, there, 2, first + 3] = -1j * rho_p
+        motion[1, there, :, first + 1] = along
+        motion[1, there, :, first + 2] = -1j * along
+        motion[1, there, :, first + 4] = 1j * across
+        motion[1, there, :, first + 5] = across
+    return motion.reshape(2, -1, 12)
+
+
+@dataclass(frozen=True)
+class _Images:
+    """What the solids, held or moving, do to the wires; all without the factor 1/(8 pi)."""
+
+    resistance: Samples
+    """Of the solids alone, (12, 12)."""
+    mobility: Samples
+    """Velocity that forces on the stations lose to the held solids, (3 stations, 3 stations)."""
+    drift: Samples
+    """Velocity at the stations from the solids' motion, (3 stations, 12)."""
+    drag: Samples
+    """The same from forces on the solids that the stations' forces exert; equal to `drift` by reciprocity."""
+    moving: Amplitudes
+    """Densities from the solids' motion, (2, 3 nodes, 12)."""
+    held: tuple[Amplitudes, ...]
+    """Densities of each mode on the held solids for the stations' forces, complex, (3 nodes, 3 stations)."""
+
+    @classmethod
+    def of(
+        cls, panels: Panels, part_of_solid: np.ndarray, points: Samples, wires: tuple[Wire, ...], modes: int
+    ) -> _Images:
+        """Solve mode by mode."""
+        from scipy.linalg import lu_factor, lu_solve
+
+        motion = _surface_motion(panels, part_of_solid)
+        blocks = panels.matrices(modes)
+        weight = np.repeat(panels.area, 3)[:, None]
+        turn, frames = _turns(points, modes), _frames(points)
+        cross = _wires_to_surface(panels, wires, modes)
+        stations = points.size
+        resistance, mobility = np.zeros((12, 12)), np.zeros((stations, stations))
+        drift, drag = np.zeros((stations, 12)), np.zeros((stations, 12))
+        moving, held = [], []
+        for m in range(modes):
+            share = (1.0 if m == 0 else 2.0) / (2.0 * np.pi)  # Fourier coefficient of a point force on a ring
+            factors = lu_factor(blocks[m], check_finite=False)
+            image = lu_solve(factors, cross[m], check_finite=False)
+            back = (weight * cross[m]).T
+            mobility += share * (back @ image) * np.real(np.conj(turn[m])[:, None] * turn[m])
+            if m < 2:
+                answer = lu_solve(factors, np.concatenate([motion[m].real, motion[m].imag], axis=1), check_finite=False)
+                answer = answer[:, :12] + 1j * answer[:, 12:]
+                dual = (weight * motion[m]).conj().T
+                resistance += np.real(dual @ answer) / share
+                drift += np.real(np.conj(turn[m])[:, None] * (back @ answer))
+                drag += np.real((dual @ image) * turn[m]).T
+                moving.append(answer)
+            held.append(_columns(share * image * turn[m], frames))
+        return cls(
+            resistance,
+            _columns(_columns(0.5 * (mobility + mobility.T), frames).T, frames),
+            _columns(drift.T, frames).T,
+            _columns(drag.T, frames).T,
+            np.array(moving),
+            tuple(held),
+        )
+
+    def densities(self, forces: Samples) -> Amplitudes:
+        """Densities of each mode for each unit twist, (modes, 3 nodes, 12)."""
+        found: Amplitudes = np.array([-(held @ forces) for held in self.held])
+        found[:2] += self.moving
+        return found
+
+
+def _turns(points: Samples, modes: int) -> Amplitudes:
+    """Phase exp(-i m theta) of each cylindrical component of a force, -i more for g, (modes, 3 stations)."""
+    theta = np.arctan2(points[:, 2], points[:, 1])
+    phase = np.exp(-1j * np.arange(modes)[:, None, None] * theta[:, None])
+    turns: Amplitudes = (phase * np.array([1.0, 1.0, -1j])).reshape(modes, -1)
+    return turns
+
+
+def _frames(points: Samples) -> Samples:
+    """Rows e_x, e_rho, e_theta at each station, (stations, 3, 3)."""
+    theta = np.arctan2(points[:, 2], points[:, 1])
+    cos, sin, zero = np.cos(theta), np.sin(theta), np.zeros(len(theta))
+    rows = [[zero + 1.0, zero, zero], [zero, cos, sin], [zero, -sin, cos]]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _columns(matrix: _M, frames: Samples) -> _M:
+    """Turn columns that stand for cylindrical components at the stations into Cartesian ones."""
+    split = matrix.reshape(len(matrix), matrix.shape[1] // 3, 3)
+    return cast("_M", np.matmul(split.swapaxes(0, 1), frames).swapaxes(0, 1).reshape(matrix.shape))
+
+
+def _wires_to_surface(panels: Panels, wires: tuple[Wire, ...], modes: int) -> Samples:
+    """Velocities of each mode on the nodes from ring forces at the stations, (modes, 3 nodes, 3 stations)."""
+    from spirillum.kernels.rings import ring_blocks
+
+    x, rho = panels.x.ravel(), panels.rho.ravel()
+    blocks = [
+        ring_blocks(x, rho, wire.points[:, 0], np.hypot(wire.points[:, 1], wire.points[:, 2]), wire.blob**2, modes)
+        for wire in wires
+    ]
+    return np.concatenate(blocks, axis=2) if blocks else np.zeros((modes, 3 * panels.size, 0))

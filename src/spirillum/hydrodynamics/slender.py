@@ -1,0 +1,262 @@
+"""The real tail and body: a wire of its own shape, solids of revolution, and the flow between them.
+
+The tail is a line of regularised Stokeslets (`wire`), body and coupling are single layers (`revolution`), coupled in
+unbounded fluid (`interaction`). The 12x12 is constant in the tail's frame: it is computed once for a geometry and
+turned with the tail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.hydrodynamics.algebra import axial_entries, axis_rotation, joint_locked, rotated
+from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
+from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.hydrodynamics.thin_wire import thin_wire_cautions
+from spirillum.hydrodynamics.wire import Wire, station_count, wire_along
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import centreline
+from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.options import ModelOptions
+from spirillum.robot.outline import Outline, body_outline, cylinder_outline
+from spirillum.robot.parts import End, Shape
+
+__all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
+
+_MOST_STATIONS = {"standard": 3000, "high": 1200}
+_POINTS_PER_TURN = 200
+_SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
+
+_RESOLUTIONS = {
+    "standard": Resolution("standard", order=8, tolerance=1e-4),
+    "high": Resolution("high", order=12, tolerance=1e-6),
+}
+_CHECKS = {  # what differs most from each: the form of the wire, and the spacing of its stations
+    "standard": Resolution("high", order=8, tolerance=1e-4),
+    "high": Resolution("high", order=8, tolerance=1e-4, spacing=1.25),
+}
+
+
+_NUMBERS = (
+    "body_diameter",
+    "body_length",
+    "fillet",
+    "coupling_diameter",
+    "coupling_length",
+    "coupling_clearance",
+    "wavelength",
+    "amplitude",
+    "tail_length",
+    "wire_diameter",
+    "taper",
+    "hand",
+)
+
+
+class _Geometry(NamedTuple):
+    """Everything that the resistance depends on, but for the viscosity; lengths in m."""
+
+    shape: Shape
+    front: End | None
+    rear: End | None
+    body_diameter: float
+    body_length: float
+    fillet: float
+    coupling_diameter: float
+    coupling_length: float
+    coupling_clearance: float
+    wavelength: float
+    amplitude: float
+    tail_length: float
+    wire_diameter: float
+    taper: float
+    hand: float
+
+    @classmethod
+    def of(cls, batch: RobotBatch, index: int) -> _Geometry:
+        """Of robot number `index`."""
+
+        def number(name: str) -> float:
+            column = getattr(batch, name)
+            return float(column[index if column.size > 1 else 0])
+
+        return cls(
+            **{name: number(name) for name in _NUMBERS},
+            shape=batch.shape,
+            front=batch.front,
+            rear=batch.rear,
+        )
+
+
+def _solids(g: _Geometry) -> Iterator[tuple[str, Outline, int]]:
+    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution."""
+    yield "body", body_outline(g.shape, g.body_diameter, g.body_length, g.fillet, g.front, g.rear), 0
+    if g.coupling_diameter > 0 and g.coupling_length > 0:
+        front = -0.5 * g.body_length - g.coupling_clearance
+        rear = -0.5 * g.body_length - g.coupling_length + g.coupling_clearance
+        yield "coupling", cylinder_outline(g.coupling_diameter, front, rear), 1
+
+
+def _wire(g: _Geometry, spacing: float) -> Wire:
+    """The tail at phase 0."""
+    turns = g.tail_length / g.wavelength
+    count = int(np.ceil(_POINTS_PER_TURN * turns)) + 400
+    share = np.linspace(0.0, 1.0, count)
+    xi = g.tail_length * share
+    if np.isfinite(g.taper):  # denser where the root bends
+        root = np.linspace(0.0, 1.0, 400) ** 2 * min(1.0, 20.0 / g.taper) * g.tail_length
+        xi = np.unique(np.concatenate([xi, root]))
+    columns = (g.wavelength, g.amplitude, g.tail_length, g.taper, g.hand, 0.0)
+    names = ("wavelength", "amplitude", "length", "taper", "hand", "phase")
+    values = {name: np.full(1, value) for name, value in zip(names, columns, strict=True)}
+    line = centreline(xi, root=np.full(1, 0.5 * g.body_length + g.coupling_length), **values)
+    return wire_along(line.position, 0.5 * g.wire_diameter, spacing=spacing)
+
+
+def solids_of(batch: RobotBatch, index: int) -> tuple[tuple[str, Outline, int], ...]:
+    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution of robot number `index`."""
+    return tuple(_solids(_Geometry.of(batch, index)))
+
+
+def tail_wire(batch: RobotBatch, index: int) -> Wire:
+    """The tail of robot number `index` as a wire, at phase 0."""
+    return _wire(_Geometry.of(batch, index), 1.0)
+
+
+def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
+    """Tractions on robot number `index` for all unit twists, at phase 0."""
+    return _solved(_Geometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
+
+
+def _solved(g: _Geometry, part: str, resolution: Resolution) -> Solution:
+    solids = [(outline, moves) for name, outline, moves in _solids(g) if name in _PIECES[part]]
+    wires = [(_wire(g, resolution.spacing), 1)] if "tail" in _PIECES[part] else []
+    return solve(solids, wires, resolution)
+
+
+_PIECES = {
+    "body": ("body",),
+    "coupling": ("coupling",),
+    "tail": ("tail",),
+    "rotor": ("coupling", "tail"),
+    "robot": ("body", "coupling", "tail"),
+}
+
+
+@lru_cache(maxsize=4096)
+def _matrix(g: _Geometry, part: str, resolution: Resolution) -> Samples:
+    """12x12 of a part at phase 0 and viscosity 1."""
+    matrix = _solved(g, part, resolution).matrix
+    matrix.flags.writeable = False
+    return matrix
+
+
+_STATED = {
+    "standard": (
+        "against a fully resolved wire and body (tail 25, 2.5 mm) the tail's drag, thrust and axial torque are 0.6, "
+        "0.5 and 0.8 % low, the robot's speed and torque per turn 0.5 and 0.6 %; unbounded fluid, no channel walls"
+    ),
+    "high": (
+        "against a fully resolved wire and body (tail 25, 2.5 mm) drag, thrust and axial torque of the tail and speed "
+        "and torque per turn of the robot agree to 0.3 %; unbounded fluid, no channel walls"
+    ),
+}
+
+
+class Slender(SwimmerModel):
+    """The tail as a line of regularised Stokeslets, body and coupling as they are, and the flow between them."""
+
+    name = "slender"
+    title = "resolved"
+    references = ("cortez2001", "johnson1980", "pozrikidis1992", "biorob2012")
+    known_error = _STATED["standard"]
+    parts = ("body", "coupling", "tail", "rotor", "robot")
+    closed_form = False
+
+    def __init__(self, resolution: Resolution | None = None) -> None:
+        """Resolve the flow as each robot's `model.slender.accuracy` says, or in one way for all."""
+        self._resolution = resolution
+
+    def stated_error(self, options: ModelOptions) -> str:
+        """See `ResistanceModel.stated_error`."""
+        return _STATED[options.slender.accuracy]
+
+    def checked_by(self, options: ModelOptions) -> SwimmerModel:
+        """See `SwimmerModel.checked_by`."""
+        return Slender(_CHECKS[options.slender.accuracy])
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
+        coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
+        stations = station_count(batch.arc_length, 0.5 * batch.wire_diameter)
+        return [
+            Limit.of(
+                "coupling.length",
+                batch.coupling_length,
+                "more than",
+                0.5 * batch.wire_diameter,
+                "mm",
+                "the tail's root, coupling.length behind the body, would lie in the body",
+                "tail-in-body",
+            ),
+            Limit.of(
+                "coupling.clearance",
+                np.where(coupled, batch.coupling_clearance, np.inf),
+                "at least",
+                _SMALLEST_CLEARANCE * batch.coupling_diameter,
+                "mm",
+                "the film between body and coupling is resolved down to a hundredth of coupling.diameter",
+                "film-too-thin",
+            ),
+            Limit.of(
+                "stations along the tail (tail.wire_diameter)",
+                stations,
+                "at most",
+                float(_MOST_STATIONS[batch.options.slender.accuracy]),
+                "1",
+                "their equations would fill the memory",
+                "wire-too-thin",
+            ),
+        ]
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """A wire thin against its wave."""
+        return thin_wire_cautions(batch, 2.6)[:1]
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`; NaN for robots outside the domain."""
+        zero = np.zeros(1)
+        return axial_entries(self.resistance(batch, zero))
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """See `SwimmerModel.resistance`; NaN for robots outside the domain."""
+        matrices = self._matrices(batch, "robot")
+        turn = np.zeros((*np.shape(phase), 12, 12))
+        for first in range(0, 12, 3):
+            turn[..., first : first + 3, first : first + 3] = axis_rotation(phase)
+        return turn @ matrices @ np.swapaxes(turn, -1, -2)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """See `ResistanceModel.part_matrix`; the rotor is coupling and tail."""
+        if part not in self.parts:
+            raise InputError(f"part = {part!r} with model 'slender'; allowed: {', '.join(self.parts)}")
+        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
+            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
+        return rotated(joint_locked(self._matrices(batch, part)), axis_rotation(phase))
+
+    def _matrices(self, batch: RobotBatch, part: str) -> Samples:
+        """12x12 of a part at phase 0; the other entries are zero, all are NaN outside the domain."""
+        limits = assembly_limits(batch) + (self.domain(batch) if part not in ("body", "coupling") else [])
+        answerable = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
+        resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        found = np.full((batch.size, 12, 12), np.nan)
+        for index in np.flatnonzero(answerable):
+            viscosity = float(batch.viscosity[index if batch.viscosity.size > 1 else 0])
+            found[index] = viscosity * _matrix(_Geometry.of(batch, int(index)), part, resolution)
+        return found

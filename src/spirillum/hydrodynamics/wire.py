@@ -1,0 +1,231 @@
+"""A thin wire of any curve: a line of regularised Stokeslets.
+
+A blob of radius a sqrt(e) on the centreline gives the velocity that slender-body theory gives on a wire of radius a,
+along and across it, to leading order in its curvature (Cortez and Nicholas, Commun. Appl. Math. Comput. Sci. 7:33,
+2012); the matrix from forces to velocities is symmetric positive definite.
+
+`standard` adds the torque of cross-sections that spin and tilt as if each were alone. `high` gives every
+cross-section, besides its force, the first moments of its traction: those that resist its spin, its tilt, and its
+strain. They act through the gradients of the same kernel; on a straight wire each has the resistance of a
+cylinder. With them the effect of curvature on the traction is there: what remains falls off with its square.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from spirillum.arrays import PerRobot, Samples
+from spirillum.hydrodynamics.algebra import skew
+
+__all__ = ["Accuracy", "Wire", "WireSystem", "station_count", "wire_along", "wire_system"]
+
+Accuracy = Literal["standard", "high"]
+
+_BLOB = float(np.exp(0.5))
+"""Blob radius over a: the velocity on a straight wire is that of slender-body theory, along and across."""
+_SPACING = 0.75
+"""Spacing of stations over the blob radius: the smooth kernel's sums are then integrals to 2e-4."""
+_INSET = 0.375
+"""Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
+solved for with their edges, then have the right drag along and across to 0.4 %."""
+_TILT = 0.5
+"""Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Stations along a wire's centreline; SI."""
+
+    points: Samples
+    """(n, 3), m."""
+    tangents: Samples
+    """Unit tangents, (n, 3)."""
+    lengths: Samples
+    """Arc length that each station stands for, m, (n,)."""
+    radius: float
+    """Radius a of the wire, m."""
+
+    @property
+    def blob(self) -> float:
+        """Blob radius, m."""
+        return _BLOB * self.radius
+
+    def distance(self, points: Samples) -> Samples:
+        """Distance of points from the centreline, m, (k,).
+
+        Args:
+            points: (k, 3), m.
+        """
+        from scipy.spatial import cKDTree
+
+        _, nearest = cKDTree(self.points).query(points)
+        offset = points - self.points[nearest]
+        half = 0.5 * self.lengths[nearest]
+        along = np.clip(np.sum(offset * self.tangents[nearest], axis=1), -half, half)
+        distance: Samples = np.linalg.norm(offset - along[:, None] * self.tangents[nearest], axis=1)
+        return distance
+
+
+def station_count(arc_length: PerRobot, radius: PerRobot) -> PerRobot:
+    """Stations that wires of these lengths and radii take."""
+    blob = _BLOB * radius
+    return np.ceil(np.maximum(arc_length / blob - 2.0 * _INSET, 0.0) / _SPACING) + 1.0
+
+
+def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: bool = False) -> Wire:
+    """The wire along a curve.
+
+    Args:
+        curve: points along the centreline, dense against its bends, (k, 3), m; a closed one ends where it starts.
+        radius: a, m.
+        spacing: of the stations, relative to the standard one.
+        closed: whether the wire is a ring without ends.
+    """
+    from scipy.interpolate import CubicSpline
+
+    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    spline = CubicSpline(chord, curve, axis=0, bc_type="periodic" if closed else "not-a-knot")
+    node, weight = np.polynomial.legendre.leggauss(4)
+    steps = np.diff(chord)
+    speed = np.linalg.norm(spline(chord[:-1, None] + 0.5 * (1.0 + node) * steps[:, None], 1), axis=-1)
+    arc = np.concatenate([[0.0], np.cumsum(0.5 * steps * (speed @ weight))])
+    at, lengths = _stations(float(arc[-1]), _BLOB * radius, spacing, closed=closed)
+    where = np.interp(at, arc, chord)
+    tangents = spline(where, 1)
+    tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+    return Wire(spline(where), tangents, lengths, radius)
+
+
+def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:
+    """Arc lengths of the stations, and what each stands for."""
+    step = _SPACING * spacing * blob
+    if closed:
+        count = int(np.ceil(length / step))
+        around: Samples = np.linspace(0.0, length, count, endpoint=False)
+        return around, np.full(count, length / count)
+    inset = min(_INSET * blob, 0.5 * length)
+    at: Samples = np.linspace(inset, length - inset, int(np.ceil((length - 2.0 * inset) / step)) + 1)
+    ends = np.concatenate([np.zeros(1), 0.5 * (at[1:] + at[:-1]), np.full(1, length)])
+    lengths: Samples = np.diff(ends)
+    return at, lengths
+
+
+@dataclass(frozen=True)
+class WireSystem:
+    """Equations of wires that move with rigid parts, all without the factor 1/(8 pi mu).
+
+    Forces F at the stations follow from A F = S V - u for unit twists V and the velocity u that others make there;
+    the fluid's wrench on the parts is S' F + K V.
+    """
+
+    mobility: Samples
+    """A, (3 stations, 3 stations), symmetric positive definite."""
+    motion: Samples
+    """S, (3 stations, 12)."""
+    own: Samples
+    """K, (12, 12)."""
+
+
+def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
+    """Equations of wires.
+
+    Args:
+        wires: each with the part (0 body, 1 rotor) that it moves with.
+        accuracy: `standard` or `high`.
+    """
+    from spirillum.kernels.blobs import force_matrix
+
+    if not wires:
+        return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), np.zeros((12, 12)))
+    points = np.concatenate([wire.points for wire, _ in wires])
+    e2 = np.concatenate([np.full(len(wire.points), wire.blob**2) for wire, _ in wires])
+    part = np.concatenate([np.full(len(wire.points), part) for wire, part in wires])
+    forces: Samples = force_matrix(points, e2)
+    motion = _on_part(np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=-1), part)
+    if accuracy == "standard":
+        own: Samples = np.sum([_own_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
+        return WireSystem(forces, motion, own)
+    return _with_moments(wires, points, e2, part, WireSystem(forces, motion, np.zeros((12, 12))))
+
+
+def _on_part(rows: Samples, part: np.ndarray) -> Samples:
+    """Rows (stations, k, 6) against the twist of the part that each station moves with, (k stations, 12)."""
+    motion = np.zeros((*rows.shape[:2], 12))
+    for which in (0, 1):
+        motion[part == which, :, 6 * which : 6 * which + 6] = rows[part == which]
+    return motion.reshape(-1, 12)
+
+
+def _own_torque(wire: Wire, part: int) -> Samples:
+    """Torque over rotation of a wire's cross-sections, each alone, (12, 12); viscosity 1.
+
+    4 pi a^2 per arc length about the tangent, as a spinning cylinder, and half of it across: first moments of the
+    traction tilt a cross-section as they would in the line's own flow.
+    """
+    tangent = wire.tangents.T @ (wire.lengths[:, None] * wire.tangents)
+    across = np.sum(wire.lengths) * np.eye(3) - tangent
+    matrix = np.zeros((12, 12))
+    at = slice(6 * part + 3, 6 * part + 6)
+    matrix[at, at] = 4.0 * np.pi * wire.radius**2 * (tangent + _TILT * across)
+    return matrix
+
+
+def _moments(tangents: Samples) -> tuple[Samples, Samples]:
+    """First moments that a cross-section bears and their resistance, (n, 5, 3, 3) and (5,).
+
+    Force along b times displacement along k: spin about the tangent, tangential forces displaced along each of two
+    normals, and two strains of the cross-section; trace-free, of unit norm, orthogonal. A unit density of each
+    moves the gradient along it by its resistance over 8 pi mu a^2 on an infinite cylinder.
+    """
+    helper = np.eye(3)[np.argmin(np.abs(tangents), axis=1)]
+    first = np.cross(tangents, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangents, first)
+
+    def dyad(force: Samples, displacement: Samples) -> Samples:
+        product: Samples = force[:, :, None] * displacement[:, None, :]
+        return product
+
+    moments = (
+        np.sqrt(0.5) * (dyad(second, first) - dyad(first, second)),
+        dyad(tangents, first),
+        dyad(tangents, second),
+        np.sqrt(0.5) * (dyad(first, first) - dyad(second, second)),
+        np.sqrt(0.5) * (dyad(first, second) + dyad(second, first)),
+    )
+    return np.stack(moments, axis=1), np.array([4.0, 4.0, 4.0, 2.0, 2.0])
+
+
+def _with_moments(
+    wires: Sequence[tuple[Wire, int]], points: Samples, e2: Samples, part: np.ndarray, forces: WireSystem
+) -> WireSystem:
+    """The system with first moments, eliminated by static condensation: it stays symmetric positive definite.
+
+    On an infinite straight line the kernel's own answer to a unit density of moment is 2 (a/e)^2 of a cylinder's;
+    what is missing is added to each station's own entry.
+    """
+    from scipy.linalg import cho_factor, cho_solve
+
+    from spirillum.kernels.blobs import moment_matrices
+
+    moments, compliance = _moments(np.concatenate([wire.tangents for wire, _ in wires]))
+    lengths = np.concatenate([wire.lengths for wire, _ in wires])
+    a2 = np.concatenate([np.full(len(wire.points), wire.radius**2) for wire, _ in wires])
+    velocities, gradients = moment_matrices(points, e2, moments)
+    missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * compliance
+    gradients[np.diag_indices_from(gradients)] += missing.ravel()
+    turning = np.cross(np.eye(3)[:, None], np.eye(3)[None])  # e_k x e_l: gradient along l of a rotation about k
+    spin = np.einsum("nqbl,klb->nqk", moments, turning)
+    rotation = _on_part(np.concatenate([np.zeros_like(spin), spin], axis=-1), part)
+    factors = cho_factor(gradients, lower=True, check_finite=False)
+    solved = cho_solve(factors, np.concatenate([velocities.T, rotation], axis=1), check_finite=False)
+    size = points.size
+    return WireSystem(
+        forces.mobility - velocities @ solved[:, :size],
+        forces.motion - velocities @ solved[:, size:],
+        rotation.T @ solved[:, size:],
+    )
