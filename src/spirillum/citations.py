@@ -35,6 +35,27 @@ REFERENCES: dict[str, str] = {
         "(II) 7:1-11, 1936."
     ),
     "happel1983": "J. Happel and H. Brenner. Low Reynolds Number Hydrodynamics. Martinus Nijhoff, 1983.",
+    "cortez2001": (
+        "R. Cortez. The method of regularized Stokeslets. SIAM Journal on Scientific Computing 23:1204-1225, 2001."
+    ),
+    "cortez2012": (
+        "R. Cortez and M. Nicholas. Slender body theory for Stokes flows with regularized forces. "
+        "Communications in Applied Mathematics and Computational Science 7:33-62, 2012."
+    ),
+    "pozrikidis1992": (
+        "C. Pozrikidis. Boundary Integral and Singularity Methods for Linearized Viscous Flow. "
+        "Cambridge University Press, 1992."
+    ),
+    "rodenborn2013": (
+        "B. Rodenborn, C.-H. Chen, H. L. Swinney, B. Liu and H. P. Zhang. Propulsion of microorganisms by a helical "
+        "flagellum. Proceedings of the National Academy of Sciences 110:E338-E347, 2013."
+    ),
+    "tirado1979": (
+        "M. M. Tirado and J. Garcia de la Torre. Translational friction coefficients of rigid, symmetric top "
+        "macromolecules. Application to circular cylinders. Journal of Chemical Physics 71:2581-2587, 1979; "
+        "Rotational dynamics of rigid, symmetric top macromolecules. Application to circular cylinders. 73:1986-1993, "
+        "1980."
+    ),
     "higdon1979": (
         "J. J. L. Higdon. The hydrodynamics of flagellar propulsion: helical waves. "
         "Journal of Fluid Mechanics 94:331-351, 1979."

@@ -101,7 +101,7 @@ FIELDS: list[tuple[dict[str, Any], str, str]] = [
     ({"body.fillet": "1 mm"}, "body.fillet", "both or neither"),
     ({"body.rear": "fillet"}, "body.fillet", "both or neither"),
     ({"body.rear": "fillet", "body.fillet": "10 mm"}, "body.fillet = 10 mm", "9 mm"),
-    ({"coupling.diameter": "0 mm"}, "coupling.diameter = 0 mm", "more than 0 mm"),
+    ({"coupling.diameter": "-1 mm"}, "coupling.diameter", "0 m to 100 m"),
     ({"coupling.clearance": "6 mm"}, "coupling.clearance = 6 mm", "less than 5 mm"),
     ({"model.rft.axis_height": "5 mm"}, "model.rft.axis_height", "brennen-winet"),
     # drives and joints

@@ -16,8 +16,6 @@ from spirillum.robot.outline import Outline
 
 __all__ = ["FlowField", "flow_field"]
 
-_TOUCHING = 1e-9  # of a solid's size: points as close as that to a surface lie on it
-
 
 @dataclass(frozen=True)
 class FlowField:
@@ -89,19 +87,19 @@ class FlowField:
             raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
         turned = self._tail_frame(places)
         field = self._sum(turned)
-        velocity = field[:, :3] @ axis_rotation(np.array(self.phase)).T / (8.0 * np.pi)
+        velocity = field[:, :3] @ _rotation(self.phase).T / (8.0 * np.pi)
         return velocity, self.viscosity * field[:, 3] / (8.0 * np.pi)
 
     def _tail_frame(self, points: Samples) -> Samples:
         """Turned back by the phase."""
-        turned: Samples = points @ axis_rotation(np.array(self.phase))
+        turned: Samples = points @ _rotation(self.phase)
         return turned
 
     def _sum(self, points: Samples) -> Samples:
         from spirillum.kernels.field import add_blobs, add_layer
 
         s = self.solution
-        back = axis_rotation(np.array(-self.phase))
+        back = _rotation(-self.phase)
         twists = (self.twists.reshape(4, 3) @ back.T).ravel()
         field = np.zeros((len(points), 4))
         forces = (s.forces @ twists).reshape(-1, 3)
@@ -115,6 +113,12 @@ class FlowField:
             density: Amplitudes = np.ascontiguousarray(np.moveaxis(modes, 0, 2))
             add_layer(points, s.panels.x, s.panels.rho, density, s.panels.rule, field)
         return field
+
+
+def _rotation(angle: float) -> Samples:
+    """Rotation about the x axis, 3x3."""
+    rotation: Samples = axis_rotation(np.array([angle]))[0]
+    return rotation
 
 
 def _checked(points: Samples) -> Samples:

@@ -9,9 +9,11 @@ Real fields are written as Re sum_m c_m exp(i m theta), m >= 0, with f_theta = i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TypeVar, cast
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple, TypeVar, cast
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.hydrodynamics.revolution import Panels, panels_of
 from spirillum.hydrodynamics.wire import Accuracy, Wire, wire_system
 from spirillum.robot.outline import Outline
+
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 __all__ = ["Resolution", "Solution", "solve"]
 
@@ -68,6 +73,27 @@ def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int
         wires: wires, and the part with which each moves.
         resolution: how finely.
     """
+    with _one_thread():
+        return _solve(solids, wires, resolution)
+
+
+def _one_thread() -> AbstractContextManager[object]:
+    """One thread of linear algebra: matrices of some hundred rows gain little from more, and lose on a busy machine."""
+    limited: AbstractContextManager[object] = _thread_pools().limit(limits=1, user_api="blas")
+    return limited
+
+
+@lru_cache(maxsize=1)
+def _thread_pools() -> ThreadpoolController:
+    import scipy.linalg  # noqa: F401 - brings its own linear algebra
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def _solve(
+    solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Resolution
+) -> Solution:
     lines = tuple(wire for wire, _ in wires)
     points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
     system = wire_system(wires, resolution.wire)
@@ -76,8 +102,7 @@ def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int
         matrix = system.motion.T @ forces + system.own
         return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), forces)
     panels = panels_of([outline for outline, _ in solids], _longest(solids, points, lines), resolution.order)
-    modes = _mode_count(panels, points, lines, resolution)
-    images = _Images.of(panels, np.array([part for _, part in solids]), points, lines, modes)
+    images = _Images.of(panels, np.array([part for _, part in solids]), lines, resolution)
     forces = _solved(system.mobility - images.mobility, system.motion - images.drift)
     matrix = images.resistance + (system.motion - images.drag).T @ forces + system.own
     return _solution(matrix, panels, lines, images.densities(forces), forces)
@@ -108,8 +133,10 @@ def _solution(
     return Solution(symmetric, float(np.max(np.abs(lack))), panels, wires, _EIGHT_PI * densities, _EIGHT_PI * forces)
 
 
-def _longest(solids: Sequence[tuple[Outline, int]], points: Samples, wires: tuple[Wire, ...]):  # type: ignore[no-untyped-def]
-    """Longest panels allowed: against the solid's own size, the gap to other solids, and the wires."""
+def _longest(
+    solids: Sequence[tuple[Outline, int]], points: Samples, wires: tuple[Wire, ...]
+) -> Callable[[int, Samples, Samples], Samples]:
+    """Longest panels allowed on each solid at (x, rho): against the gap to other solids, and to the wires."""
     blob = min((wire.blob for wire in wires), default=np.inf)
     line_x, line_rho = points[:, 0], np.hypot(points[:, 1], points[:, 2])
 
@@ -117,7 +144,7 @@ def _longest(solids: Sequence[tuple[Outline, int]], points: Samples, wires: tupl
         found = np.full(np.shape(x), np.inf)
         for other, (outline, _) in enumerate(solids):
             if other != solid:
-                found = np.minimum(found, 3.0 * outline.distance(x, rho))
+                found = np.minimum(found, 2.0 * outline.distance(x, rho))
         if len(points):
             near = np.min(np.hypot(x[:, None] - line_x, rho[:, None] - line_rho), axis=1)
             found = np.minimum(found, 4.0 * np.hypot(near, blob))
@@ -126,19 +153,22 @@ def _longest(solids: Sequence[tuple[Outline, int]], points: Samples, wires: tupl
     return longest
 
 
-def _mode_count(panels: Panels, points: Samples, wires: tuple[Wire, ...], resolution: Resolution) -> int:
-    """Number of modes to keep.
+def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Resolution) -> list[int]:
+    """Number of modes to keep on each solid; 0 and 1 hold all rigid motions.
 
     With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
     falls off as exp(-2 m zeta).
     """
-    if not wires:
-        return 2
-    e2 = min(wire.blob for wire in wires) ** 2
-    rho = np.hypot(points[:, 1], points[:, 2])[:, None]
-    near2 = (points[:, :1] - panels.x.ravel()) ** 2 + (rho - panels.rho.ravel()) ** 2 + e2
-    zeta = float(np.min(np.arccosh(1.0 + near2 / (2.0 * np.maximum(rho * panels.rho.ravel(), 1e-300)))))
-    return int(np.clip(np.ceil(-np.log(resolution.tolerance) / (2.0 * zeta)) + 1, 2, resolution.most_modes))
+    x, rho = panels.x.ravel(), panels.rho.ravel()
+    counts = np.full(int(panels.solid.max()) + 1, 2)
+    for wire in wires:
+        line_rho = np.hypot(wire.points[:, 1], wire.points[:, 2])[:, None]
+        near2 = (wire.points[:, :1] - x) ** 2 + (line_rho - rho) ** 2 + wire.blob**2
+        zeta = np.min(np.arccosh(1.0 + near2 / (2.0 * np.maximum(line_rho * rho, 1e-300))), axis=0)
+        for solid in range(counts.size):
+            nearest = float(np.min(zeta[panels.solid_of_node == solid]))
+            counts[solid] = max(counts[solid], int(np.ceil(-0.5 * np.log(resolution.tolerance) / nearest)) + 1)
+    return [min(int(count), resolution.most_modes) for count in counts]
 
 
 def _surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
@@ -172,40 +202,44 @@ class _Images:
     """The same from forces on the solids that the stations' forces exert; equal to `drift` by reciprocity."""
     moving: Amplitudes
     """Densities from the solids' motion, (2, 3 nodes, 12)."""
-    held: tuple[Amplitudes, ...]
-    """Densities of each mode on the held solids for the stations' forces, complex, (3 nodes, 3 stations)."""
+    held: tuple[tuple[np.ndarray, Samples], ...]
+    """For each mode the rows (3 nodes of the solids that bear it), and the densities there for ring forces at the
+    stations, (rows, 3 stations)."""
+    turn: Amplitudes
+    """Phases of the stations' forces in each mode, see `_turns`."""
+    frames: Samples
+    """Cylindrical unit vectors at the stations, see `_frames`."""
 
     @classmethod
-    def of(
-        cls, panels: Panels, part_of_solid: np.ndarray, points: Samples, wires: tuple[Wire, ...], modes: int
-    ) -> _Images:
-        """Solve mode by mode."""
-        from scipy.linalg import lu_factor, lu_solve
+    def of(cls, panels: Panels, parts: np.ndarray, wires: tuple[Wire, ...], resolution: Resolution) -> _Images:
+        """Solve mode by mode.
 
-        motion = _surface_motion(panels, part_of_solid)
-        blocks = panels.matrices(modes)
-        weight = np.repeat(panels.area, 3)[:, None]
-        turn, frames = _turns(points, modes), _frames(points)
-        cross = _wires_to_surface(panels, wires, modes)
-        stations = points.size
-        resistance, mobility = np.zeros((12, 12)), np.zeros((stations, stations))
-        drift, drag = np.zeros((stations, 12)), np.zeros((stations, 12))
+        Args:
+            panels: of all solids.
+            parts: the part (0 body, 1 rotor) with which each solid moves.
+            wires: wires.
+            resolution: how finely.
+        """
+        points = np.concatenate([wire.points for wire in wires]) if wires else np.zeros((0, 3))
+        counts = _mode_counts(panels, wires, resolution)
+        turn, frames = _turns(points, max(counts)), _frames(points)
+        motion = _surface_motion(panels, parts)
+        size = points.size
+        resistance, mobility = np.zeros((12, 12)), np.zeros((size, size))
+        drift, drag = np.zeros((size, 12)), np.zeros((size, 12))
         moving, held = [], []
-        for m in range(modes):
-            share = (1.0 if m == 0 else 2.0) / (2.0 * np.pi)  # Fourier coefficient of a point force on a ring
-            factors = lu_factor(blocks[m], check_finite=False)
-            image = lu_solve(factors, cross[m], check_finite=False)
-            back = (weight * cross[m]).T
-            mobility += share * (back @ image) * np.real(np.conj(turn[m])[:, None] * turn[m])
+        for m, rows, mode in _modes(panels, wires, counts):
+            image = mode.solve(mode.cross)
+            back = (mode.weight * mode.cross).T
+            mobility += _share(m) * (back @ image) * np.real(np.conj(turn[m])[:, None] * turn[m])
             if m < 2:
-                answer = lu_solve(factors, np.concatenate([motion[m].real, motion[m].imag], axis=1), check_finite=False)
-                answer = answer[:, :12] + 1j * answer[:, 12:]
-                dual = (weight * motion[m]).conj().T
-                resistance += np.real(dual @ answer) / share
+                answer = mode.solve(motion[m].real) + 1j * mode.solve(motion[m].imag)
+                dual = (mode.weight * motion[m]).conj().T
+                resistance += np.real(dual @ answer) / _share(m)
                 drift += np.real(np.conj(turn[m])[:, None] * (back @ answer))
                 drag += np.real((dual @ image) * turn[m]).T
                 moving.append(answer)
-            held.append(_columns(share * image * turn[m], frames))
+            held.append((rows, image))
         return cls(
             resistance,
             _columns(_columns(0.5 * (mobility + mobility.T), frames).T, frames),
@@ -213,13 +247,58 @@ class _Images:
             _columns(drag.T, frames).T,
             np.array(moving),
             tuple(held),
+            turn,
+            frames,
         )
 
     def densities(self, forces: Samples) -> Amplitudes:
         """Densities of each mode for each unit twist, (modes, 3 nodes, 12)."""
-        found: Amplitudes = np.array([-(held @ forces) for held in self.held])
-        found[:2] += self.moving
+        rings = np.matmul(self.frames, forces.reshape(-1, 3, 12)).reshape(-1, 12)
+        found = np.zeros((len(self.held), *self.moving.shape[1:]), complex)
+        found[:2] = self.moving
+        for m, (rows, image) in enumerate(self.held):
+            found[m, rows] -= _share(m) * (image @ (self.turn[m][:, None] * rings))
         return found
+
+
+class _Mode(NamedTuple):
+    """The single layer in one mode."""
+
+    factors: tuple[Samples, np.ndarray]
+    """LU factors of the matrix."""
+    weight: Samples
+    """Surface element of each row, (rows, 1)."""
+    cross: Samples
+    """Velocities on the surface from ring forces at the stations, (rows, 3 stations)."""
+
+    def solve(self, velocities: Samples) -> Samples:
+        """Densities from velocities."""
+        from scipy.linalg import lu_solve
+
+        densities: Samples = lu_solve(self.factors, velocities, check_finite=False)
+        return densities
+
+
+def _modes(panels: Panels, wires: tuple[Wire, ...], counts: Sequence[int]) -> Iterator[tuple[int, np.ndarray, _Mode]]:
+    """Each mode with its rows and equations, on the solids that bear it: the others are left out."""
+    from scipy.linalg import lu_factor
+
+    first = 0
+    for last in sorted(set(counts)):
+        bearing = np.array(counts) >= last
+        some = panels.of_solids(bearing)
+        rows = np.flatnonzero(np.repeat(bearing[panels.solid_of_node], 3))
+        blocks = some.matrices(last)
+        cross = _wires_to_surface(some, wires, last)
+        weight = np.repeat(some.area, 3)[:, None]
+        for m in range(first, last):
+            yield m, rows, _Mode(lu_factor(blocks[m], check_finite=False), weight, cross[m])
+        first = last
+
+
+def _share(m: int) -> float:
+    """Fourier coefficient of a point force over that of a ring of the same total."""
+    return (1.0 if m == 0 else 2.0) / (2.0 * np.pi)
 
 
 def _turns(points: Samples, modes: int) -> Amplitudes:

@@ -47,6 +47,10 @@ class ResistanceModel(ABC):
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory: outside them an answer is NaN in a batch and an `InputError` alone."""
 
+    def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
+        """Requirements on one part alone: those of the tail do not matter to body and coupling."""
+        return [] if part in ("body", "coupling") else self.domain(batch)
+
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory's accuracy: where they are broken, the answer carries a warning."""
         return []

@@ -99,7 +99,7 @@ def resistance(
     if not np.isfinite(phase):
         raise InputError(f"phase = {phase}; allowed: a finite angle in rad")
     batch = RobotBatch.of(ready)
-    outside = broken(chosen.domain(batch)) if part != "body" else []
+    outside = broken(chosen.part_domain(batch, part))
     if outside:
         raise InputError(f"{ready.name} with model '{model}': {outside[0].sentence()}")
     matrix = chosen.part_matrix(batch, part, np.array([float(phase)]))
@@ -112,7 +112,7 @@ def resistance(
 
 def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:
     found = list(robot.warnings)
-    if part != "body":
+    if part not in ("body", "coupling"):
         found += [limit.sentence() for limit in broken(model.cautions(batch))]
     if model.axial_only:
         found.append(

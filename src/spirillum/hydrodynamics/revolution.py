@@ -75,6 +75,15 @@ class Panels:
         """Index of the solid of each node."""
         return np.repeat(self.solid, self.order)
 
+    def of_solids(self, wanted: np.ndarray) -> Panels:
+        """The panels of some solids.
+
+        Args:
+            wanted: whether to keep each solid.
+        """
+        keep = wanted[self.solid]
+        return self if np.all(keep) else Panels(self.x[keep], self.rho[keep], self.solid[keep])
+
     @cached_property
     def normal(self) -> Samples:
         """Normal times ds/du, outward for outlines that run from front to rear, (nodes, 2) in (x, rho)."""
@@ -108,8 +117,7 @@ class Panels:
             null[there, :2] = self.normal[there]
             dual = null * self.area[:, None]
             norm = float(np.sum(null * dual))
-            size = float(np.sqrt(np.sum(np.hypot(*self.normal[there].T) * self.area[there])))
-            blocks[0] += 8.0 * np.pi * size / norm * np.outer(null.ravel(), dual.ravel())
+            blocks[0] += 8.0 * np.pi / norm * np.outer(null.ravel(), dual.ravel())
         return blocks
 
 
@@ -125,8 +133,12 @@ def panels_of(outlines: Sequence[Outline], longest: Callable[[int, Samples, Samp
     for index, outline in enumerate(outlines):
         sharp = (False, *outline.corners, False)
         for number, piece in enumerate(outline.pieces):
-            allowed = partial(longest, index)
-            for t in _panel_parameters(piece, (sharp[number], sharp[number + 1]), allowed, order):
+            joints = (sharp[number], sharp[number + 1])
+            beside = tuple(
+                outline.pieces[other].length if 0 <= other < len(outline.pieces) and not edge else np.inf
+                for other, edge in zip((number - 1, number + 1), joints, strict=True)
+            )
+            for t in _panel_parameters(piece, joints, beside, partial(longest, index), order):
                 points = piece.points(t)
                 x.append(points[0])
                 rho.append(points[1])
@@ -135,9 +147,16 @@ def panels_of(outlines: Sequence[Outline], longest: Callable[[int, Samples, Samp
 
 
 def _panel_parameters(
-    piece: Line | Arc, sharp: tuple[bool, bool], longest: Callable[[Samples, Samples], Samples], order: int
+    piece: Line | Arc,
+    sharp: tuple[bool, bool],
+    beside: tuple[float, ...],
+    longest: Callable[[Samples, Samples], Samples],
+    order: int,
 ) -> list[Samples]:
-    """Parameters t of the nodes of each panel of a piece; they crowd where its start or end is a sharp edge."""
+    """Parameters t of the nodes of each panel of a piece; they crowd where its start or end is a sharp edge.
+
+    Panels shrink towards the ends of a long piece, and towards a short neighbour, such as a fillet, to its length.
+    """
     edges = [0.0, 1.0]
     if isinstance(piece, Arc):  # at most 60 degrees
         parts = int(np.ceil(abs(piece.angles[1] - piece.angles[0]) / (np.pi / 3 + 1e-9)))
@@ -145,11 +164,14 @@ def _panel_parameters(
     elif all(sharp):
         edges = [0.0, 0.5, 1.0]
     length = piece.length
+    widest = float(np.max(piece.points(np.linspace(0.0, 1.0, 9))[1]))
     at = 0
     while at < len(edges) - 1:
         low, high = edges[at], edges[at + 1]
         inside = np.linspace(low, high, 9)
         allowed = float(np.min(longest(*piece.points(inside))))
+        from_ends = low * length, (1.0 - high) * length
+        allowed = min(allowed, 3.0 * widest + min(from_ends), beside[0] + from_ends[0], beside[1] + from_ends[1])
         if (high - low) * length > allowed:
             edges.insert(at + 1, 0.5 * (low + high))
         else:

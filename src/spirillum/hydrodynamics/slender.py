@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
 from spirillum.hydrodynamics.model import SwimmerModel
-from spirillum.hydrodynamics.thin_wire import thin_wire_cautions
+from spirillum.hydrodynamics.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.hydrodynamics.wire import Wire, station_count, wire_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
@@ -159,12 +159,13 @@ def _matrix(g: _Geometry, part: str, resolution: Resolution) -> Samples:
 
 _STATED = {
     "standard": (
-        "against a fully resolved wire and body (tail 25, 2.5 mm) the tail's drag, thrust and axial torque are 0.6, "
-        "0.5 and 0.8 % low, the robot's speed and torque per turn 0.5 and 0.6 %; unbounded fluid, no channel walls"
+        "against a fully resolved wire and robot (tail 25, 2.5 mm) drag, thrust and axial torque of the tail are 0.6, "
+        "0.5 and 0.8 % low, speed and torque per turn 0.5 and 0.8 %; thrust up to 2.7 % off for short, wide coils; "
+        "unbounded fluid, no channel walls"
     ),
     "high": (
-        "against a fully resolved wire and body (tail 25, 2.5 mm) drag, thrust and axial torque of the tail and speed "
-        "and torque per turn of the robot agree to 0.3 %; unbounded fluid, no channel walls"
+        "against fully resolved wires and a robot, drag, thrust and axial torque of the tail, speed and torque per "
+        "turn agree to 0.4 %; unbounded fluid, no channel walls"
     ),
 }
 
@@ -174,7 +175,7 @@ class Slender(SwimmerModel):
 
     name = "slender"
     title = "resolved"
-    references = ("cortez2001", "johnson1980", "pozrikidis1992", "biorob2012")
+    references = ("cortez2001", "cortez2012", "pozrikidis1992", "biorob2012")
     known_error = _STATED["standard"]
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
@@ -215,6 +216,15 @@ class Slender(SwimmerModel):
                 "film-too-thin",
             ),
             Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                0.5 * batch.arc_length,
+                "mm",
+                "a wire is at least twice as long as it is thick",
+                "wire-too-short",
+            ),
+            Limit.of(
                 "stations along the tail (tail.wire_diameter)",
                 stations,
                 "at most",
@@ -226,8 +236,19 @@ class Slender(SwimmerModel):
         ]
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
-        """A wire thin against its wave."""
-        return thin_wire_cautions(batch, 2.6)[:1]
+        """A wire thin against its wave, and long enough for its ends not to matter much."""
+        return [
+            thin_wire_cautions(batch, EXACT_EPS_CONSTANT)[0],
+            Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                0.2 * batch.arc_length,
+                "mm",
+                "the ends of a wire shorter than five diameters are resolved to some 5 % only",
+                "short-wire",
+            ),
+        ]
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`; NaN for robots outside the domain."""
@@ -252,7 +273,7 @@ class Slender(SwimmerModel):
 
     def _matrices(self, batch: RobotBatch, part: str) -> Samples:
         """12x12 of a part at phase 0; the other entries are zero, all are NaN outside the domain."""
-        limits = assembly_limits(batch) + (self.domain(batch) if part not in ("body", "coupling") else [])
+        limits = assembly_limits(batch) + self.part_domain(batch, part)
         answerable = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
         found = np.full((batch.size, 12, 12), np.nan)

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
+from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import skew
 
 __all__ = ["Accuracy", "Wire", "WireSystem", "station_count", "wire_along", "wire_system"]
@@ -84,10 +85,21 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
         radius: a, m.
         spacing: of the stations, relative to the standard one.
         closed: whether the wire is a ring without ends.
+
+    Raises:
+        InputError: if the curve is no curve, or a wire of that radius would run into itself.
     """
     from scipy.interpolate import CubicSpline
 
-    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    curve = np.asarray(curve, dtype=float)
+    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 4 or not np.all(np.isfinite(curve)):
+        raise InputError(f"curve has shape {curve.shape}; allowed: at least 4 finite points (x, y, z) in m")
+    if not (np.isfinite(radius) and radius > 0):
+        raise InputError(f"radius = {radius} m; allowed: more than 0 m")
+    gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    apart = np.concatenate([[True], gaps > 1e-12 * np.sum(gaps)])
+    curve = curve[apart]
+    chord = np.concatenate([[0.0], np.cumsum(gaps[apart[1:]])])
     spline = CubicSpline(chord, curve, axis=0, bc_type="periodic" if closed else "not-a-knot")
     node, weight = np.polynomial.legendre.leggauss(4)
     steps = np.diff(chord)
@@ -97,7 +109,25 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
     where = np.interp(at, arc, chord)
     tangents = spline(where, 1)
     tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
-    return Wire(spline(where), tangents, lengths, radius)
+    wire = Wire(spline(where), tangents, lengths, radius)
+    _check_apart(wire, at, float(arc[-1]) if closed else np.inf)
+    return wire
+
+
+def _check_apart(wire: Wire, at: Samples, around: float) -> None:
+    """Refuse a wire that touches itself: nearer than its diameter, but further along it than half a tightest turn."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(wire.points).query_pairs(2.0 * wire.radius, output_type="ndarray")
+    along = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]])
+    touching = pairs[np.minimum(along, around - along) > np.pi * wire.radius]
+    if len(touching):
+        first, second = 1e3 * wire.points[touching[0]]
+        raise InputError(
+            f"the wire touches itself near ({', '.join(f'{value:.4g}' for value in first)}) mm: "
+            f"{float(np.linalg.norm(first - second)):.3g} mm to another part of its centreline; allowed: more than "
+            f"its diameter, {2e3 * wire.radius:.3g} mm"
+        )
 
 
 def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:

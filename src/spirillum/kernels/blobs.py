@@ -8,6 +8,7 @@ displacement along k, moves the fluid by -m[b, k] d_k G[a, b], and feels the gra
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
 __all__ = ["force_matrix", "moment_matrices"]
+
+Contracted: TypeAlias = tuple[Samples, Samples, Samples]
+"""Of each moment m and a vector x: m x, x m, and x m x."""
 
 
 @compiled
@@ -60,6 +64,51 @@ def _contract(moment: Samples, x: Samples, mx: Samples, xm: Samples) -> float:
 
 
 @compiled
+def _moment_velocities(x: Samples, square: float, r2: float, there: Contracted, block: Samples) -> None:
+    """Fill block (3, q) with the velocities at x from unit moments."""
+    mx, xm, xmx = there
+    i3 = 1.0 / (r2 * math.sqrt(r2))
+    i5 = i3 / r2
+    # G = a_0(r) I + b_0(r) x x'; a_1 is the derivative of a_0 over r, and so on
+    a_1, b_0, b_1 = -i3 - 3.0 * square * i5, i3, -3.0 * i5
+    for s in range(block.shape[1]):
+        for c in range(3):
+            block[c, s] = -(a_1 * mx[s, c] + b_0 * xm[s, c] + b_1 * xmx[s] * x[c])
+
+
+@compiled
+def _moment_gradients(
+    square: float,
+    r2: float,
+    here: Contracted,
+    there: Contracted,
+    moments_here: Samples,
+    moments_there: Samples,
+    block: Samples,
+) -> None:
+    """Fill block (q, q) with the velocity gradients along moments here from unit moments there."""
+    my, ym, ymy = here
+    mx, xm, xmx = there
+    i3 = 1.0 / (r2 * math.sqrt(r2))
+    i5 = i3 / r2
+    i7 = i5 / r2
+    a_1, a_2 = -i3 - 3.0 * square * i5, 3.0 * i5 + 15.0 * square * i7
+    b_0, b_1, b_2 = i3, -3.0 * i5, 15.0 * i7
+    q = block.shape[0]
+    for t in range(q):
+        for s in range(q):
+            same, crossed, outer, mixed = 0.0, 0.0, 0.0, 0.0
+            for c in range(3):
+                outer += my[t, c] * mx[s, c]
+                mixed += ym[t, c] * xm[s, c] + my[t, c] * xm[s, c] + ym[t, c] * mx[s, c]
+                for d in range(3):
+                    same += moments_here[t, c, d] * moments_there[s, c, d]
+                    crossed += moments_here[t, c, d] * moments_there[s, d, c]
+            value = a_2 * outer + a_1 * same + b_2 * ymy[t] * xmx[s] + b_1 * mixed + b_0 * crossed
+            block[t, s] = -value
+
+
+@compiled
 def moment_matrices(points: Samples, e2: Samples, moments: Samples) -> tuple[Samples, Samples]:
     """What unit first moments at points do.
 
@@ -74,41 +123,22 @@ def moment_matrices(points: Samples, e2: Samples, moments: Samples) -> tuple[Sam
     n, q = moments.shape[:2]
     velocities, gradients = np.empty((3 * n, q * n)), np.empty((q * n, q * n))
     x = np.empty(3)
-    my, ym, mx, xm = np.empty((q, 3)), np.empty((q, 3)), np.empty((q, 3)), np.empty((q, 3))
-    ymy, xmx = np.empty(q), np.empty(q)
+    here, there = (np.empty((q, 3)), np.empty((q, 3)), np.empty(q)), (np.empty((q, 3)), np.empty((q, 3)), np.empty(q))
     for i in range(n):
         for j in range(n):
             for c in range(3):
                 x[c] = points[i, c] - points[j, c]
             square = 0.5 * (e2[i] + e2[j])
             r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + square
-            i3 = 1.0 / (r2 * math.sqrt(r2))
-            i5 = i3 / r2
-            i7 = i5 / r2
-            # G = a_0(r) I + b_0(r) x x'; a_1 is the derivative of a_0 over r, and so on
-            a_1, a_2 = -i3 - 3.0 * square * i5, 3.0 * i5 + 15.0 * square * i7
-            b_0, b_1, b_2 = i3, -3.0 * i5, 15.0 * i7
             for s in range(q):
-                xmx[s] = _contract(moments[j, s], x, mx[s], xm[s])
-                for c in range(3):
-                    value = a_1 * mx[s, c] + b_0 * xm[s, c] + b_1 * xmx[s] * x[c]
-                    velocities[3 * i + c, q * j + s] = -value
+                there[2][s] = _contract(moments[j, s], x, there[0][s], there[1][s])
+            _moment_velocities(x, square, r2, there, velocities[3 * i : 3 * i + 3, q * j : q * j + q])
             if j > i:
                 continue
             for t in range(q):
-                ymy[t] = _contract(moments[i, t], x, my[t], ym[t])
-            for t in range(q):
-                for s in range(q):
-                    same, crossed, mm, ss, ms, sm = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                    for c in range(3):
-                        mm += my[t, c] * mx[s, c]
-                        ss += ym[t, c] * xm[s, c]
-                        ms += my[t, c] * xm[s, c]
-                        sm += ym[t, c] * mx[s, c]
-                        for d in range(3):
-                            same += moments[i, t, c, d] * moments[j, s, c, d]
-                            crossed += moments[i, t, c, d] * moments[j, s, d, c]
-                    value = a_2 * mm + a_1 * same + b_2 * ymy[t] * xmx[s] + b_1 * (ss + ms + sm) + b_0 * crossed
-                    gradients[q * i + t, q * j + s] = -value
-                    gradients[q * j + s, q * i + t] = -value
+                here[2][t] = _contract(moments[i, t], x, here[0][t], here[1][t])
+            block = gradients[q * i : q * i + q, q * j : q * j + q]
+            _moment_gradients(square, r2, here, there, moments[i], moments[j], block)
+            if j < i:
+                gradients[q * j : q * j + q, q * i : q * i + q] = block.T
     return velocities, gradients

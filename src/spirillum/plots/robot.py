@@ -104,7 +104,7 @@ def _draw_robot(axes: Axes, s: Scene) -> None:
     )
     draw_wire(axes, robot, _COPPER, phase=PHASE, unit=unit, points=s.points)
     clearance = robot.coupling.clearance / unit
-    if robot.coupling.length > 2 * robot.coupling.clearance:
+    if robot.coupling.diameter > 0 and robot.coupling.length > 2 * robot.coupling.clearance:
         radius = 0.5 * robot.coupling.diameter / unit
         x = np.array([s.rear - clearance, s.rear - clearance, s.root + clearance, s.root + clearance])
         draw_solid(axes, x, np.array([0.0, radius, radius, 0.0]), _COUPLING, order=7)

@@ -63,7 +63,8 @@ class Arc:
     def radius(self, x: Samples) -> Samples:
         """Radius at x; NaN off the piece."""
         ends = self.centre[0] + self.semi_axes[0] * np.cos(np.array(self.angles))
-        inside = (x >= ends.min()) & (x <= ends.max())
+        slack = 1e-12 * abs(self.semi_axes[0])
+        inside = (x >= ends.min() - slack) & (x <= ends.max() + slack)
         share = np.clip((x - self.centre[0]) / self.semi_axes[0], -1.0, 1.0)
         return np.where(inside, self.centre[1] + self.semi_axes[1] * np.sqrt(1.0 - share**2), np.nan)
 

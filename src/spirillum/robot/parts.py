@@ -72,7 +72,7 @@ class Coupling(Section):
     """The mechanical coupling between motor and tail; it turns with the tail."""
 
     diameter: LengthOrZero = 0.0
-    """Diameter D_c (Table I)."""
+    """Diameter D_c (Table I); 0 for a bare gap between body and tail."""
     length: LengthOrZero = 0.0
     """Axial distance L_c from the body's rear to the tail's root (Table I); 0 for no coupling."""
     clearance: LengthOrZero = 0.0005

@@ -99,8 +99,6 @@ class Robot(Section):
         elif (body.fillet is not None) != ("fillet" in (body.front_end, body.rear_end)):
             wanted = "needs body.fillet, the edge radius" if body.fillet is None else "is not used by either end"
             problems.append(f"body.fillet: an end 'fillet' {wanted}; allowed: both or neither")
-        if self.coupling.length > 0 and not self.coupling.diameter > 0:
-            problems.append("coupling.diameter = 0 mm; allowed: more than 0 mm where coupling.length is not 0")
         if rft.axis_height is not None and rft.coefficients != "brennen-winet":
             problems.append(
                 f"model.rft.axis_height is set, but coefficients are '{rft.coefficients}'; "

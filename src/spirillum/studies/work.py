@@ -61,6 +61,7 @@ REASONS = (
     "tail-in-body",
     "film-too-thin",
     "wire-too-thin",
+    "wire-too-short",
     "wire-too-thick-for-rft",
     "wire-touches-floor",
     "wire-too-close-to-floor",
