@@ -1,8 +1,10 @@
 """Array shapes in annotations are checked while tests run; robots that many tests share."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import Phase, settings
 from jaxtyping import install_import_hook
@@ -31,3 +33,34 @@ def batch_of() -> Callable[..., Any]:
 def wide(batch_of: Callable[..., Any]) -> Any:
     """The paper's robot in the wide channel, with the tail that Fig. 5 names (25 mm, 2.5 mm)."""
     return batch_of()
+
+
+@dataclass(frozen=True)
+class StokesSphere:
+    """The exact flow around a sphere at the origin: a stand-in for a robot's flow with a known truth; SI."""
+
+    radius: float = 0.012
+    viscosity: float = 3.5
+    velocity: tuple[float, float, float] = (1.2e-3, 0.0, 0.3e-3)
+    rotation: tuple[float, float, float] = (-0.2, 0.1, 0.0)
+
+    def inside(self, points: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(points, axis=1) < self.radius
+
+    def fields(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        from spirillum import InputError
+
+        if self.inside(points).any():
+            raise InputError("point lies inside the sphere")
+        r = np.linalg.norm(points, axis=1, keepdims=True)
+        n, a, speed = points / r, self.radius, np.array(self.velocity)
+        along = (n @ speed)[:, None]
+        moved = 0.75 * a / r * (speed + along * n) + 0.25 * (a / r) ** 3 * (speed - 3 * along * n)
+        turned = (a / r) ** 3 * np.cross(np.array(self.rotation), points)
+        return moved + turned, (1.5 * self.viscosity * a * along / r**2)[:, 0]
+
+
+@pytest.fixture(scope="session")
+def sphere() -> StokesSphere:
+    """The flow around a sphere that moves and turns."""
+    return StokesSphere()

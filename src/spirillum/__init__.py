@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from spirillum.citations import citation
     from spirillum.errors import InputError
     from spirillum.hydrodynamics.resistance import Resistance, resistance
+    from spirillum.motion.comparison import ModelComparison, compare_models
+    from spirillum.motion.flow import Flow, flow
     from spirillum.motion.prediction import Prediction, predict
     from spirillum.motion.swimming import Swimming, swim
     from spirillum.motion.transient import simulate
@@ -21,13 +23,17 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Flow",
     "InputError",
+    "ModelComparison",
     "Prediction",
     "Resistance",
     "Robot",
     "RobotBatch",
     "Swimming",
     "citation",
+    "compare_models",
+    "flow",
     "load",
     "predict",
     "resistance",
@@ -37,13 +43,17 @@ __all__ = [
 ]
 
 _HOME = {
+    "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
+    "ModelComparison": "spirillum.motion.comparison",
     "Prediction": "spirillum.motion.prediction",
     "Resistance": "spirillum.hydrodynamics.resistance",
     "Robot": "spirillum.robot",
     "RobotBatch": "spirillum.robot",
     "Swimming": "spirillum.motion.swimming",
     "citation": "spirillum.citations",
+    "compare_models": "spirillum.motion.comparison",
+    "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
     "predict": "spirillum.motion.prediction",
     "resistance": "spirillum.hydrodynamics.resistance",

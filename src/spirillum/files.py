@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
+    "PICTURES",
     "netcdf_target",
     "output_folder",
+    "output_target",
     "parse_toml",
     "read_text",
     "read_toml",
@@ -26,6 +28,8 @@ __all__ = [
     "write_text",
 ]
 
+PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
+"""Endings of the pictures that can be written, for `output_target`."""
 _LARGEST_TEXT = 1 << 20
 
 
@@ -136,9 +140,24 @@ def netcdf_target(path: str | Path) -> Path:
     Raises:
         InputError: if it does not end in `.nc`, is no regular file, or its folder is not there.
     """
+    return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
+
+
+def output_target(path: str | Path, kinds: Mapping[str, str], example: str) -> Path:
+    """The path of a file to write, checked before any work is done.
+
+    Args:
+        path: the file.
+        kinds: allowed endings, and what each of them is.
+        example: a name that would do.
+
+    Raises:
+        InputError: if it has another ending, is no regular file, or its folder is not there.
+    """
     path = Path(path)
-    if path.suffix != ".nc":
-        raise InputError(f"{str(path)[:200]!r} does not end in .nc; allowed: a NetCDF file, for example run.nc")
+    if path.suffix not in kinds:
+        endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
+        raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
     if not _regular(path).parent.is_dir():
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
     return path

@@ -8,15 +8,21 @@ from typing import Annotated, Any
 import typer
 
 from spirillum.cli.options import (
+    Accuracy,
     Calibration,
     Friction,
     Json,
     Model,
     NoCalibration,
     Output,
+    Picture,
     RobotArgument,
     Settings,
+    TailRate,
+    complete_frames,
+    complete_models,
     complete_parts,
+    complete_planes,
     complete_presets,
     complete_resistance_models,
     complete_schemas,
@@ -60,13 +66,11 @@ def _root(
 def predict(
     robot: RobotArgument,
     model: Model = "sbt",
-    tail_rate: Annotated[
-        str | None,
-        typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
-    ] = None,
+    tail_rate: TailRate = None,
     friction: Friction = None,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
+    accuracy: Accuracy = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -77,28 +81,80 @@ def predict(
     from spirillum.cli import text
     from spirillum.motion.prediction import predict as answer
 
-    result = answer(
-        _loaded(robot, settings),
-        model=model,
-        tail_rate=tail_rate,
-        friction=friction,
-        calibrated=not no_calibration,
-        calibration=calibration,
-    )
+    with text.patience(model, quiet=json):
+        result = answer(
+            _loaded(robot, settings),
+            model=model,
+            tail_rate=tail_rate,
+            friction=friction,
+            calibrated=not no_calibration,
+            calibration=calibration,
+            accuracy=accuracy,
+        )
     text.show(result.to_dict(), text.prediction, json=json)
+
+
+@app.command("compare-models")
+def compare_models(
+    robot: RobotArgument,
+    output: Picture = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(autocompletion=complete_models, help="A model to compare; repeatable. Without it, all of them."),
+    ] = None,
+    tail_rate: TailRate = None,
+    friction: Friction = None,
+    no_calibration: NoCalibration = False,
+    calibration: Calibration = None,
+    accuracy: Accuracy = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Predict one robot's swimming with every model, side by side.
+
+    Example: `spirillum compare-models biorob2012-wide --tail-rate 1.2Hz`
+    """
+    from spirillum.cli import comparison_text, text
+    from spirillum.files import PICTURES, output_target
+    from spirillum.motion.comparison import compare_models as answer
+
+    target = None if output is None else output_target(output, PICTURES, "models.png")
+    loaded = _loaded(robot, settings)
+    with text.progress_bar(quiet=json) as progress:
+        result = answer(
+            loaded,
+            models=model,
+            tail_rate=tail_rate,
+            friction=friction,
+            calibrated=not no_calibration,
+            calibration=calibration,
+            accuracy=accuracy,
+            progress=progress,
+        )
+    if target is not None:
+        from spirillum.plots.comparison import comparison_figure
+        from spirillum.plots.style import save_as
+
+        save_as(comparison_figure(result), target)
+    text.show(comparison_text.comparison_answer(result, output), comparison_text.model_comparison, json=json)
 
 
 @app.command()
 def resistance(
     robot: RobotArgument,
     part: Annotated[
-        str | None, typer.Option(autocompletion=complete_parts, help="body, tail, rotor or robot (joint locked).")
+        str | None,
+        typer.Option(autocompletion=complete_parts, help="body, coupling, tail, rotor or robot (joint locked)."),
     ] = None,
     model: Annotated[
-        str, typer.Option(autocompletion=complete_resistance_models, help="perrin (body only), rft or sbt (axial).")
+        str,
+        typer.Option(
+            autocompletion=complete_resistance_models, help="perrin (body only), rft, slender or sbt (axial)."
+        ),
     ] = "rft",
     about: Annotated[str, typer.Option(help="Reference point: body (its mid-length) or tail-root.")] = "body",
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
+    accuracy: Accuracy = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -109,13 +165,15 @@ def resistance(
     from spirillum.cli import text
     from spirillum.hydrodynamics.resistance import resistance as answer
 
-    result = answer(
-        _loaded(robot, settings),
-        part=part,
-        model=model,
-        about=about,
-        phase=text.angle(phase),
-    )
+    with text.patience(model, quiet=json):
+        result = answer(
+            _loaded(robot, settings),
+            part=part,
+            model=model,
+            about=about,
+            phase=text.angle(phase),
+            accuracy=accuracy,
+        )
     text.show(result.to_dict(), text.resistance, json=json)
 
 
@@ -175,19 +233,79 @@ def simulate(
     from spirillum.motion.transient import simulate as answer
 
     target = netcdf_target(output)
-    dataset = answer(
-        _loaded(robot, settings),
-        model=model,
-        friction=friction,
-        turns=turns,
-        duration=duration,
-        on=[text.time_window(window) for window in on] if on else None,
-        samples_per_turn=samples_per_turn,
-        calibrated=not no_calibration,
-        calibration=calibration,
-    )
+    with text.patience(model, quiet=json):
+        dataset = answer(
+            _loaded(robot, settings),
+            model=model,
+            friction=friction,
+            turns=turns,
+            duration=duration,
+            on=[text.time_window(window) for window in on] if on else None,
+            samples_per_turn=samples_per_turn,
+            calibrated=not no_calibration,
+            calibration=calibration,
+        )
     write_dataset(dataset, target)
     text.show(text.simulation_answer(dataset, output), text.simulation, json=json)
+
+
+@app.command()
+def flow(
+    robot: RobotArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
+    ] = None,
+    volume: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A box around the robot: .vti for ParaView, or .nc.")
+    ] = None,
+    plane: Annotated[
+        str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
+    ] = "xz",
+    offset: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Place of the plane on the axis across it, such as -50mm.")
+    ] = "0mm",
+    extent: Annotated[
+        str | None,
+        typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
+    ] = None,
+    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
+    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
+    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
+    frame: Annotated[
+        str, typer.Option(autocompletion=complete_frames, help="lab, or body (moving with its forward velocity).")
+    ] = "lab",
+    tail_rate: TailRate = None,
+    friction: Friction = None,
+    accuracy: Accuracy = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Compute velocity and pressure of the fluid around the swimming robot: a picture, or numbers on a grid.
+
+    Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
+    """
+    from spirillum.cli import flow_text, text
+    from spirillum.motion.flow import box_around, plane_around
+    from spirillum.motion.flow import flow as answer
+
+    flow_text.check_targets(output, volume)
+    loaded = _loaded(robot, settings)
+    plane_around(loaded, plane, offset, extent, resolution)
+    box_around(loaded, extent, volume_resolution)
+    with text.progress_bar(quiet=json) as progress:
+        progress("flow: forces on the robot", 0, 1)
+        found = answer(
+            loaded, tail_rate=tail_rate, friction=friction, accuracy=accuracy, phase=text.angle(phase), frame=frame
+        )
+        written = {}
+        if output is not None:
+            written[output] = found.plane(plane, offset=offset, extent=extent, resolution=resolution, progress=progress)
+        if volume is not None:
+            written[volume] = found.volume(extent=extent, resolution=volume_resolution, progress=progress)
+        for path, dataset in written.items():
+            flow_text.write(found, dataset, path)
+    text.show(flow_text.flow_answer(found, written), flow_text.flow_table, json=json)
 
 
 @robot_app.command("new")

@@ -8,15 +8,21 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "Accuracy",
     "Calibration",
     "Friction",
     "Json",
     "Model",
     "NoCalibration",
     "Output",
+    "Picture",
     "RobotArgument",
     "Settings",
+    "TailRate",
+    "complete_frames",
+    "complete_models",
     "complete_parts",
+    "complete_planes",
     "complete_presets",
     "complete_resistance_models",
     "complete_schemas",
@@ -39,13 +45,14 @@ def _complete_robots(incomplete: str) -> list[str]:
     return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
 
 
-def _complete_models(incomplete: str) -> list[str]:
-    return _starting(("rft", "sbt"), incomplete)
+def complete_models(incomplete: str) -> list[str]:
+    """Names of models that make a robot swim."""
+    return _starting(("rft", "sbt", "slender"), incomplete)
 
 
 def complete_resistance_models(incomplete: str) -> list[str]:
     """Names of models that give a resistance matrix."""
-    return _starting(("perrin", "rft", "sbt"), incomplete)
+    return _starting(("perrin", "rft", "sbt", "slender"), incomplete)
 
 
 def complete_parts(incomplete: str) -> list[str]:
@@ -53,9 +60,23 @@ def complete_parts(incomplete: str) -> list[str]:
     return _starting(("body", "coupling", "robot", "rotor", "tail"), incomplete)
 
 
+def complete_planes(incomplete: str) -> list[str]:
+    """Planes through a robot."""
+    return _starting(("xy", "xz", "yz"), incomplete)
+
+
+def complete_frames(incomplete: str) -> list[str]:
+    """Frames of a flow."""
+    return _starting(("body", "lab"), incomplete)
+
+
 def complete_schemas(incomplete: str) -> list[str]:
     """Names of schemas."""
     return _starting(("calibration", "robot", "study"), incomplete)
+
+
+def _complete_accuracies(incomplete: str) -> list[str]:
+    return _starting(("high", "standard"), incomplete)
 
 
 def _complete_friction(incomplete: str) -> list[str]:
@@ -63,7 +84,11 @@ def _complete_friction(incomplete: str) -> list[str]:
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=_complete_robots, help="A preset's name or a TOML file.")]
-Model = Annotated[str, typer.Option(autocompletion=_complete_models, help="Hydrodynamic model: sbt or rft.")]
+Model = Annotated[str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft or slender.")]
+Accuracy = Annotated[
+    str | None,
+    typer.Option(autocompletion=_complete_accuracies, help="Of the model slender: standard or high; else the robot's."),
+]
 Friction = Annotated[
     str | None,
     typer.Option(
@@ -83,3 +108,10 @@ Settings = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
+Picture = Annotated[
+    Path | None, typer.Option("--output", "-o", metavar="FILE", help="Draw a picture too: .png, .pdf or .svg.")
+]
+TailRate = Annotated[
+    str | None,
+    typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
+]

@@ -56,7 +56,8 @@ def show(answer: Answer, table: Callable[[Answer, Console], None], *, json: bool
         console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)
 
 
-def _grid(title: str, *columns: str) -> Table:
+def grid(title: str, *columns: str) -> Table:
+    """An empty table in the look of all answers."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
     for column in columns:
         table.add_column(column, justify="right" if column in ("value", "SI") else "left")
@@ -64,17 +65,24 @@ def _grid(title: str, *columns: str) -> Table:
 
 
 def _friendly(value: float | None, unit: str) -> tuple[str, str]:
-    if value is None:
-        return "-", ""
-    shown = _FRIENDLY.get(unit)
-    if unit in _LONG and abs(value) >= _LONG[unit][0]:
-        shown = _LONG[unit][1]
-    if shown is None:
-        return f"{value:.4g}", "" if unit == "1" else unit
-    return f"{shown_in(value, shown):.4g}", shown
+    shown = friendly_unit(value, unit)
+    return in_unit(value, unit, shown), "" if value is None or shown == "1" else shown
 
 
-def _add_quantities(table: Table, items: Mapping[str, Any]) -> None:
+def friendly_unit(value: float | None, unit: str) -> str:
+    """The unit in which people read such a value."""
+    if value is not None and unit in _LONG and abs(value) >= _LONG[unit][0]:
+        return _LONG[unit][1]
+    return _FRIENDLY.get(unit, unit)
+
+
+def in_unit(value: float | None, unit: str, shown: str) -> str:
+    """An SI value as people read it in one of their units."""
+    return "-" if value is None else f"{value if shown == unit else shown_in(value, shown):.4g}"
+
+
+def add_quantities(table: Table, items: Mapping[str, Any]) -> None:
+    """A row for each quantity that has a value: name, value, unit, SI."""
     for name, item in items.items():
         if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
             value, unit = _friendly(item["value"], item["unit"])
@@ -86,10 +94,13 @@ def prediction(answer: Answer, console: Console) -> None:
     """Table of `predict`."""
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}"
-    table = _grid(title, "quantity", "value", "unit", "SI")
-    _add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
+    table = grid(title, "quantity", "value", "unit", "SI")
+    add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(table)
-    console.print(f"known error: {escape(answer['error_estimate']['statement'])}", highlight=False, soft_wrap=True)
+    error = answer["error_estimate"]
+    if error["value"] is not None:
+        console.print(f"error estimate by refinement: {error['value']:.2g} of the forward velocity", highlight=False)
+    console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
 
 
 def resistance(answer: Answer, console: Console) -> None:
@@ -123,14 +134,14 @@ def robot(answer: Answer, console: Console) -> None:
     """Table of `robot show`."""
     fields = answer["fields"]
     console.print(f"[bold]{escape(fields['name'])}[/bold]  {escape(fields['description'])}", highlight=False)
-    table = _grid("fields", "field", "value", "unit")
+    table = grid("fields", "field", "value", "unit")
     for name, item in fields.items():
         word = "none" if name in ("tail.taper", "channel") and item is None else _word(item)
         value, unit = _friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (word, "")
         if name not in ("name", "description", "reference"):
             table.add_row(name, value, unit)
     console.print(table)
-    found = _grid("what follows", "quantity", "value", "unit", "meaning")
+    found = grid("what follows", "quantity", "value", "unit", "meaning")
     for name, item in answer["derived"].items():
         value, unit = _friendly(item["value"], item["unit"])
         found.add_row(name.replace("_", " "), value, unit, item["meaning"])
@@ -227,8 +238,8 @@ def simulation_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
 def simulation(answer: Answer, console: Console) -> None:
     """Table of `simulate`."""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
-    table = _grid(title, "quantity", "value", "unit", "SI")
-    _add_quantities(table, answer)
+    table = grid(title, "quantity", "value", "unit", "SI")
+    add_quantities(table, answer)
     console.print(table)
     console.print("means are over the last two thirds of the run", highlight=False)
     console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
@@ -253,6 +264,19 @@ def time_window(text: str) -> tuple[float, float]:
     if not colon:
         raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
     return parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])
+
+
+@contextmanager
+def patience(model: str, *, quiet: bool) -> Iterator[None]:
+    """A sign of life on standard error while a model solves; its first run on a machine compiles for some seconds."""
+    from spirillum.hydrodynamics import MODELS
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal or model not in MODELS or MODELS[model].closed_form:
+        yield
+        return
+    with console.status("solving for the flow (the first time, compiling takes some seconds)"):
+        yield
 
 
 @contextmanager

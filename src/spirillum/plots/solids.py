@@ -12,7 +12,7 @@ from spirillum.robot.geometry import centreline
 from spirillum.robot.parts import Body, End
 from spirillum.robot.robot import Robot
 
-__all__ = ["Metal", "body_profile", "crests", "draw_solid", "draw_wire"]
+__all__ = ["Metal", "body_profile", "crests", "draw_solid", "draw_wire", "wire_line"]
 
 Metal = tuple[str, str, str]
 """Colours of a shaded surface: shadow, middle, highlight."""
@@ -75,7 +75,7 @@ def draw_solid(axes: Axes, x: Values, radius: Values, colours: Metal, *, order: 
     axes.plot(np.concatenate([x, x[::-1]]), edge, color="#2b3a44", linewidth=0.8, zorder=order + 0.1)
 
 
-def _wire(robot: Robot, phase: float, unit: float) -> Values:
+def wire_line(robot: Robot, phase: float, unit: float) -> Values:
     """Points (x, y, z) of the wire's centreline from its root on, in `unit`."""
     tail = robot.tail
     turns = tail.length / tail.wavelength
@@ -118,7 +118,7 @@ def draw_wire(axes: Axes, robot: Robot, colours: Metal, *, phase: float, unit: f
         unit: length of one drawing unit, m.
         points: typographic points in one drawing unit.
     """
-    path = _wire(robot, phase, unit)
+    path = wire_line(robot, phase, unit)
     thickness, amplitude = robot.tail.wire_diameter / unit, robot.tail.amplitude / unit
     pieces = np.stack([path[:-1, [0, 2]], path[1:, [0, 2]]], axis=1)
     depth = 0.5 * (path[:-1, 1] + path[1:, 1])

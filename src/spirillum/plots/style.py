@@ -19,7 +19,18 @@ from matplotlib.figure import Figure
 from spirillum.arrays import Values
 from spirillum.files import whole_file
 
-__all__ = ["COLOURS", "Look", "Scale", "look_of_model", "new_figure", "plain", "readable", "save", "styled"]
+__all__ = [
+    "COLOURS",
+    "Look",
+    "Scale",
+    "look_of_model",
+    "new_figure",
+    "plain",
+    "readable",
+    "save",
+    "save_as",
+    "styled",
+]
 
 COLOURS = {
     "black": "#000000",
@@ -60,6 +71,11 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
     "svg.hashsalt": "spirillum",
 }
 _DPI = 200
+_NO_DATE: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
 _PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"))
@@ -163,9 +179,18 @@ def save(figure: Figure, path_without_suffix: Path) -> tuple[Path, Path]:
     """
     folder, name = path_without_suffix.parent, path_without_suffix.name
     png, svg = folder / f"{name}.png", folder / f"{name}.svg"
-    with styled():
-        with whole_file(png) as temporary:
-            figure.savefig(temporary, format="png", dpi=_DPI, metadata={"Software": None})
-        with whole_file(svg) as temporary:
-            figure.savefig(temporary, format="svg", metadata={"Date": None})
+    save_as(figure, png)
+    save_as(figure, svg)
     return png, svg
+
+
+def save_as(figure: Figure, path: Path) -> None:
+    """Write one picture whole or not at all, without dates: PNG (200 dpi), PDF or SVG (text as paths).
+
+    Args:
+        figure: the figure.
+        path: the file; its suffix is `.png`, `.pdf` or `.svg`.
+    """
+    kind = path.suffix.removeprefix(".")
+    with styled(), whole_file(path) as temporary:
+        figure.savefig(temporary, format=kind, dpi=_DPI, metadata=_NO_DATE[kind])

@@ -1,0 +1,124 @@
+"""`flow`: a picture, numbers on grids, a summary; with a sphere's exact flow in place of the robot's."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+WIDE = "biorob2012-wide"
+SMALL = ("--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2Hz")
+
+
+@pytest.fixture(autouse=True)
+def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A model in closed form for the motion, and a sphere for the flow."""
+    import spirillum.hydrodynamics.flow as core
+    import spirillum.motion.flow as module
+
+    monkeypatch.setattr(module, "MODEL", "sbt")
+    monkeypatch.setattr(core, "flow_field", lambda *_: sphere)
+
+
+def test_summary_agrees_with_the_files(run: Callable[..., Any], tmp_path: Path) -> None:
+    plane, box = tmp_path / "plane.nc", tmp_path / "box.nc"
+    outcome = run("flow", WIDE, *SMALL, "-o", str(plane), "--volume", str(box), "--phase", "90deg", "--json")
+    assert (outcome.code, outcome.err) == (0, "")
+    answer = json.loads(outcome.out)
+    assert answer["schema"] == "spirillum.flow/1"
+    assert answer["frame"] == "lab"
+    assert answer["phase"] == {"value": pytest.approx(np.pi / 2), "unit": "rad"}
+    assert any("walls are not computed" in warning for warning in answer["warnings"])
+    assert [item["file"] for item in answer["files"]] == [str(plane), str(box)]
+    for item in answer["files"]:
+        with xr.open_dataset(item["file"]) as stored:
+            speed = np.sqrt(sum(stored[f"velocity_{axis}"] ** 2 for axis in "xyz"))
+            assert item["largest_speed"]["value"] == float(speed.max())
+            at = dict(zip("xyz", item["largest_speed"]["at"]["value"], strict=True))
+            place = {axis: at[axis] for axis in stored["inside"].dims}
+            assert float(speed.sel(place)) == float(speed.max())
+            assert item["lowest_pressure"]["value"] == float(stored["pressure"].min())
+            assert item["highest_pressure"]["value"] == float(stored["pressure"].max())
+            assert item["grid"]["points"] == dict(stored["inside"].sizes)
+            assert item["points_inside"] == int(stored["inside"].sum())
+            assert stored.attrs["phase"] == pytest.approx(np.pi / 2)
+    first, second = answer["files"]
+    assert first["flow_rate_through_plane"]["direction"] == "+y"
+    assert "flow_rate_through_plane" not in second
+
+
+@pytest.mark.parametrize("name", ["flow.png", "flow.pdf", "flow.svg", "flow.nc"])
+def test_every_kind_of_plane_is_written(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
+    arguments = ("--plane", "yz", "--offset", "-50mm", "--extent", "10mm", "--frame", "body")
+    outcome = run("flow", WIDE, *SMALL, *arguments, "-o", str(tmp_path / name))
+    assert outcome.code == 0
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert "plane yz, 30 x 30 points" in outcome.out
+    assert "largest speed" in outcome.out
+
+
+@pytest.mark.parametrize("name", ["flow.vti", "flow.nc"])
+def test_a_box_alone_is_written(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
+    outcome = run("flow", WIDE, *SMALL, "--volume", str(tmp_path / name))
+    assert outcome.code == 0
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert "box, 20 x 9 x 9 points" in outcome.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "no file is asked for"),
+        (["-o", "flow.vti"], "does not end in .png or .pdf or .svg or .nc"),
+        (["-o", "flow"], "does not end in"),
+        (["--volume", "flow.png"], "does not end in .vti or .nc"),
+        (["-o", "no/such/folder/flow.png"], "no such folder"),
+        (["-o", "flow.nc", "--volume", "flow.nc"], "allowed: two files"),
+        (["-o", "flow.png", "--plane", "zz"], "plane = 'zz'"),
+        (["-o", "flow.png", "--offset", "5"], 'offset = "5" has no unit'),
+        (["-o", "flow.png", "--extent", "5"], 'extent = "5" has no unit'),
+        (["-o", "flow.png", "--extent", "-5mm"], "out of range"),
+        (["-o", "flow.png", "--resolution", "0"], "resolution = 0; allowed"),
+        (["-o", "flow.png", "--resolution", "1000000"], "resolution = 1000000; allowed"),
+        (["-o", "flow.png", "--resolution", "many"], "--resolution"),
+        (["--volume", "flow.vti", "--volume-resolution", "900"], "allowed: at most 2000000 points"),
+        (["-o", "flow.png", "--phase", "1"], 'phase = "1" has no unit'),
+        (["-o", "flow.png", "--frame", "tail"], "frame = 'tail'"),
+        (["-o", "flow.png", "--tail-rate", "0Hz"], "a tail at rest"),
+        (["-o", "flow.png", "--friction", "ice"], "friction = 'ice'"),
+        (["-o", "flow.png", "--set", "tail.wavelength=20"], "has no unit"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_leaves_nothing(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run("flow", WIDE, *arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert outcome.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_grids_are_checked_before_anything_is_solved(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    import spirillum.motion.flow as module
+
+    def solved(*_: object, **__: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(module, "predict", solved)
+    assert run("flow", WIDE, "-o", "flow.png", "--resolution", "1").code == 2
+    assert run("flow", WIDE, "--volume", "flow.vti", "--volume-resolution", "1").code == 2
+    assert run("flow", WIDE, "-o", "flow.png", "--phase", "1").code == 2
+
+
+def test_the_example_of_the_help_runs(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    example = re.search(r"Example: spirillum (.*)", run("flow", "--help").out)
+    assert example
+    assert run(*example[1].split()).code == 0
