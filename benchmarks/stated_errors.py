@@ -1,8 +1,9 @@
 """How accurate is every model, and how long does the resolved one take against a full solution of the surfaces?
 
-Every model on the same reference robots, against resolved, exact or measured values; the documentation shows these
-tables. The resolved values of tail and robot are those that `resolved_reference.py --full` gave (minutes, in
-`resolved_reference.json`); `--time` also runs its coarsest tail, for the ratio of times on one machine.
+Every model on the same reference robots, against resolved, exact or measured values; `tools/write_tables.py` writes
+the tables of the documentation from these rows. The resolved values of tail and robot are those that
+`resolved_reference.py --full` gave (minutes, in `resolved_reference.json`); `--time` also runs its coarsest tail, for
+the ratio of times on one machine.
 
     OMP_NUM_THREADS=1 python benchmarks/stated_errors.py --time
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -136,27 +137,27 @@ def body_rows() -> list[Row]:
     return rows
 
 
-def published_rows() -> list[Row]:
-    """Wires of other shapes: the torus, exact, and helices measured in oil."""
+def published_rows(*, without: Collection[str] = ()) -> list[Row]:
+    """Wires of other shapes, but for those named: the torus, exact, and helices measured in oil."""
     rows = []
     accuracies: tuple[Accuracy, ...] = ("standard", "high")
     for accuracy in accuracies:
         for ratio, exact in TORUS.items():
             if ratio < 0.01 and accuracy == "high":
                 continue  # thousands of stations: for a ring that thin both forms agree
-            found = _resistance(_ring(ratio), accuracy)[0, 0] / (6.0 * np.pi * (1.0 + ratio))
             what = f"torus, a/R = {ratio:g}"
+            if what in without:
+                continue
+            found = _resistance(_ring(ratio), accuracy)[0, 0] / (6.0 * np.pi * (1.0 + ratio))
             rows.append({"wire": what, "accuracy": accuracy, "quantity": "drag", "error": found / exact - 1.0})
         for wavelength, measured in RODENBORN.items():
+            what = f"helix, wavelength {wavelength:g} radii"
+            if what in without:
+                continue
             r = _resistance(_rodenborn(wavelength), accuracy)
             found = (-r[0, 3] / 6.3**2, r[3, 3] / 6.3**3, r[0, 0] / 6.3)
             rows += [
-                {
-                    "wire": f"helix, wavelength {wavelength:g} radii",
-                    "accuracy": accuracy,
-                    "quantity": quantity,
-                    "error": value / true - 1.0,
-                }
+                {"wire": what, "accuracy": accuracy, "quantity": quantity, "error": value / true - 1.0}
                 for quantity, value, true in zip(("thrust", "torque", "drag"), found, measured, strict=True)
             ]
     return rows

@@ -59,6 +59,11 @@ class StokesSphere:
         turned = (a / r) ** 3 * np.cross(np.array(self.rotation), points)
         return moved + turned, (1.5 * self.viscosity * a * along / r**2)[:, 0]
 
+    def wrench(self) -> np.ndarray:
+        """6 pi mu a U and 8 pi mu a^3 Omega."""
+        drag = 6 * np.pi * self.viscosity * self.radius
+        return np.concatenate([drag * np.array(self.velocity), 4 / 3 * drag * self.radius**2 * np.array(self.rotation)])
+
 
 @pytest.fixture(scope="session")
 def sphere() -> StokesSphere:

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-HEAVY = ("scipy", "xarray", "matplotlib", "pint", "h5py", "jinja2", "pandas")
+HEAVY = ("scipy", "xarray", "matplotlib", "pint", "h5py", "jinja2", "pandas", "numba", "llvmlite")
 
 
 def loaded_after(code: str) -> set[str]:
@@ -26,4 +26,4 @@ def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
 
 def test_one_prediction_draws_no_picture() -> None:
     code = "from spirillum.cli import main; main(['predict', 'biorob2012-wide', '--json'])"
-    assert not loaded_after(code) & {"matplotlib", "xarray", "h5py", "jinja2", "pandas"}
+    assert not loaded_after(code) & {"matplotlib", "xarray", "h5py", "jinja2", "pandas", "numba"}

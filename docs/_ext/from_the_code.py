@@ -347,32 +347,6 @@ class Models(SphinxDirective):
         return [table(("Model", "Parts", "Entries", "Known error"), rows, (10, 20, 15, 55))]
 
 
-class StatedErrors(SphinxDirective):
-    """`stated-errors tail|robot|body|published`: a table of `benchmarks/stated_errors.py`, computed anew."""
-
-    required_arguments = 1
-
-    def run(self) -> list[nodes.Node]:
-        found = _stated_errors()[f"{self.arguments[0]}_rows"]()
-        titles = {"B11": "drag B11", "B14": "thrust B14", "B44": "torque B44", "body_rate": "body rate"}
-        header = [titles.get(name, name) for name in found[0]]
-        cells = [[value if isinstance(value, str) else _percent(value) for value in row.values()] for row in found]
-        return [table(header, cells, [3 if isinstance(value, str) else 1 for value in found[0].values()])]
-
-
-def _percent(value: float) -> str:
-    if abs(value) < 1e-6:
-        return f"{value:.0e}"
-    return f"{100 * value:+.2g} %" if abs(value) < 0.1 else f"{100 * value:+.0f} %"
-
-
-@lru_cache(maxsize=1)
-def _stated_errors() -> dict[str, Any]:
-    import runpy
-
-    return runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "stated_errors.py"))
-
-
 class References(SphinxDirective):
     """`reference-list`: every reference with its key, as a target for links."""
 
@@ -499,7 +473,6 @@ def setup(app: Sphinx) -> dict[str, Any]:
         "simulation-variables": SimulationVariables,
         "claims": Claims,
         "models": Models,
-        "stated-errors": StatedErrors,
         "reference-list": References,
         "command-options": CommandOptions,
     }.items():

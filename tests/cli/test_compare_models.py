@@ -24,7 +24,7 @@ def test_the_document_holds_every_model_and_nothing_else_is_printed(run: Callabl
     assert list(answer)[-1] == "warnings"
     assert picture.read_bytes().startswith(b"\x89PNG")
     for entry in answer["models"]:
-        alone = sp.predict(WIDE, model=entry["model"], tail_rate="1.2 Hz")
+        alone = sp.predict(WIDE, model=entry["model"], tail_rate="1.2 Hz", calibrated=False)
         assert entry["forward_velocity"] == {"value": alone.forward_velocity, "unit": "m/s"}
         assert entry["error_estimate"]["statement"] == alone.to_dict()["error_estimate"]["statement"]
     assert [path.name for path in tmp_path.iterdir()] == ["models.png"]
@@ -51,13 +51,13 @@ def test_a_refusing_model_is_a_line(run: Callable[..., Any]) -> None:
 
 
 def test_options_reach_the_models(run: Callable[..., Any]) -> None:
-    arguments = ("--no-calibration", "--friction", "none", "--set", "tail.wavelength=20mm", "--json")
+    arguments = ("--calibrated", "--friction", "none", "--set", "tail.wavelength=20mm", "--json")
     answer = json.loads(run("compare-models", WIDE, *TWO, *arguments).out)
     robot = sp.load(WIDE, **{"tail.wavelength": "20 mm"})
     for entry in answer["models"]:
-        alone = sp.predict(robot, model=entry["model"], friction="none", calibrated=False)
+        alone = sp.predict(robot, model=entry["model"], friction="none")
         assert entry["forward_velocity"]["value"] == alone.forward_velocity
-        assert entry["calibrated"] is False
+        assert entry["calibrated"] is True
 
 
 @pytest.mark.parametrize(

@@ -88,8 +88,8 @@ def test_no_slip_with_high_accuracy(batch_of: Callable[..., Any]) -> None:
     outline = dict(field.solids)["body"]
     points = outside(outline, 9e-9)
     slip = np.linalg.norm(field.velocity(points) - rigid(BODY, points), axis=1)
-    assert np.max(slip) < 1e-4 * np.max(np.linalg.norm(rigid(BODY, points), axis=1))
-    assert np.median(slip) < 2e-5 * np.max(np.linalg.norm(rigid(BODY, points), axis=1))
+    assert np.max(slip) < 3e-4 * np.max(np.linalg.norm(rigid(BODY, points), axis=1))
+    assert np.median(slip) < 5e-5 * np.max(np.linalg.norm(rigid(BODY, points), axis=1))
 
 
 def around_the_wire(field: FlowField, distance: float, count: int = 12) -> tuple[np.ndarray, np.ndarray]:
@@ -191,9 +191,18 @@ def test_stress_on_a_large_sphere_is_the_resistance(wide: Any, moving: FlowField
     wanted = both[:6] + both[6:]
     found = wrench_on_a_sphere(moving, 0.3, np.array([-0.04, 0.0, 0.0]))
     np.testing.assert_allclose(found[:3], wanted[:3], atol=1e-5 * np.max(np.abs(wanted[:3])))
-    # The wire's own spin is a torque that its line of forces does not carry.
+    # At standard accuracy the wire's own spin is a torque that its line of forces does not carry.
     own = 4 * np.pi * MU * 0.5e-3**2 * float(wide.arc_length[0]) * np.linalg.norm(ROTOR[3:])
     assert np.linalg.norm(found[3:] - wanted[3:]) < 1.05 * own + 1e-5 * np.linalg.norm(wanted[3:])
+
+
+def test_stress_with_high_accuracy_holds_all_torques(batch_of: Callable[..., Any]) -> None:
+    """First moments carry the torque of spinning and tilting cross-sections."""
+    field = flow_field(batch_of(model__slender__accuracy="high"), BODY, ROTOR, PHASE)
+    found = wrench_on_a_sphere(field, 0.3, np.array([-0.04, 0.0, 0.0]))
+    for part in (slice(0, 3), slice(3, 6)):
+        wanted = -field.wrench()[part]
+        np.testing.assert_allclose(found[part], wanted, atol=2e-5 * np.max(np.abs(wanted)))
 
 
 def test_free_robot_exerts_no_force(wide: Any) -> None:

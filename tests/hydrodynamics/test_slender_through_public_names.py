@@ -189,7 +189,7 @@ def test_batch_of_phases_and_viscosities(wide: Any) -> None:
         (lambda: sp.resistance(PRESET, model="slendr"), "did you mean slender?"),
         (lambda: sp.resistance(PRESET, part="coupling", model="rft"), "part = 'coupling' with model 'rft'; allowed: "),
         (lambda: sp.resistance(PRESET, model="slender", about="nose"), "about = 'nose'; allowed: body, tail-root"),
-        (lambda: sp.resistance(PRESET, model="slender", phase=float("nan")), "phase = nan"),
+        (lambda: sp.resistance(PRESET, model="slender", phase=float("nan")), "is not finite"),
         (
             lambda: sp.resistance(PRESET, model="slender", accuracy="bogus"),
             "accuracy = 'bogus'; allowed: standard, high",

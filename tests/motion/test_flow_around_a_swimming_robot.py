@@ -24,7 +24,7 @@ def _directions(count: int) -> np.ndarray:
 
 
 def test_motion_is_the_predicted_one(swimming: sp.Flow) -> None:
-    alone = sp.predict(WIDE, model="slender", tail_rate="1.2 Hz", calibrated=False)
+    alone = sp.predict(WIDE, model="slender", tail_rate="1.2 Hz", calibrated=False, accuracy="high")
     assert swimming.prediction.forward_velocity == alone.forward_velocity
     assert swimming.prediction.calibrated is False
 

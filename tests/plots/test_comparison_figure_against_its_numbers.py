@@ -18,7 +18,7 @@ WIDE = "biorob2012-wide"
 @pytest.fixture(scope="module")
 def both() -> ModelComparison:
     """Two models at one rate."""
-    return sp.compare_models(WIDE, models=["sbt", "rft"], tail_rate="1.2 Hz")
+    return sp.compare_models(WIDE, models=["sbt", "rft"], tail_rate="1.2 Hz", calibrated=True)
 
 
 def _marks(axes: Any) -> dict[float, float]:

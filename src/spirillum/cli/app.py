@@ -104,7 +104,7 @@ def compare_models(
     ] = None,
     tail_rate: TailRate = None,
     friction: Friction = None,
-    no_calibration: NoCalibration = False,
+    calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     calibration: Calibration = None,
     accuracy: Accuracy = None,
     settings: Settings = None,
@@ -126,7 +126,7 @@ def compare_models(
             models=model,
             tail_rate=tail_rate,
             friction=friction,
-            calibrated=not no_calibration,
+            calibrated=calibrated or None,
             calibration=calibration,
             accuracy=accuracy,
             progress=progress,
@@ -277,7 +277,7 @@ def flow(
     ] = "lab",
     tail_rate: TailRate = None,
     friction: Friction = None,
-    accuracy: Accuracy = None,
+    accuracy: Accuracy = "high",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -296,7 +296,12 @@ def flow(
     with text.progress_bar(quiet=json) as progress:
         progress("flow: forces on the robot", 0, 1)
         found = answer(
-            loaded, tail_rate=tail_rate, friction=friction, accuracy=accuracy, phase=text.angle(phase), frame=frame
+            loaded,
+            tail_rate=tail_rate,
+            friction=friction,
+            accuracy=accuracy or "high",
+            phase=text.angle(phase),
+            frame=frame,
         )
         written = {}
         if output is not None:

@@ -59,7 +59,11 @@ def _own_error(item: Answer) -> str:
     if not item["answered"]:
         return f"no answer: {item['reason']}"
     error = item["error_estimate"]
-    estimate = "" if error["value"] is None else f"{100 * error['value']:.2g} % of the speed by refinement; "
+    estimate = (
+        ""
+        if error["value"] is None
+        else f"{100 * error['value']:.2g} % of the forward velocity, against another resolution; "
+    )
     return f"known error of {item['model']}: {estimate}{error['statement']}"
 
 

@@ -70,6 +70,7 @@ def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any
         "frame": flow.frame,
         "phase": quantity(flow.phase, "rad"),
         **{name: quantity(getattr(flow.prediction, name), unit) for name, unit in _MOTION.items()},
+        "held_force": quantity(flow.held_force, "N", direction="sideways"),
         "placement": flow.prediction.placement,
         "files": [_file(path, dataset) for path, dataset in written.items()],
         "references": list(flow.prediction.references),

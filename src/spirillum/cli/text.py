@@ -97,9 +97,14 @@ def prediction(answer: Answer, console: Console) -> None:
     table = grid(title, "quantity", "value", "unit", "SI")
     add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(table)
-    error = answer["error_estimate"]
+    _show_error(answer["error_estimate"], console)
+
+
+def _show_error(error: Answer, console: Console) -> None:
+    """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
-        console.print(f"error estimate by refinement: {error['value']:.2g} of the forward velocity", highlight=False)
+        share = f"{100 * error['value']:.2g} %"
+        console.print(f"error estimate: {share} of the forward velocity, against another resolution", highlight=False)
     console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
 
 
@@ -226,6 +231,7 @@ def simulation_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "model": dataset.attrs["model"],
         "friction": dataset.attrs["friction"],
         "motion": dataset.attrs["motion"],
+        "error_estimate": quantity(float(dataset.attrs["error_estimate"]), "1", statement=dataset.attrs["known_error"]),
         "file": str(output),
         "duration": quantity(float(last["time"]), "s"),
     }
@@ -239,8 +245,9 @@ def simulation(answer: Answer, console: Console) -> None:
     """Table of `simulate`."""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
     table = grid(title, "quantity", "value", "unit", "SI")
-    add_quantities(table, answer)
+    add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(table)
+    _show_error(answer["error_estimate"], console)
     console.print("means are over the last two thirds of the run", highlight=False)
     console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,7 +21,7 @@ __all__ = ["FlowField", "flow_field"]
 class FlowField:
     """Flow at one instant, in the lab frame, fluid at rest far away; SI, body axes, origin at the body's mid-length."""
 
-    solution: Solution
+    solution: Solution = field(repr=False)
     """Tractions for unit twists, at phase 0."""
     solids: tuple[tuple[str, Outline], ...]
     """Names and outlines of the solids of revolution."""
@@ -90,23 +90,35 @@ class FlowField:
         velocity = field[:, :3] @ _rotation(self.phase).T / (8.0 * np.pi)
         return velocity, self.viscosity * field[:, 3] / (8.0 * np.pi)
 
+    def wrench(self) -> Samples:
+        """Force (N) and torque about the origin (N m) that hold the whole robot to its motion, body axes, (6,)."""
+        rows = self.solution.matrix
+        matrix = self.viscosity * (rows[:6] + rows[6:])
+        back, forth = _rotation(-self.phase), _rotation(self.phase)
+        turned = matrix @ (self.twists.reshape(4, 3) @ back.T).ravel()
+        held: Samples = (turned.reshape(2, 3) @ forth.T).ravel()
+        return held
+
     def _tail_frame(self, points: Samples) -> Samples:
         """Turned back by the phase."""
         turned: Samples = points @ _rotation(self.phase)
         return turned
 
     def _sum(self, points: Samples) -> Samples:
-        from spirillum.kernels.field import add_blobs, add_layer
+        from spirillum.kernels.field import add_blobs, add_layer, add_moments
 
         s = self.solution
         back = _rotation(-self.phase)
         twists = (self.twists.reshape(4, 3) @ back.T).ravel()
         field = np.zeros((len(points), 4))
-        forces = (s.forces @ twists).reshape(-1, 3)
+        forces, moments = (s.forces @ twists).reshape(-1, 3), s.moments @ twists
         start = 0
         for wire in s.wires:
             count = len(wire.points)
-            add_blobs(points, wire.points, forces[start : start + count], np.full(count, wire.blob**2), field)
+            at, e2 = slice(start, start + count), np.full(count, wire.blob**2)
+            add_blobs(points, wire.points, forces[at], e2, field)
+            if np.any(moments):
+                add_moments(points, wire.points, moments[at], e2, field)
             start += count
         if s.panels is not None:
             modes = (s.densities @ twists).reshape(len(s.densities), *s.panels.x.shape, 3)

@@ -11,15 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
 from spirillum.hydrodynamics.revolution import Panels, panels_of
-from spirillum.hydrodynamics.wire import Accuracy, Wire, wire_system
+from spirillum.hydrodynamics.sources import Sources
+from spirillum.hydrodynamics.wire import Accuracy, Wire, WireSystem, wire_system
 from spirillum.robot.outline import Outline
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 __all__ = ["Resolution", "Solution", "solve"]
 
 _EIGHT_PI = 8.0 * np.pi
-_M = TypeVar("_M", Samples, Amplitudes)
 
 
 @dataclass(frozen=True)
@@ -55,14 +55,16 @@ class Solution:
     """R, 12x12, made symmetric; zero for a part that is not there."""
     asymmetry: float
     """What it lacked in symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
-    panels: Panels | None
+    panels: Panels | None = field(repr=False)
     """Nodes on the solids."""
-    wires: tuple[Wire, ...]
+    wires: tuple[Wire, ...] = field(repr=False)
     """The wires."""
-    densities: Amplitudes
+    densities: Amplitudes = field(repr=False)
     """Modes (f_x, f_rho, g) ds/du of the traction on the nodes, complex, (modes, 3 nodes, 12)."""
-    forces: Samples
+    forces: Samples = field(repr=False)
     """Forces at the wires' stations, (3 stations, 12)."""
+    moments: Samples = field(repr=False)
+    """First moments of the forces there, force by displacement, with `high` accuracy, (stations, 3, 3, 12)."""
 
 
 def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Resolution) -> Solution:
@@ -98,24 +100,24 @@ def _solve(
     points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
     system = wire_system(wires, resolution.wire)
     if not solids:
-        forces = _solved(system.mobility, system.motion)
-        matrix = system.motion.T @ forces + system.own
-        return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), forces)
+        strengths = _solved(system.mobility, system.motion)
+        matrix = system.motion.T @ strengths + system.own
+        return _solution(matrix, None, lines, np.zeros((0, 0, 12), complex), strengths, system)
     panels = panels_of([outline for outline, _ in solids], _longest(solids, points, lines), resolution.order)
-    images = _Images.of(panels, np.array([part for _, part in solids]), lines, resolution)
-    forces = _solved(system.mobility - images.mobility, system.motion - images.drift)
-    matrix = images.resistance + (system.motion - images.drag).T @ forces + system.own
-    return _solution(matrix, panels, lines, images.densities(forces), forces)
+    images = _Images.of(panels, np.array([part for _, part in solids]), lines, system, resolution)
+    strengths = _solved(system.mobility - images.mobility, system.motion - images.drift)
+    matrix = images.resistance + (system.motion - images.drag).T @ strengths + system.own
+    return _solution(matrix, panels, lines, images.densities(strengths), strengths, system)
 
 
 def _solved(mobility: Samples, motion: Samples) -> Samples:
-    """Forces from velocities, by Cholesky factors: the matrix is symmetric positive definite."""
+    """Forces and moments from velocities, by Cholesky factors: the matrix is symmetric positive definite."""
     from scipy.linalg import cho_factor, cho_solve
 
     if mobility.size == 0:
         return np.zeros_like(motion)
-    forces: Samples = cho_solve(cho_factor(mobility, lower=True, check_finite=False), motion, check_finite=False)
-    return forces
+    strengths: Samples = cho_solve(cho_factor(mobility, lower=True, check_finite=False), motion, check_finite=False)
+    return strengths
 
 
 def _solution(
@@ -123,14 +125,24 @@ def _solution(
     panels: Panels | None,
     wires: tuple[Wire, ...],
     densities: Amplitudes,
-    forces: Samples,
+    strengths: Samples,
+    system: WireSystem,
 ) -> Solution:
     matrix = _EIGHT_PI * matrix
     scale = np.sqrt(np.diag(matrix))
     there = scale > 0
     lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale[there], scale[there])
-    symmetric = 0.5 * (matrix + matrix.T)
-    return Solution(symmetric, float(np.max(np.abs(lack))), panels, wires, _EIGHT_PI * densities, _EIGHT_PI * forces)
+    stations, kinds = system.moments.shape[:2]
+    amounts = strengths[3 * stations :].reshape(stations, kinds, 12)
+    return Solution(
+        matrix=0.5 * (matrix + matrix.T),
+        asymmetry=float(np.max(np.abs(lack))),
+        panels=panels,
+        wires=wires,
+        densities=_EIGHT_PI * densities,
+        forces=_EIGHT_PI * strengths[: 3 * stations],
+        moments=_EIGHT_PI * np.einsum("nqbk,nqt->nbkt", system.moments, amounts),
+    )
 
 
 def _longest(
@@ -203,61 +215,59 @@ class _Images:
     moving: Amplitudes
     """Densities from the solids' motion, (2, 3 nodes, 12)."""
     held: tuple[tuple[np.ndarray, Samples], ...]
-    """For each mode the rows (3 nodes of the solids that bear it), and the densities there for ring forces at the
-    stations, (rows, 3 stations)."""
-    turn: Amplitudes
-    """Phases of the stations' forces in each mode, see `_turns`."""
-    frames: Samples
-    """Cylindrical unit vectors at the stations, see `_frames`."""
+    """For each mode the rows (3 nodes of the solids that bear it), and the densities there for ring sources at the
+    stations, (rows, stations of 3 forces or 3 forces and 3 torques)."""
+    sources: Sources
+    """What the stations send out."""
 
     @classmethod
-    def of(cls, panels: Panels, parts: np.ndarray, wires: tuple[Wire, ...], resolution: Resolution) -> _Images:
+    def of(
+        cls,
+        panels: Panels,
+        parts: np.ndarray,
+        wires: tuple[Wire, ...],
+        system: WireSystem,
+        resolution: Resolution,
+    ) -> _Images:
         """Solve mode by mode.
 
         Args:
             panels: of all solids.
             parts: the part (0 body, 1 rotor) with which each solid moves.
             wires: wires.
+            system: their equations.
             resolution: how finely.
         """
-        points = np.concatenate([wire.points for wire in wires]) if wires else np.zeros((0, 3))
-        counts = _mode_counts(panels, wires, resolution)
-        turn, frames = _turns(points, max(counts)), _frames(points)
+        sources = Sources.of(wires, system)
         motion = _surface_motion(panels, parts)
-        size = points.size
+        size = len(system.mobility)
         resistance, mobility = np.zeros((12, 12)), np.zeros((size, size))
         drift, drag = np.zeros((size, 12)), np.zeros((size, 12))
         moving, held = [], []
-        for m, rows, mode in _modes(panels, wires, counts):
+        for m, rows, mode in _modes(panels, sources, _mode_counts(panels, wires, resolution)):
             image = mode.solve(mode.cross)
             back = (mode.weight * mode.cross).T
-            mobility += _share(m) * (back @ image) * np.real(np.conj(turn[m])[:, None] * turn[m])
+            turn = sources.turn(m, image.shape[1])
+            bounce = _share(m) * (back @ image) * np.real(np.conj(turn)[:, None] * turn)
+            mobility += sources.columns(sources.columns(0.5 * (bounce + bounce.T)).T)
             if m < 2:
                 answer = mode.solve(motion[m].real) + 1j * mode.solve(motion[m].imag)
                 dual = (mode.weight * motion[m]).conj().T
                 resistance += np.real(dual @ answer) / _share(m)
-                drift += np.real(np.conj(turn[m])[:, None] * (back @ answer))
-                drag += np.real((dual @ image) * turn[m]).T
+                drift += sources.columns(np.real(np.conj(turn)[:, None] * (back @ answer)).T).T
+                drag += sources.columns(np.real((dual @ image) * turn)).T
                 moving.append(answer)
             held.append((rows, image))
-        return cls(
-            resistance,
-            _columns(_columns(0.5 * (mobility + mobility.T), frames).T, frames),
-            _columns(drift.T, frames).T,
-            _columns(drag.T, frames).T,
-            np.array(moving),
-            tuple(held),
-            turn,
-            frames,
-        )
+        return cls(resistance, mobility, drift, drag, np.array(moving), tuple(held), sources)
 
-    def densities(self, forces: Samples) -> Amplitudes:
+    def densities(self, strengths: Samples) -> Amplitudes:
         """Densities of each mode for each unit twist, (modes, 3 nodes, 12)."""
-        rings = np.matmul(self.frames, forces.reshape(-1, 3, 12)).reshape(-1, 12)
         found = np.zeros((len(self.held), *self.moving.shape[1:]), complex)
         found[:2] = self.moving
         for m, (rows, image) in enumerate(self.held):
-            found[m, rows] -= _share(m) * (image @ (self.turn[m][:, None] * rings))
+            rings = self.sources.rings(strengths, image.shape[1])
+            turn = self.sources.turn(m, image.shape[1])[:, None]
+            found[m, rows] -= _share(m) * (image @ (turn * rings))
         return found
 
 
@@ -269,7 +279,7 @@ class _Mode(NamedTuple):
     weight: Samples
     """Surface element of each row, (rows, 1)."""
     cross: Samples
-    """Velocities on the surface from ring forces at the stations, (rows, 3 stations)."""
+    """Velocities on the surface from ring sources at the stations, (rows, sources)."""
 
     def solve(self, velocities: Samples) -> Samples:
         """Densities from velocities."""
@@ -279,7 +289,7 @@ class _Mode(NamedTuple):
         return densities
 
 
-def _modes(panels: Panels, wires: tuple[Wire, ...], counts: Sequence[int]) -> Iterator[tuple[int, np.ndarray, _Mode]]:
+def _modes(panels: Panels, sources: Sources, counts: Sequence[int]) -> Iterator[tuple[int, np.ndarray, _Mode]]:
     """Each mode with its rows and equations, on the solids that bear it: the others are left out."""
     from scipy.linalg import lu_factor
 
@@ -288,8 +298,7 @@ def _modes(panels: Panels, wires: tuple[Wire, ...], counts: Sequence[int]) -> It
         bearing = np.array(counts) >= last
         some = panels.of_solids(bearing)
         rows = np.flatnonzero(np.repeat(bearing[panels.solid_of_node], 3))
-        blocks = some.matrices(last)
-        cross = _wires_to_surface(some, wires, last)
+        blocks, cross = some.matrices(last), sources.velocities(some, last)
         weight = np.repeat(some.area, 3)[:, None]
         for m in range(first, last):
             yield m, rows, _Mode(lu_factor(blocks[m], check_finite=False), weight, cross[m])
@@ -299,37 +308,3 @@ def _modes(panels: Panels, wires: tuple[Wire, ...], counts: Sequence[int]) -> It
 def _share(m: int) -> float:
     """Fourier coefficient of a point force over that of a ring of the same total."""
     return (1.0 if m == 0 else 2.0) / (2.0 * np.pi)
-
-
-def _turns(points: Samples, modes: int) -> Amplitudes:
-    """Phase exp(-i m theta) of each cylindrical component of a force, -i more for g, (modes, 3 stations)."""
-    theta = np.arctan2(points[:, 2], points[:, 1])
-    phase = np.exp(-1j * np.arange(modes)[:, None, None] * theta[:, None])
-    turns: Amplitudes = (phase * np.array([1.0, 1.0, -1j])).reshape(modes, -1)
-    return turns
-
-
-def _frames(points: Samples) -> Samples:
-    """Rows e_x, e_rho, e_theta at each station, (stations, 3, 3)."""
-    theta = np.arctan2(points[:, 2], points[:, 1])
-    cos, sin, zero = np.cos(theta), np.sin(theta), np.zeros(len(theta))
-    rows = [[zero + 1.0, zero, zero], [zero, cos, sin], [zero, -sin, cos]]
-    return np.moveaxis(np.array(rows), -1, 0)
-
-
-def _columns(matrix: _M, frames: Samples) -> _M:
-    """Turn columns that stand for cylindrical components at the stations into Cartesian ones."""
-    split = matrix.reshape(len(matrix), matrix.shape[1] // 3, 3)
-    return cast("_M", np.matmul(split.swapaxes(0, 1), frames).swapaxes(0, 1).reshape(matrix.shape))
-
-
-def _wires_to_surface(panels: Panels, wires: tuple[Wire, ...], modes: int) -> Samples:
-    """Velocities of each mode on the nodes from ring forces at the stations, (modes, 3 nodes, 3 stations)."""
-    from spirillum.kernels.rings import ring_blocks
-
-    x, rho = panels.x.ravel(), panels.rho.ravel()
-    blocks = [
-        ring_blocks(x, rho, wire.points[:, 0], np.hypot(wire.points[:, 1], wire.points[:, 2]), wire.blob**2, modes)
-        for wire in wires
-    ]
-    return np.concatenate(blocks, axis=2) if blocks else np.zeros((modes, 3 * panels.size, 0))

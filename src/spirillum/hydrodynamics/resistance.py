@@ -19,6 +19,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import load, with_accuracy
 from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_option
 
 __all__ = ["Resistance", "resistance"]
 
@@ -69,7 +70,7 @@ def resistance(
     part: str | None = None,
     model: str = "rft",
     about: str = "body",
-    phase: float = 0.0,
+    phase: str | float = 0.0,
     accuracy: str | None = None,
 ) -> Resistance:
     """Resistance matrix of one part alone in the same fluid.
@@ -79,7 +80,7 @@ def resistance(
         part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked); None: the robot, or what the model knows.
         model: `perrin` (body only), `rft`, `slender`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
-        phase: phase phi of the tail, rad.
+        phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
 
     Raises:
@@ -87,7 +88,7 @@ def resistance(
     """
     ready, chosen = load(robot), find_model(model)
     if accuracy is not None:
-        ready = with_accuracy(ready, accuracy)
+        ready = with_accuracy(ready, accuracy, model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in PARTS:
@@ -96,18 +97,17 @@ def resistance(
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(chosen.parts)}")
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
-    if not np.isfinite(phase):
-        raise InputError(f"phase = {phase}; allowed: a finite angle in rad")
+    angle = parse_option("phase", phase, KINDS["angle"])
     batch = RobotBatch.of(ready)
     outside = broken(chosen.part_domain(batch, part))
     if outside:
         raise InputError(f"{ready.name} with model '{model}': {outside[0].sentence()}")
-    matrix = chosen.part_matrix(batch, part, np.array([float(phase)]))
+    matrix = chosen.part_matrix(batch, part, np.array([angle]))
     if about == "tail-root":
         # A shift along the axis leaves axial entries as they are, and the others of an axial model stay unknown.
         root = np.array([[-float(batch.root[0]), 0.0, 0.0]])
         matrix = matrix if chosen.axial_only else about_point(matrix, root)
-    return Resistance(ready, chosen, part, about, float(phase), matrix[0], _warnings(ready, chosen, batch, part))
+    return Resistance(ready, chosen, part, about, angle, matrix[0], _warnings(ready, chosen, batch, part))
 
 
 def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:

@@ -167,8 +167,8 @@ class Rft(SwimmerModel):
     title = "RFT"
     references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "katz1975", "jeffrey1981", "perrin1934")
     known_error = (
-        "against a resolved wire (25, 2.5 mm) the printed coefficients give about +57 % drag, +20 % thrust and "
-        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +5 and -51 %; body and "
+        "against a resolved wire (25, 2.5 mm) the printed coefficients give about +56 % drag, +22 % thrust and "
+        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %; body and "
         "tail do not interact, which alone adds some 15 % to the speed"
     )
     parts = ("body", "tail", "rotor", "robot")

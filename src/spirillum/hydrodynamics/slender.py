@@ -21,7 +21,7 @@ from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.hydrodynamics.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.hydrodynamics.wire import Wire, station_count, wire_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import centreline
+from spirillum.robot.geometry import centreline, coil_spacing
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline
@@ -29,7 +29,7 @@ from spirillum.robot.parts import End, Shape
 
 __all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
 
-_MOST_STATIONS = {"standard": 3000, "high": 1200}
+_MOST_STATIONS = {"standard": 3000, "high": 800}
 _POINTS_PER_TURN = 200
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
 
@@ -161,11 +161,11 @@ _STATED = {
     "standard": (
         "against a fully resolved wire and robot (tail 25, 2.5 mm) drag, thrust and axial torque of the tail are 0.6, "
         "0.5 and 0.8 % low, speed and torque per turn 0.5 and 0.8 %; thrust up to 2.7 % off for short, wide coils; "
-        "unbounded fluid, no channel walls"
+        "with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
     ),
     "high": (
         "against fully resolved wires and a robot, drag, thrust and axial torque of the tail, speed and torque per "
-        "turn agree to 0.4 %; unbounded fluid, no channel walls"
+        "turn agree to 0.4 %; with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
     ),
 }
 
@@ -236,9 +236,18 @@ class Slender(SwimmerModel):
         ]
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
-        """A wire thin against its wave, and long enough for its ends not to matter much."""
+        """A wire thin against its wave, its turns apart, and long enough for its ends not to matter much."""
         return [
             thin_wire_cautions(batch, EXACT_EPS_CONSTANT)[0],
+            Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                coil_spacing(batch.wavelength, batch.amplitude) / 3.0,
+                "mm",
+                "turns of the coil closer than two wire diameters to each other are resolved to some 5 % only",
+                "close-turns",
+            ),
             Limit.of(
                 "tail.wire_diameter",
                 batch.wire_diameter,

@@ -33,6 +33,7 @@ _SPACING = 0.75
 _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _TILT = 0.5
 """Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
 
@@ -148,16 +149,25 @@ def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tu
 class WireSystem:
     """Equations of wires that move with rigid parts, all without the factor 1/(8 pi mu).
 
-    Forces F at the stations follow from A F = S V - u for unit twists V and the velocity u that others make there;
-    the fluid's wrench on the parts is S' F + K V.
+    Forces at the stations, and with `high` accuracy first moments m after them, follow from A f = S V - u for unit
+    twists V and the velocities (and gradients along the moments) u that others make there; the fluid's wrench on the
+    parts is S' f + K V.
     """
 
     mobility: Samples
-    """A, (3 stations, 3 stations), symmetric positive definite."""
+    """A, symmetric positive definite, (3 n + q n, 3 n + q n)."""
     motion: Samples
-    """S, (3 stations, 12)."""
+    """S, (3 n + q n, 12)."""
     own: Samples
     """K, (12, 12)."""
+    moments: Samples
+    """Tensors of the q first moments at each station, force by displacement, (n, q, 3, 3)."""
+
+    @property
+    def torques(self) -> Samples:
+        """Torque of each unit moment, (n, 3, q)."""
+        torques: Samples = np.einsum("ikb,nqbk->niq", _LEVI_CIVITA, self.moments)
+        return torques
 
 
 def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
@@ -169,8 +179,9 @@ def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSy
     """
     from spirillum.kernels.blobs import force_matrix
 
+    none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))
     if not wires:
-        return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), np.zeros((12, 12)))
+        return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), none, nothing)
     points = np.concatenate([wire.points for wire, _ in wires])
     e2 = np.concatenate([np.full(len(wire.points), wire.blob**2) for wire, _ in wires])
     part = np.concatenate([np.full(len(wire.points), part) for wire, part in wires])
@@ -178,8 +189,12 @@ def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSy
     motion = _on_part(np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=-1), part)
     if accuracy == "standard":
         own: Samples = np.sum([_own_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
-        return WireSystem(forces, motion, own)
-    return _with_moments(wires, points, e2, part, WireSystem(forces, motion, np.zeros((12, 12))))
+        return WireSystem(forces, motion, own, np.zeros((len(points), 0, 3, 3)))
+    moments, across, gradients = _first_moments([wire for wire, _ in wires], points, e2)
+    spin = np.einsum("nqbl,kbl->nqk", moments, -_LEVI_CIVITA)  # gradient along l of a rotation about k: e_k x e_l
+    rotation = _on_part(np.concatenate([np.zeros_like(spin), spin], axis=-1), part)
+    mobility: Samples = np.block([[forces, across], [across.T, gradients]])
+    return WireSystem(mobility, np.concatenate([motion, rotation]), none, moments)
 
 
 def _on_part(rows: Samples, part: np.ndarray) -> Samples:
@@ -204,58 +219,39 @@ def _own_torque(wire: Wire, part: int) -> Samples:
     return matrix
 
 
-def _moments(tangents: Samples) -> tuple[Samples, Samples]:
-    """First moments that a cross-section bears and their resistance, (n, 5, 3, 3) and (5,).
+def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple[Samples, Samples, Samples]:
+    """First moments that cross-sections bear, (n, 5, 3, 3), their velocities at the stations, and their gradients.
 
-    Force along b times displacement along k: spin about the tangent, tangential forces displaced along each of two
-    normals, and two strains of the cross-section; trace-free, of unit norm, orthogonal. A unit density of each
-    moves the gradient along it by its resistance over 8 pi mu a^2 on an infinite cylinder.
+    Force by displacement: spin about the tangent, tangential forces displaced along each of two normals, and two
+    strains of the cross-section; trace-free, of unit norm, orthogonal. On an infinite cylinder a unit density of each
+    moves the gradient along it by 4, 4, 4, 2, 2 over 8 pi mu a^2; the kernel's own answer on an infinite straight line
+    is 2 (a/e)^2 of that, and what is missing is added to each station's own entry.
     """
+    from spirillum.kernels.blobs import moment_matrices
+
+    tangents = np.concatenate([wire.tangents for wire in wires])
     helper = np.eye(3)[np.argmin(np.abs(tangents), axis=1)]
     first = np.cross(tangents, helper)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(tangents, first)
-
-    def dyad(force: Samples, displacement: Samples) -> Samples:
-        product: Samples = force[:, :, None] * displacement[:, None, :]
-        return product
-
-    moments = (
-        np.sqrt(0.5) * (dyad(second, first) - dyad(first, second)),
-        dyad(tangents, first),
-        dyad(tangents, second),
-        np.sqrt(0.5) * (dyad(first, first) - dyad(second, second)),
-        np.sqrt(0.5) * (dyad(first, second) + dyad(second, first)),
+    moments: Samples = np.stack(
+        [
+            np.sqrt(0.5) * (_dyad(second, first) - _dyad(first, second)),
+            _dyad(tangents, first),
+            _dyad(tangents, second),
+            np.sqrt(0.5) * (_dyad(first, first) - _dyad(second, second)),
+            np.sqrt(0.5) * (_dyad(first, second) + _dyad(second, first)),
+        ],
+        axis=1,
     )
-    return np.stack(moments, axis=1), np.array([4.0, 4.0, 4.0, 2.0, 2.0])
-
-
-def _with_moments(
-    wires: Sequence[tuple[Wire, int]], points: Samples, e2: Samples, part: np.ndarray, forces: WireSystem
-) -> WireSystem:
-    """The system with first moments, eliminated by static condensation: it stays symmetric positive definite.
-
-    On an infinite straight line the kernel's own answer to a unit density of moment is 2 (a/e)^2 of a cylinder's;
-    what is missing is added to each station's own entry.
-    """
-    from scipy.linalg import cho_factor, cho_solve
-
-    from spirillum.kernels.blobs import moment_matrices
-
-    moments, compliance = _moments(np.concatenate([wire.tangents for wire, _ in wires]))
-    lengths = np.concatenate([wire.lengths for wire, _ in wires])
-    a2 = np.concatenate([np.full(len(wire.points), wire.radius**2) for wire, _ in wires])
-    velocities, gradients = moment_matrices(points, e2, moments)
-    missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * compliance
+    lengths = np.concatenate([wire.lengths for wire in wires])
+    a2 = np.concatenate([np.full(len(wire.points), wire.radius**2) for wire in wires])
+    across, gradients = moment_matrices(points, e2, moments)
+    missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * np.array([4.0, 4.0, 4.0, 2.0, 2.0])
     gradients[np.diag_indices_from(gradients)] += missing.ravel()
-    turning = np.cross(np.eye(3)[:, None], np.eye(3)[None])  # e_k x e_l: gradient along l of a rotation about k
-    spin = np.einsum("nqbl,klb->nqk", moments, turning)
-    rotation = _on_part(np.concatenate([np.zeros_like(spin), spin], axis=-1), part)
-    factors = cho_factor(gradients, lower=True, check_finite=False)
-    solved = cho_solve(factors, np.concatenate([velocities.T, rotation], axis=1), check_finite=False)
-    size = points.size
-    return WireSystem(
-        forces.mobility - velocities @ solved[:, :size],
-        forces.motion - velocities @ solved[:, size:],
-        rotation.T @ solved[:, size:],
-    )
+    return moments, across, gradients
+
+
+def _dyad(force: Samples, displacement: Samples) -> Samples:
+    product: Samples = force[:, :, None] * displacement[:, None, :]
+    return product

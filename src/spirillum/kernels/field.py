@@ -15,7 +15,7 @@ from spirillum.kernels.compiled import compiled, compiled_parallel
 from spirillum.kernels.panels import Panel, cardinals, is_near
 from spirillum.kernels.rings import ring_modes
 
-__all__ = ["add_blobs", "add_layer"]
+__all__ = ["add_blobs", "add_layer", "add_moments"]
 
 
 @compiled_parallel
@@ -42,6 +42,36 @@ def add_blobs(points: Samples, sources: Samples, forces: Samples, e2: Samples, f
             field[i, 1] += diagonal * forces[j, 1] + dot * cube * y
             field[i, 2] += diagonal * forces[j, 2] + dot * cube * z
             field[i, 3] += dot * cube * (2.0 + 3.0 * e2[j] / r2)
+
+
+@compiled_parallel
+def add_moments(points: Samples, sources: Samples, moments: Samples, e2: Samples, field: Samples) -> None:
+    """Add the flow of first moments m of forces: u_a = -m[b, k] d_k G[a, b], and the pressure that goes with it.
+
+    Args:
+        points: (n, 3).
+        sources: (s, 3).
+        moments: trace-free, force by displacement, (s, 3, 3).
+        e2: square of the blob radius of each source.
+        field: velocity and pressure to add to, (n, 4).
+    """
+    for i in numba.prange(points.shape[0]):
+        for j in range(sources.shape[0]):
+            x = points[i] - sources[j]
+            r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + e2[j]
+            i3 = 1.0 / (r2 * math.sqrt(r2))
+            i5 = i3 / r2
+            along = 0.0
+            for c in range(3):
+                mx, xm = 0.0, 0.0
+                for d in range(3):
+                    mx += moments[j, c, d] * x[d]
+                    xm += moments[j, d, c] * x[d]
+                along += mx * x[c]
+                field[i, c] += (i3 + 3.0 * e2[j] * i5) * mx - i3 * xm
+            for c in range(3):
+                field[i, c] += 3.0 * i5 * along * x[c]
+            field[i, 3] += along * (6.0 + 15.0 * e2[j] / r2) * i5
 
 
 @compiled

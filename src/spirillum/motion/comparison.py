@@ -18,7 +18,7 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_accuracy, with_calibration
 from spirillum.robot.robot import Robot
 
-__all__ = ["ModelComparison", "compare_models", "estimated_error"]
+__all__ = ["ModelComparison", "compare_models", "estimated_error", "uneven_models"]
 
 _UNITS: dict[str, str] = {f.name: f.metadata["unit"] for f in fields(Swimming) if f.name != "valid"}
 
@@ -76,31 +76,8 @@ class ModelComparison:
         found = [
             sentence if len(names) == count else f"{', '.join(names)}: {sentence}" for sentence, names in said.items()
         ]
-        return (*found, *self._uneven_calibration(), *self._uneven_coupling())
-
-    def _uneven_calibration(self) -> list[str]:
-        groups = {
-            state: [name for name, answer in self.predictions.items() if answer.calibrated is state]
-            for state in (True, False)
-        }
-        if not all(groups.values()):
-            return []
-        return [
-            f"calibration factors stand for the walls with {', '.join(groups[True])} and not with "
-            f"{', '.join(groups[False])}: the differences contain them; with --no-calibration only the models differ"
-        ]
-
-    def _uneven_coupling(self) -> list[str]:
-        if self.robot.coupling.length == 0:
-            return []
-        turned = [name for name, answer in self.predictions.items() if "coupling" in answer.model.parts]
-        without = [name for name in self.predictions if name not in turned]
-        if not turned or not without:
-            return []
-        return [
-            f"the coupling turns with the tail in {', '.join(turned)} and is left out by {', '.join(without)}: torques "
-            "and efficiencies differ by it too"
-        ]
+        calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
+        return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum compare-models --json`."""
@@ -126,6 +103,31 @@ class ModelComparison:
         }
 
 
+def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[str]:
+    """What sets models apart besides their theory, a sentence each.
+
+    Args:
+        robots: the robots that they answer for.
+        models: names of the models.
+        calibrated: those of them that take calibration factors.
+    """
+    found = []
+    bare = [name for name in models if name not in calibrated]
+    if calibrated and bare:
+        found.append(
+            f"calibration factors stand for the walls with {', '.join(calibrated)} and not with {', '.join(bare)}: the "
+            "differences contain them; without calibration only the models differ"
+        )
+    turned = [name for name in models if "coupling" in find_swimmer_model(name).parts]
+    without = [name for name in models if name not in turned]
+    if turned and without and any(robot.coupling.length > 0 and robot.coupling.diameter > 0 for robot in robots):
+        found.append(
+            f"the coupling turns with the tail in {', '.join(turned)} and is left out by {', '.join(without)}: torques "
+            "and efficiencies differ by it too"
+        )
+    return found
+
+
 def estimated_error(prediction: Prediction) -> float | None:
     """The relative error that a model estimates of its own speed; None where it states its error in words only."""
     return prediction.error_estimate if math.isfinite(prediction.error_estimate) else None
@@ -137,7 +139,7 @@ def compare_models(
     models: Sequence[str] | None = None,
     tail_rate: str | float | None = None,
     friction: str | None = None,
-    calibrated: bool = True,
+    calibrated: bool | None = None,
     calibration: str | Path | None = None,
     accuracy: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -152,7 +154,8 @@ def compare_models(
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides, and the models differ in their rates too.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        calibrated: apply the robot's calibration factors, model by model.
+        calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
+            factors that stand for walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.
         accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
         progress: told what is being computed, how many models are done, and of how many.
@@ -161,6 +164,7 @@ def compare_models(
         InputError: for wrong input, or if no model answers.
     """
     ready = load(robot)
+    factors = calibration is not None if calibrated is None else calibrated
     if calibration is not None:
         ready = with_calibration(ready, calibration)
     if accuracy is not None:
@@ -173,7 +177,7 @@ def compare_models(
         if progress is not None:
             progress(f"model {name}", done, len(names))
         try:
-            predictions[name] = predict(ready, model=name, tail_rate=tail_rate, friction=reading, calibrated=calibrated)
+            predictions[name] = predict(ready, model=name, tail_rate=tail_rate, friction=reading, calibrated=factors)
         except InputError as error:
             refusals[name] = str(error)
     if not predictions:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from dataclasses import field as repr_field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, get_args, runtime_checkable
 
@@ -16,6 +17,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.motion.flow_grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.motion.prediction import Prediction, predict
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, with_accuracy
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Kind, parse_option
 
@@ -46,6 +48,9 @@ class FluidField(Protocol):
             InputError: if a point lies inside a solid.
         """
 
+    def wrench(self) -> Samples:
+        """Force (N) and torque about the origin (N m) that hold the robot to its motion, (6,)."""
+
 
 @dataclass(frozen=True)
 class Flow:
@@ -57,12 +62,14 @@ class Flow:
 
     prediction: Prediction
     """The motion."""
-    field: FluidField
+    field: FluidField = repr_field(repr=False)
     """The flow in the lab frame."""
     phase: float
     """Phase of the tail, rad."""
     frame: Frame
     """`lab` (fluid at rest far away) or `body` (moving with the robot's forward velocity)."""
+    held_force: float = 0.0
+    """Sideways force that holds the lateral motion at this phase, N; far away the flow is that of this force."""
 
     @property
     def robot(self) -> Robot:
@@ -174,7 +181,7 @@ def flow(
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = False,
-    accuracy: str | None = None,
+    accuracy: str = "high",
     phase: str | float = 0.0,
     frame: str = "lab",
 ) -> Flow:
@@ -191,7 +198,7 @@ def flow(
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors to the motion. They stand for walls that are not in the flow, which
             then pulls at the robot; without them it swims free of force.
-        accuracy: of the model, `standard` or `high`; None: the robot's own.
+        accuracy: of the model, `standard` or `high`; the flow of `standard` leaves out the torque of the wire's spin.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         frame: `lab` (fluid at rest far away) or `body` (moving with the robot's forward velocity, not turning).
 
@@ -202,7 +209,7 @@ def flow(
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
     prediction = predict(
-        robot, model=MODEL, tail_rate=tail_rate, friction=friction, calibrated=calibrated, accuracy=accuracy
+        with_accuracy(load(robot), accuracy), model=MODEL, tail_rate=tail_rate, friction=friction, calibrated=calibrated
     )
     from spirillum.hydrodynamics.flow import flow_field
 
@@ -212,7 +219,8 @@ def flow(
         for rate in (prediction.body_rotation_rate, prediction.tail_rotation_rate)
     )
     field = flow_field(RobotBatch.of(prediction.robot), body, rotor, angle)
-    return Flow(prediction, field, angle, cast("Frame", frame))
+    held = float(np.hypot(*field.wrench()[1:3]))
+    return Flow(prediction, field, angle, cast("Frame", frame), held)
 
 
 def plane_around(
@@ -256,6 +264,7 @@ def _attributes(flow: Flow) -> dict[str, Any]:
         "forward_velocity": motion.forward_velocity,
         "body_rotation_rate": motion.body_rotation_rate,
         "tail_rotation_rate": motion.tail_rotation_rate,
+        "held_force": flow.held_force,
         "placement": json.dumps(motion.placement),
         "settings": json.dumps(motion.robot.model_dump(), sort_keys=True),
         "references": " ".join(motion.references),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -42,7 +42,7 @@ class Prediction:
     """Reading of the friction."""
     calibrated: bool
     """Whether calibration factors were applied."""
-    swimming: Swimming
+    swimming: Swimming = field(repr=False)
     """The quantities, as arrays of length one."""
     error_estimate: float
     """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
@@ -166,7 +166,7 @@ def prepared(
     if calibration is not None:
         ready = with_calibration(ready, calibration)
     if accuracy is not None:
-        ready = with_accuracy(ready, accuracy)
+        ready = with_accuracy(ready, accuracy, model)
     chosen = find_swimmer_model(model)
     return ready, chosen, checked_batch(ready, chosen)
 
@@ -241,7 +241,8 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
     """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry."""
     entry = robot.calibration.get(model)
     if entry is None:
-        return [f"no calibration for model '{model}': body drag factors are 1"]
+        walls = "" if robot.channel is None else ", and nothing stands for the channel's walls"
+        return [f"no calibration for model '{model}': body drag factors are 1{walls}"]
     fitted = entry.fitted_to
     channel = robot.channel.diameter if robot.channel else None
     pairs = (

@@ -327,6 +327,8 @@ def _dataset(
             "friction": prediction.friction,
             "effective_friction": prediction.effective_friction,
             "calibrated": int(prediction.calibrated),
+            "error_estimate": prediction.error_estimate,
+            "known_error": prediction.model.stated_error(prediction.robot.model),
             "motion": "axial",
             "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
             "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),

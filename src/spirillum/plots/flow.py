@@ -246,7 +246,7 @@ def _write_words(figure: Figure, flow: Flow, view: _View) -> None:
     figure.text(left, 1 - 0.12 / height, title, va="top", size=11, weight="bold")
     words = "\n".join(_conditions(flow, view)).replace("-", "−")
     figure.text(left, 1 - 0.36 / height, words, va="top", size=9, color="#333", linespacing=1.25)
-    for number, line in enumerate(_notes(view)):
+    for number, line in enumerate(_notes(flow, view)):
         figure.text(left, (0.40 - 0.17 * number) / height, line, va="top", size=8, color="#333")
 
 
@@ -262,10 +262,14 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     )
 
 
-def _notes(view: _View) -> Iterator[str]:
+def _notes(flow: Flow, view: _View) -> Iterator[str]:
     drawn = ["grey: robot where the plane cuts it"]
     if view.first == "x":
         drawn.append("white band: tail")
         drawn += ["dashed: its full outline"] if view.offset != 0 else []
     yield f"Lines: direction of the velocity's part in the plane; {', '.join(drawn)}."
-    yield "Unbounded fluid: no walls. Computed, nothing is measured."
+    held = ""
+    if flow.held_force > 0:
+        force = Scale.of(np.array([flow.held_force]), "N")
+        held = f" Held from moving sideways by {flow.held_force / force.factor:.2g} {force.unit}."
+    yield f"Unbounded fluid: no walls.{held} Computed, nothing is measured."

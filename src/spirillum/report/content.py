@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from spirillum.citations import REFERENCES
 from spirillum.hydrodynamics import SWIMMER_MODELS
+from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +42,7 @@ def content(dataset: xr.Dataset) -> dict[str, Any]:
         "note": str(attributes.get("note", "")),
         "observations": str(attributes["observations"]) if "observed_forward_velocity" in dataset else None,
         "size": _size(dataset),
-        "models": [_model(name) for name in models],
+        "models": [(name, _known_errors(name, robots)) for name in models],
         "readings": [(name, FRICTION_MEANINGS.get(name, "")) for name in readings],
         "calibrations": calibrations[:MOST_CALIBRATIONS],
         "more_calibrations": max(len(calibrations) - MOST_CALIBRATIONS, 0),
@@ -65,10 +66,21 @@ def _size(dataset: xr.Dataset) -> str:
     return f"{robots} × {sizes['model']} models × {sizes['friction']} friction readings{rates}"
 
 
-def _model(name: str) -> tuple[str, str]:
-    """Name and known error of a model."""
+def _known_errors(name: str, robots: list[Mapping[str, Any]]) -> str:
+    """Known error of a model with the options of the robots."""
     known = SWIMMER_MODELS.get(name)
-    return name, known.known_error if known else ""
+    if known is None:
+        return ""
+    options = [_options(robot.get("model", {})) for robot in robots] or [ModelOptions()]
+    return "; or ".join(dict.fromkeys(known.stated_error(option) for option in options))
+
+
+def _options(table: Mapping[str, Any]) -> ModelOptions:
+    """Options as a robot has stored them: checked when it was loaded."""
+    return ModelOptions.model_construct(
+        rft=RftOptions.model_construct(**table.get("rft", {})),
+        slender=SlenderOptions.model_construct(**table.get("slender", {})),
+    )
 
 
 def _calibrations(robots: list[Mapping[str, Any]], models: list[str]) -> Iterator[dict[str, str]]:

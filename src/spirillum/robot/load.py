@@ -162,16 +162,19 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
     return robot.model_copy(update={"calibration": checked.calibration})
 
 
-def with_accuracy(robot: Robot, accuracy: str) -> Robot:
+def with_accuracy(robot: Robot, accuracy: str, model: str = "slender") -> Robot:
     """The robot with another accuracy of the model `slender`.
 
     Args:
         robot: a checked robot.
         accuracy: `standard` or `high`.
+        model: the model that is asked.
 
     Raises:
-        InputError: for any other.
+        InputError: for any other accuracy, or a model in closed form, which has none.
     """
+    if model != "slender":
+        raise InputError(f"accuracy = {accuracy!r} with model {model!r}; allowed: only with model 'slender'")
     checked = problems_in(SlenderOptions, {"accuracy": accuracy})
     if isinstance(checked, list):
         raise InputError(f"accuracy = {accuracy!r}; allowed: standard, high")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from spirillum.answer import as_json
 from spirillum.errors import InputError
 from spirillum.files import output_folder, write_dataset, write_text
+from spirillum.motion.comparison import uneven_models
 from spirillum.motion.prediction import calibration_warnings
 from spirillum.studies.dataset import assembled, read_dataset
 from spirillum.studies.observed import ObservedArrays, observed_arrays
@@ -118,6 +119,9 @@ def _computed(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
+    models = loaded.study.models
+    factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
+    warnings += uneven_models(loaded.robots, models, factors)
     for done, task in enumerate(todo):
         tell(f"{task.model}, {task.batch.size} robots", done, len(todo))
         part = kept(task, parts, len(loaded.study.friction))
