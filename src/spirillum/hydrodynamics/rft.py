@@ -168,15 +168,15 @@ class Rft(SwimmerModel):
     references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "katz1975", "jeffrey1981", "perrin1934")
     known_error = (
         "against a resolved wire (25, 2.5 mm) the printed coefficients give about +56 % drag, +22 % thrust and "
-        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %; body and "
-        "tail do not interact, which alone adds some 15 % to the speed"
+        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %, Lighthill's coefficients "
+        "+89, +97 and -12 %; body and tail do not interact, which alone adds some 15 % to the speed"
     )
     parts = ("body", "tail", "rotor", "robot")
 
     def stated_error(self, options: ModelOptions) -> str:
-        """See `ResistanceModel.stated_error`; only two of the coefficient sets were compared with a resolved wire."""
+        """See `ResistanceModel.stated_error`; the near-floor coefficients were not compared with a resolved wire."""
         chosen = options.rft.coefficients
-        if chosen in ("printed", "gray-hancock"):
+        if chosen != "brennen-winet":
             return self.known_error
         return (
             f"the '{chosen}' coefficients have not been compared with a resolved wire here; sets differ from each "

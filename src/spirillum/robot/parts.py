@@ -33,8 +33,18 @@ Taper = Annotated[
     WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0.1, "maximum": 1e4}, {"const": "none"}]}),
 ]
 
+def _read_end(value: Any) -> Any:
+    return None if value == "none" else value
+
+
 Shape = Literal["capsule", "sphere", "spheroid", "cylinder"]
 End = Literal["hemisphere", "flat", "fillet"]
+
+EndOrNone = Annotated[
+    End | None,
+    BeforeValidator(_read_end),
+    WithJsonSchema({"enum": ["hemisphere", "flat", "fillet", "none"]}),
+]
 
 _DEFAULT_END: dict[str, End] = {"capsule": "hemisphere", "cylinder": "flat"}
 
@@ -48,10 +58,10 @@ class Body(Section):
     """Largest diameter D_b (Table I)."""
     length: Length
     """Overall length L_b along the motor axis, ends included (Table I)."""
-    front: End | None = None
-    """Front end of a capsule (default `hemisphere`) or cylinder (default `flat`)."""
-    rear: End | None = None
-    """Rear end of a capsule (default `hemisphere`) or cylinder (default `flat`)."""
+    front: EndOrNone = None
+    """Front end of a capsule (default `hemisphere`) or cylinder (default `flat`); `none` is as if left out."""
+    rear: EndOrNone = None
+    """Rear end of a capsule (default `hemisphere`) or cylinder (default `flat`); `none` is as if left out."""
     fillet: Length | None = None
     """Edge radius of an end that is a `fillet`."""
     mass: Mass | None = None
