@@ -51,7 +51,7 @@ def preset_text(name: str) -> str:
     return (files("spirillum.robot") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(robot: str | Path | Mapping[str, Any] | Robot, **overrides: Any) -> Robot:
+def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> Robot:
     """Load a robot, apply overrides to its raw tables, and check the whole once.
 
     Args:
