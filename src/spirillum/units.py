@@ -139,6 +139,10 @@ def _factor(unit: str, kind: Kind) -> float:
     raise InputError(f'"{unit}" is not a unit of {kind.name}; {hint}')
 
 
+def _article(name: str) -> str:
+    return "an" if name[0] in "aeiou" else "a"
+
+
 def _clip(text: str, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
@@ -159,7 +163,8 @@ def parse_quantity(value: object, kind: Kind) -> float:
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         shown = "a table or list" if isinstance(value, (dict, list)) else _clip(str(value))
         raise InputError(
-            f'= {shown} is not a {kind.name}; allowed: a number with its unit, for example "{kind.example}"'
+            f"= {shown} is not {_article(kind.name)} {kind.name}; allowed: a number with its unit, for example "
+            f'"{kind.example}"'
         )
     if not isinstance(value, str):
         number, unit = value if isinstance(value, float) else float(max(-(10**300), min(value, 10**300))), ""
@@ -169,7 +174,8 @@ def parse_quantity(value: object, kind: Kind) -> float:
         shown = f'"{_clip(value)}"'
         if found is None or len(value) > 200:
             raise InputError(
-                f'= {shown} is not a {kind.name}; allowed: a number with its unit, for example "{kind.example}"'
+                f"= {shown} is not {_article(kind.name)} {kind.name}; allowed: a number with its unit, for example "
+                f'"{kind.example}"'
             )
         number, unit = float(found["number"]), (found["unit"] or "").strip()
         unit = f"1{unit}" if unit.startswith("/") else unit

@@ -212,3 +212,36 @@ def test_coupling_that_is_not_there(wide: Any) -> None:
     np.testing.assert_array_equal(rotor, tail)
     uncoupled = robot(coupling={"length": "0 mm", "diameter": "0 mm", "clearance": "0 mm"})
     assert "this robot has none" in refused(lambda: sp.resistance(uncoupled, part="coupling", model="slender"))
+
+
+def test_wire_that_touches_its_own_arm_is_left_out_of_a_batch(wide: Any) -> None:
+    """The arm at a steep root is no part of the plain helix: only the whole wire shows that it is too thick."""
+    values = {
+        "tail.length": [0.06, 10.4e-3],
+        "tail.wire_diameter": [1e-3, 7.6e-3],
+        "tail.taper": [100.0, 8200.0],
+        "tail.wavelength": [25e-3, 16.5e-3],
+        "tail.amplitude": [2.5e-3, 7.6e-3],
+    }
+    answer = sp.swim(wide.with_values(values), "slender", tail_rate=np.array([7.5]))
+    assert answer.valid.tolist() == [True, False]
+    assert np.isfinite(answer.forward_velocity).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"coupling.diameter": "1e-9 mm"}, "ratio of length and diameter of a thousand"),
+        ({"tail.amplitude": "1100 mm", "tail.wavelength": "10 m"}, "hundredth of tail.amplitude"),
+        ({"tail.wire_diameter": "0.05 mm"}, "at most 1500"),
+    ],
+)
+def test_what_would_fill_the_memory_is_refused_at_once(overrides: dict[str, str], words: str) -> None:
+    assert words in refused(lambda: sp.predict(sp.load(PRESET, channel="none", **overrides), model="slender"))
+
+
+def test_without_memory_for_a_check_there_is_no_estimate() -> None:
+    """A thousand stations are too many for the check's first moments."""
+    answer = sp.predict(sp.load(PRESET, **{"tail.wire_diameter": "0.14 mm"}), model="slender", tail_rate=7.5)
+    assert np.isfinite(answer.forward_velocity)
+    assert answer.to_dict()["error_estimate"]["value"] is None

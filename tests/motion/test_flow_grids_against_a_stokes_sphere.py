@@ -142,7 +142,7 @@ def test_files_are_read_back(around: Flow, tmp_path: Any) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"plane": "zx"}, "plane = 'zx'.*allowed: xz, xy, yz"),
+        ({"plane": "xx"}, "plane = 'xx'.*allowed: xz, xy, yz"),
         ({"offset": "5"}, 'offset = "5" has no unit'),
         ({"offset": "5 s"}, '"s" is not a unit of length'),
         ({"offset": "nan m"}, "is not finite"),

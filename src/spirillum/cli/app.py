@@ -292,7 +292,8 @@ def flow(
     flow_text.check_targets(output, volume)
     loaded = _loaded(robot, settings)
     plane_around(loaded, plane, offset, extent, resolution)
-    box_around(loaded, extent, volume_resolution)
+    if volume is not None:
+        box_around(loaded, extent, volume_resolution)
     with text.progress_bar(quiet=json) as progress:
         progress("flow: forces on the robot", 0, 1)
         found = answer(

@@ -17,6 +17,9 @@ from spirillum.robot.outline import Outline
 __all__ = ["FlowField", "flow_field"]
 
 
+_FARTHEST = 1e9
+
+
 @dataclass(frozen=True)
 class FlowField:
     """Flow at one instant, in the lab frame, fluid at rest far away; SI, body axes, origin at the body's mid-length."""
@@ -134,9 +137,14 @@ def _rotation(angle: float) -> Samples:
 
 
 def _checked(points: Samples) -> Samples:
-    places = np.asarray(points, dtype=float)
+    try:
+        places = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError("points are no numbers; allowed: rows (x, y, z) in m") from error
     if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
         raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
+    if np.any(np.abs(places) > _FARTHEST):
+        raise InputError(f"points lie farther away than {_FARTHEST:g} m; allowed: nearer ones")
     return np.ascontiguousarray(places)
 
 

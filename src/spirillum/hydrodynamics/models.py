@@ -23,7 +23,7 @@ def find_model(name: str) -> ResistanceModel:
     Raises:
         InputError: if there is none.
     """
-    if name not in MODELS:
+    if str(name) not in MODELS:
         raise InputError(f"model = {name!r}{did_you_mean(str(name), MODELS)}; allowed: {', '.join(MODELS)}")
     return MODELS[name]
 
@@ -34,7 +34,7 @@ def find_swimmer_model(name: str) -> SwimmerModel:
     Raises:
         InputError: if there is none.
     """
-    if name not in SWIMMER_MODELS:
+    if str(name) not in SWIMMER_MODELS:
         hint = did_you_mean(str(name), SWIMMER_MODELS)
         raise InputError(f"model = {name!r}{hint}; allowed: {', '.join(SWIMMER_MODELS)}")
     return SWIMMER_MODELS[name]

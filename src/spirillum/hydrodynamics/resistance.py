@@ -92,7 +92,7 @@ def resistance(
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in PARTS:
-        raise InputError(f"part = {part!r}{did_you_mean(part, PARTS)}; allowed: {', '.join(PARTS)}")
+        raise InputError(f"part = {part!r}{did_you_mean(str(part), PARTS)}; allowed: {', '.join(PARTS)}")
     if part not in chosen.parts:
         raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(chosen.parts)}")
     if about not in ("body", "tail-root"):

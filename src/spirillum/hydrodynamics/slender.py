@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
+from spirillum.arrays import Axial, Flags, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
 from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.hydrodynamics.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
-from spirillum.hydrodynamics.wire import Wire, station_count, wire_along
+from spirillum.hydrodynamics.wire import Accuracy, Wire, closest_approach, station_count, stations_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline, coil_spacing
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
@@ -29,9 +29,11 @@ from spirillum.robot.parts import End, Shape
 
 __all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
 
-_MOST_STATIONS = {"standard": 3000, "high": 800}
+_MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
 _POINTS_PER_TURN = 200
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
+_SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
+_SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness
 
 _RESOLUTIONS = {
     "standard": Resolution("standard", order=8, tolerance=1e-4),
@@ -116,7 +118,7 @@ def _wire(g: _Geometry, spacing: float) -> Wire:
     names = ("wavelength", "amplitude", "length", "taper", "hand", "phase")
     values = {name: np.full(1, value) for name, value in zip(names, columns, strict=True)}
     line = centreline(xi, root=np.full(1, 0.5 * g.body_length + g.coupling_length), **values)
-    return wire_along(line.position, 0.5 * g.wire_diameter, spacing=spacing)
+    return stations_along(line.position, 0.5 * g.wire_diameter, spacing)
 
 
 def solids_of(batch: RobotBatch, index: int) -> tuple[tuple[str, Outline, int], ...]:
@@ -147,6 +149,35 @@ _PIECES = {
     "rotor": ("coupling", "tail"),
     "robot": ("body", "coupling", "tail"),
 }
+
+
+def _slimness(batch: RobotBatch) -> list[Limit]:
+    """Body and coupling neither needles nor foils: their outlines are resolved against their own thickness."""
+    solid = batch.coupling_length - 2.0 * batch.coupling_clearance
+    coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
+    why = "solids are resolved up to a ratio of length and diameter of a thousand"
+    rows = (
+        ("body.diameter", batch.body_diameter, _SLIMMEST * batch.body_length),
+        ("body.length", batch.body_length, _SLIMMEST * batch.body_diameter),
+        ("coupling.diameter", np.where(coupled, batch.coupling_diameter, np.inf), _SLIMMEST * solid),
+        ("coupling.length less clearance", np.where(coupled, solid, np.inf), _SLIMMEST * batch.coupling_diameter),
+    )
+    return [Limit.of(name, value, "at least", bound, "mm", why, "solid-too-slim") for name, value, bound in rows]
+
+
+def _apart(batch: RobotBatch, fit: Flags) -> Limit:
+    """No part of the wire touches another, the arm at its root included; asked of robots that can be built."""
+    fit = np.broadcast_to(fit & batch.known & all_hold(assembly_limits(batch)), (batch.size,))
+    nearest = np.full(batch.size, np.inf)
+    for index in np.flatnonzero(fit):
+        nearest[index] = _closest(_Geometry.of(batch, int(index)))
+    why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
+    return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
+
+
+@lru_cache(maxsize=4096)
+def _closest(g: _Geometry) -> float:
+    return closest_approach(_wire(g, 1.0))
 
 
 @lru_cache(maxsize=4096)
@@ -195,8 +226,10 @@ class Slender(SwimmerModel):
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
         coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
-        stations = station_count(batch.arc_length, 0.5 * batch.wire_diameter)
-        return [
+        resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        # No more than the plain helix and the arm from the axis to it.
+        wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
+        limits = [
             Limit.of(
                 "coupling.length",
                 batch.coupling_length,
@@ -205,6 +238,15 @@ class Slender(SwimmerModel):
                 "mm",
                 "the tail's root, coupling.length behind the body, would lie in the body",
                 "tail-in-body",
+            ),
+            Limit.of(
+                "coupling.length",
+                batch.coupling_length,
+                "at least",
+                _SMALLEST_GAP * batch.amplitude,
+                "mm",
+                "the film between body and tail is resolved down to a hundredth of tail.amplitude",
+                "film-too-thin",
             ),
             Limit.of(
                 "coupling.clearance",
@@ -226,14 +268,20 @@ class Slender(SwimmerModel):
             ),
             Limit.of(
                 "stations along the tail (tail.wire_diameter)",
-                stations,
+                station_count(wire_length, 0.5 * batch.wire_diameter),
                 "at most",
-                float(_MOST_STATIONS[batch.options.slender.accuracy]),
+                float(_MOST_STATIONS[resolution.wire]),
                 "1",
                 "their equations would fill the memory",
                 "wire-too-thin",
             ),
+            *_slimness(batch),
         ]
+        return [*limits, _apart(batch, all_hold(limits))]
+
+    def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
+        """See `ResistanceModel.part_domain`."""
+        return _slimness(batch) if part in ("body", "coupling") else self.domain(batch)
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """A wire thin against its wave, its turns apart, and long enough for its ends not to matter much."""

@@ -22,7 +22,16 @@ from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import skew
 
-__all__ = ["Accuracy", "Wire", "WireSystem", "station_count", "wire_along", "wire_system"]
+__all__ = [
+    "Accuracy",
+    "Wire",
+    "WireSystem",
+    "closest_approach",
+    "station_count",
+    "stations_along",
+    "wire_along",
+    "wire_system",
+]
 
 Accuracy = Literal["standard", "high"]
 
@@ -33,6 +42,8 @@ _SPACING = 0.75
 _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
+_MOST_STATIONS = 5000
+_FARTHEST = 1e9
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _TILT = 0.5
 """Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
@@ -88,18 +99,55 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
         closed: whether the wire is a ring without ends.
 
     Raises:
-        InputError: if the curve is no curve, or a wire of that radius would run into itself.
+        InputError: if the curve is no curve, has too many stations, or a wire of that radius runs into itself.
     """
+    line = _checked(curve, radius, spacing, closed=closed)
+    wire = stations_along(line, float(radius), float(spacing), closed=closed)
+    near = closest_approach(wire, closed=closed)
+    if near < 2.0 * wire.radius:
+        raise InputError(
+            f"the wire comes within {1e3 * near:.3g} mm of another part of its centreline; allowed: more than its "
+            f"diameter, {2e3 * wire.radius:.3g} mm"
+        )
+    return wire
+
+
+def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> Samples:
+    """The curve as numbers that make a wire."""
+    try:
+        line = np.asarray(curve, dtype=float)
+        sizes = float(radius), float(spacing)
+    except (TypeError, ValueError) as error:
+        raise InputError("curve, radius or spacing is no number; allowed: points (x, y, z) and lengths in m") from error
+    if line.ndim != 2 or line.shape[1] != 3 or len(line) < 4 or not np.all(np.isfinite(line)):
+        raise InputError(f"curve has shape {line.shape}; allowed: at least 4 finite points (x, y, z) in m")
+    for name, value in zip(("radius", "spacing"), sizes, strict=True):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name} = {value}; allowed: a finite number above 0")
+    if np.max(np.abs(line)) > _FARTHEST or np.ptp(line, axis=0).max() < 1.0 / _FARTHEST:
+        raise InputError(f"curve spans {np.ptp(line, axis=0).max():.3g} m; allowed: 1/{_FARTHEST:g} to {_FARTHEST:g} m")
+    length = float(np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    if closed and np.linalg.norm(line[-1] - line[0]) > 1e-9 * length:
+        raise InputError("curve with closed = True ends elsewhere than it starts; allowed: the same point")
+    if closed and length < 2.0 * np.pi * sizes[0]:
+        raise InputError(
+            f"radius = {sizes[0]:.3g} m is larger than a ring of length {length:.3g} m; allowed: a thinner wire"
+        )
+    count = float(station_count(np.array([length]), np.array([sizes[0]]))[0]) / sizes[1]
+    if count > _MOST_STATIONS:
+        raise InputError(f"radius = {sizes[0]:.3g} m makes {count:.0f} stations; allowed: at most {_MOST_STATIONS}")
+    return line
+
+
+def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
+    """The same of a curve that is known to make a wire; it may touch itself."""
     from scipy.interpolate import CubicSpline
 
-    curve = np.asarray(curve, dtype=float)
-    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 4 or not np.all(np.isfinite(curve)):
-        raise InputError(f"curve has shape {curve.shape}; allowed: at least 4 finite points (x, y, z) in m")
-    if not (np.isfinite(radius) and radius > 0):
-        raise InputError(f"radius = {radius} m; allowed: more than 0 m")
     gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
     apart = np.concatenate([[True], gaps > 1e-12 * np.sum(gaps)])
-    curve = curve[apart]
+    curve = np.array(curve[apart])
+    if closed:
+        curve[-1] = curve[0]
     chord = np.concatenate([[0.0], np.cumsum(gaps[apart[1:]])])
     spline = CubicSpline(chord, curve, axis=0, bc_type="periodic" if closed else "not-a-knot")
     node, weight = np.polynomial.legendre.leggauss(4)
@@ -110,25 +158,24 @@ def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: b
     where = np.interp(at, arc, chord)
     tangents = spline(where, 1)
     tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
-    wire = Wire(spline(where), tangents, lengths, radius)
-    _check_apart(wire, at, float(arc[-1]) if closed else np.inf)
-    return wire
+    return Wire(spline(where), tangents, lengths, radius)
 
 
-def _check_apart(wire: Wire, at: Samples, around: float) -> None:
-    """Refuse a wire that touches itself: nearer than its diameter, but further along it than half a tightest turn."""
+def closest_approach(wire: Wire, *, closed: bool = False) -> float:
+    """Least distance between stations further apart along the wire than half a tightest turn, m.
+
+    Infinite where none is closer than the wire's diameter.
+    """
     from scipy.spatial import cKDTree
 
+    total = float(np.sum(wire.lengths))
+    at = np.cumsum(wire.lengths) - 0.5 * wire.lengths
     pairs = cKDTree(wire.points).query_pairs(2.0 * wire.radius, output_type="ndarray")
     along = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]])
-    touching = pairs[np.minimum(along, around - along) > np.pi * wire.radius]
-    if len(touching):
-        first, second = 1e3 * wire.points[touching[0]]
-        raise InputError(
-            f"the wire touches itself near ({', '.join(f'{value:.4g}' for value in first)}) mm: "
-            f"{float(np.linalg.norm(first - second)):.3g} mm to another part of its centreline; allowed: more than "
-            f"its diameter, {2e3 * wire.radius:.3g} mm"
-        )
+    along = np.minimum(along, total - along) if closed else along
+    close = pairs[along > np.pi * wire.radius]
+    distances = np.linalg.norm(wire.points[close[:, 0]] - wire.points[close[:, 1]], axis=1)
+    return float(np.min(distances, initial=np.inf))
 
 
 def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:

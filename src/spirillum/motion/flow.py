@@ -235,6 +235,7 @@ def plane_around(
     Raises:
         InputError: for an unknown plane, a wrong length, or a grid too small or too large.
     """
+    plane = "".join(sorted(str(plane)))
     if plane not in PLANES:
         raise InputError(f"plane = {plane!r}{did_you_mean(str(plane), PLANES)}; allowed: {', '.join(PLANES)}")
     at = parse_option("offset", offset, _OFFSET)
@@ -275,7 +276,10 @@ def _attributes(flow: Flow) -> dict[str, Any]:
 
 
 def _checked(points: Samples) -> Samples:
-    places = np.asarray(points, dtype=float)
+    try:
+        places = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError("points are no numbers; allowed: (n, 3), a row (x, y, z) in m for each point") from error
     if places.ndim != 2 or places.shape[1] != 3:
         raise InputError(f"points have shape {places.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
     if not np.all(np.isfinite(places)):

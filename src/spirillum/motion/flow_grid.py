@@ -67,7 +67,7 @@ def plane_grid(robot: Robot, plane: str, offset: float, margin: float | None, re
         InputError: if the grid would be too small or too large.
     """
     box = {axis: side for axis, side in _box(robot, margin).items() if axis in plane}
-    return _grid(box, {PLANES[plane]: np.array([offset])}, resolution)
+    return _grid(box, {PLANES[plane]: np.array([offset])}, resolution, "resolution")
 
 
 def volume_grid(robot: Robot, margin: float | None, resolution: int) -> Grid:
@@ -76,7 +76,7 @@ def volume_grid(robot: Robot, margin: float | None, resolution: int) -> Grid:
     Raises:
         InputError: if the grid would be too small or too large.
     """
-    return _grid(_box(robot, margin), {}, resolution)
+    return _grid(_box(robot, margin), {}, resolution, "volume resolution")
 
 
 def _box(robot: Robot, margin: float | None) -> dict[str, tuple[float, float]]:
@@ -94,10 +94,10 @@ def _box(robot: Robot, margin: float | None) -> dict[str, tuple[float, float]]:
     }
 
 
-def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int) -> Grid:
+def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> Grid:
     if not 2 <= resolution <= _LARGEST_RESOLUTION:
         raise InputError(
-            f"resolution = {resolution}; allowed: 2 to {_LARGEST_RESOLUTION} points along the grid's longest side"
+            f"{name} = {resolution}; allowed: 2 to {_LARGEST_RESOLUTION} points along the grid's longest side"
         )
     spacing, counts, size = _sizes(box, resolution)
     if size > _MOST_POINTS:
@@ -105,8 +105,8 @@ def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolu
         while _sizes(box, most)[2] > _MOST_POINTS:
             most -= 1
         raise InputError(
-            f"resolution = {resolution} makes {size} points; allowed: at most {_MOST_POINTS} points, here a "
-            f"resolution of {most}"
+            f"{name} = {resolution} makes {size} points; allowed: at most {_MOST_POINTS} points, here a {name} of "
+            f"{most}"
         )
     even = {axis: _even(0.5 * (low + high), spacing, counts[axis]) for axis, (low, high) in box.items()}
     x, y, z = ({**even, **fixed}[axis] for axis in _AXES)

@@ -80,8 +80,9 @@ class Outline:
     def contains(self, x: Samples, rho: Samples) -> np.ndarray:
         """Where points lie inside."""
         radius = np.fmax.reduce([piece.radius(x) for piece in self.pieces])
+        tips = [float(piece.points(np.full(1, t))[0][0]) for piece in self.pieces for t in (0.0, 1.0)]
         with np.errstate(invalid="ignore"):
-            return np.asarray(rho < radius)
+            return np.asarray((rho < radius) & (x < max(tips)) & (x > min(tips)))
 
     def distance(self, x: Samples, rho: Samples) -> Samples:
         """Distance of points from the surface, to a thousandth of a piece's length, m."""

@@ -33,6 +33,7 @@ Taper = Annotated[
     WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0.1, "maximum": 1e4}, {"const": "none"}]}),
 ]
 
+
 def _read_end(value: Any) -> Any:
     return None if value == "none" else value
 

@@ -95,7 +95,9 @@ class Robot(Section):
         problems = []
         if body.shape in ("sphere", "spheroid"):
             idle = [name for name in ("front", "rear", "fillet") if getattr(body, name) is not None]
-            problems += [f"body.{name} is set, but a {body.shape} has no ends; allowed: leave it out, or 'none'" for name in idle]
+            problems += [
+                f"body.{name} is set, but a {body.shape} has no ends; allowed: leave it out, or 'none'" for name in idle
+            ]
         elif (body.fillet is not None) != ("fillet" in (body.front_end, body.rear_end)):
             wanted = "needs body.fillet, the edge radius" if body.fillet is None else "is not used by either end"
             problems.append(f"body.fillet: an end 'fillet' {wanted}; allowed: both or neither")

@@ -62,6 +62,7 @@ REASONS = (
     "film-too-thin",
     "wire-too-thin",
     "wire-too-short",
+    "solid-too-slim",
     "wire-too-thick-for-rft",
     "wire-touches-floor",
     "wire-too-close-to-floor",
