@@ -42,7 +42,7 @@ _SPACING = 0.75
 _INSET = 0.375
 """Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
 solved for with their edges, then have the right drag along and across to 0.4 %."""
-_MOST_STATIONS = 5000
+_MOST_STATIONS = 6000
 _FARTHEST = 1e9
 _LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
 _TILT = 0.5
