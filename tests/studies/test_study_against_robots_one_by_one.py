@@ -87,3 +87,16 @@ def test_file_is_labelled_and_opens_with_xarray_alone(small: dict[str, object], 
             assert stored[name].attrs["source"], name
         assert json.loads(stored.attrs["settings"])["robots"][0]["body"]["diameter"] == 0.018
         assert "nothing in this dataset is measured" in stored.attrs["observations"]
+
+
+def test_a_model_that_solves_brings_its_error_estimate_and_what_sets_it_apart(small: dict[str, object]) -> None:
+    grid = {"wavelengths": ["25 mm"], "amplitudes": ["2.5 mm"], "channels": {"wide": "biorob2012-wide"}}
+    dataset = sp.study({**small, "models": ["sbt", "slender"], "grid": grid}).isel(channel=0, wavelength=0, amplitude=0)
+    for friction in ("none", "rotor"):
+        place = {"model": "slender", "friction": friction}
+        one = sp.predict("biorob2012-wide", **place)
+        assert float(dataset["forward_velocity"].sel(place)) == pytest.approx(one.forward_velocity, rel=1e-12)
+        assert float(dataset["error_estimate"].sel(place)) == pytest.approx(one.error_estimate, rel=1e-9)
+    assert dataset["error_estimate"].sel(model="sbt").isnull().all()
+    assert "calibration factors stand for the walls with sbt and not with slender" in dataset.attrs["warnings"]
+    assert "the coupling turns with the tail in slender and is left out by sbt" in dataset.attrs["warnings"]

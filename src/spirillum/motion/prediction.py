@@ -14,7 +14,14 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.hydrodynamics.coefficients import axis_height
-from spirillum.motion.swimming import Swimming, calibrated_balance, friction_reading, requirements, swim
+from spirillum.motion.swimming import (
+    Swimming,
+    calibrated_balance,
+    friction_reading,
+    requirements,
+    speed_difference,
+    swim,
+)
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
@@ -142,13 +149,8 @@ def predict(
     ]
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
-    error = np.nan if check is None else _difference(answer(check), result)
+    error = np.nan if check is None else float(speed_difference(answer(check), result)[0])
     return Prediction(ready, chosen, reading, applied, result, error, tuple(warnings))
-
-
-def _difference(check: Swimming, result: Swimming) -> float:
-    """Relative difference of the forward velocities."""
-    return float(np.abs(check.forward_velocity[0] / result.forward_velocity[0] - 1.0))
 
 
 def prepared(

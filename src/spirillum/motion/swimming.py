@@ -17,7 +17,7 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 
-__all__ = ["Swimming", "calibrated_balance", "friction_reading", "requirements", "swim"]
+__all__ = ["Swimming", "calibrated_balance", "friction_reading", "requirements", "speed_difference", "swim"]
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
 
@@ -168,6 +168,12 @@ def swim(
         for cut, block in batch.blocks(_BLOCK)
     ]
     return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+
+
+def speed_difference(check: Swimming, result: Swimming) -> PerRobot:
+    """Relative difference of the forward velocities: the error estimate of a model that `checked_by` another."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.abs(check.forward_velocity / result.forward_velocity - 1.0)
 
 
 def friction_reading(name: str) -> FrictionReading:

@@ -123,6 +123,12 @@ def _attributes(name: str) -> dict[str, Any]:
             "flag_values": np.arange(len(REASONS), dtype="int8"),
             "flag_meanings": " ".join(REASONS),
         }
+    if name == "error_estimate":
+        return {
+            "units": "1",
+            "long_name": "relative difference of the forward velocity from another resolution",
+            "source": "models that solve for the flow; NaN for those in closed form",
+        }
     base, _, at = name.partition("_at_")
     field = next(f for f in QUANTITIES if f.name == base)
     source = field.metadata["source"]

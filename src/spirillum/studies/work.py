@@ -14,7 +14,7 @@ from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.prediction import accuracy_limits
-from spirillum.motion.swimming import Swimming, requirements, swim
+from spirillum.motion.swimming import Swimming, requirements, speed_difference, swim
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
@@ -124,6 +124,11 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     readings = study.friction
     free = [swim(task.batch, task.model, friction=reading) for reading in readings]
     part: Part = {f.name: _stacked(free, f.name) for f in QUANTITIES}
+    check = find_swimmer_model(task.model).checked_by(task.batch.options)
+    if check is not None:
+        checked = [swim(task.batch, check, friction=reading) for reading in readings]
+        pairs = zip(checked, free, strict=True)
+        part["error_estimate"] = np.stack([speed_difference(*pair) for pair in pairs], axis=-1)
     valid = np.stack([result.valid for result in free], axis=-1)
     reason = _reasons(task.batch, task.model)[:, None]
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
@@ -208,7 +213,11 @@ def kept(task: Task, folder: Path | None, readings: int) -> Part | None:
     except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
         return None
     whole = {"outside", *(f.name for f in QUANTITIES)} <= set(part)
-    known = {"outside", *(f.name + at for f in QUANTITIES for at in ("", "_at_observed_rate", "_at_assumed_rate"))}
+    known = {
+        "outside",
+        "error_estimate",
+        *(f.name + at for f in QUANTITIES for at in ("", "_at_observed_rate", "_at_assumed_rate")),
+    }
     fits = all(array.dtype == np.float64 and array.shape[:2] == (task.batch.size, readings) for array in part.values())
     return part if whole and fits and set(part) <= known else None
 
