@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
 from spirillum.plots.evidence import Shown, spread
-from spirillum.plots.style import COLOURS, Look, Scale, look_of_model
+from spirillum.plots.style import COLOURS, Look, Scale, label_of_model, look_of_model
 from spirillum.units import Hz
 
 __all__ = ["Row", "amplitude_handles", "bound_row", "grid_rows", "model_handles", "robot_rows"]
@@ -249,7 +249,7 @@ def _model_entries(shown: Shown) -> Iterator[Line2D]:
     for model in shown.models:
         look = look_of_model(model)
         line: Any = look.line if shown.grid else "none"
-        yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=model.upper())
+        yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
 
 
 def _reading_entries(shown: Shown) -> Iterator[Line2D]:
@@ -282,7 +282,7 @@ def amplitude_handles(shown: Shown) -> list[Line2D]:
         entries.append(Line2D([], [], color=colour, marker=marker, markersize=3.2, linestyle="-", label=label))
     for model in shown.models:
         line = look_of_model(model).line
-        entries.append(Line2D([], [], color="#555555", linestyle=line, linewidth=1.1, label=model.upper()))
+        entries.append(Line2D([], [], color="#555555", linestyle=line, linewidth=1.1, label=label_of_model(model)))
     if shown.rotor_friction is not None:
         label = f"rotor friction $B_m$ = {_power_of_ten(shown.rotor_friction)}"
         entries.append(Line2D([], [], color="#555555", linestyle=":", linewidth=0.9, label=label))

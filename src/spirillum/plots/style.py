@@ -23,6 +23,7 @@ __all__ = [
     "COLOURS",
     "Look",
     "Scale",
+    "label_of_model",
     "look_of_model",
     "new_figure",
     "plain",
@@ -103,6 +104,11 @@ _OTHER = Look(COLOURS["orange"], (0, (5, 1, 1, 1, 1, 1)), "v")
 def look_of_model(name: str) -> Look:
     """The look of a model by its name."""
     return _LOOKS.get(name, _OTHER)
+
+
+def label_of_model(name: str) -> str:
+    """A model's name as it stands in text: abbreviations in capitals."""
+    return name.upper() if len(name) <= 3 else name
 
 
 @dataclass(frozen=True)
