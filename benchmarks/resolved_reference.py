@@ -13,7 +13,7 @@ by mu * 1e-3, mu * 1e-6 and mu * 1e-9.
 
 Without --full one coarse level; --full refines and studies the ends (some 25 minutes on two busy cores, 4 GB).
 
-    OMP_NUM_THREADS=2 python benchmarks/resolved_reference.py --full --only tail --out /tmp/ref
+    OMP_NUM_THREADS=2 python benchmarks/resolved_reference.py --full --only tail --out DIR
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline, coil_spacing
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
-from spirillum.robot.outline import Outline, body_outline, cylinder_outline
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.parts import End, Shape
 
 __all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
@@ -98,11 +98,10 @@ class _Geometry(NamedTuple):
 
 def _solids(g: _Geometry) -> Iterator[tuple[str, Outline, int]]:
     """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution."""
-    yield "body", body_outline(g.shape, g.body_diameter, g.body_length, g.fillet, g.front, g.rear), 0
-    if g.coupling_diameter > 0 and g.coupling_length > 0:
-        front = -0.5 * g.body_length - g.coupling_clearance
-        rear = -0.5 * g.body_length - g.coupling_length + g.coupling_clearance
-        yield "coupling", cylinder_outline(g.coupling_diameter, front, rear), 1
+    body = body_outline(g.shape, g.body_diameter, g.body_length, g.fillet, g.front, g.rear)
+    coupling = g.coupling_diameter, g.coupling_length, g.coupling_clearance
+    for name, outline in solid_outlines(body, g.body_length, *coupling).items():
+        yield name, outline, 0 if name == "body" else 1
 
 
 def _wire(g: _Geometry, spacing: float) -> Wire:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +10,7 @@ from matplotlib.patches import Polygon
 
 from spirillum.arrays import Values
 from spirillum.plots.solids import wire_line
-from spirillum.robot.outline import Outline, body_outline, cylinder_outline
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.robot import Robot
 
 __all__ = ["draw_section"]
@@ -54,13 +54,10 @@ def draw_section(
     _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
 
 
-def _outlines(robot: Robot) -> Iterator[Outline]:
+def _outlines(robot: Robot) -> Iterable[Outline]:
     body, coupling = robot.body, robot.coupling
-    yield body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
-    if coupling.length > 2 * coupling.clearance and coupling.diameter > 0:
-        rear = -0.5 * body.length
-        front, back = rear - coupling.clearance, rear - coupling.length + coupling.clearance
-        yield cylinder_outline(coupling.diameter, front, back)
+    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance).values()
 
 
 def _cut(outline: Outline, plane: str, offset: float) -> Values | None:

@@ -9,7 +9,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.parts import End, Shape
 
-__all__ = ["Arc", "Line", "Outline", "body_outline", "cylinder_outline"]
+__all__ = ["Arc", "Line", "Outline", "body_outline", "cylinder_outline", "solid_outlines"]
 
 
 @dataclass(frozen=True)
@@ -146,3 +146,22 @@ def cylinder_outline(diameter: float, front: float, rear: float) -> Outline:
         Line((rear, radius), (rear, 0.0)),
     )
     return Outline(pieces, (True, True))
+
+
+def solid_outlines(
+    body: Outline, body_length: float, coupling_diameter: float, coupling_length: float, clearance: float
+) -> dict[str, Outline]:
+    """Outlines by part: the body, and the coupling behind it where there is one; lengths in m.
+
+    Args:
+        body: outline of the body.
+        body_length: L_b.
+        coupling_diameter: D_c, 0 for a bare gap.
+        coupling_length: L_c, 0 for none.
+        clearance: axial clearance on both sides of the coupling's solid.
+    """
+    outlines = {"body": body}
+    if coupling_diameter > 0 and coupling_length > 2.0 * clearance:
+        rear = -0.5 * body_length
+        outlines["coupling"] = cylinder_outline(coupling_diameter, rear - clearance, rear - coupling_length + clearance)
+    return outlines
