@@ -152,14 +152,17 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str) -> P
         example: a name that would do.
 
     Raises:
-        InputError: if it has another ending, is no regular file, or its folder is not there.
+        InputError: if it has another ending, is no regular file, or its folder is not there or closed to you.
     """
     path = Path(path)
     if path.suffix not in kinds:
         endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
         raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
-    if not _regular(path).parent.is_dir():
+    folder = _regular(path).parent
+    if not folder.is_dir():
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path} cannot be written (permission denied); allowed: a folder you may write to")
     return path
 
 

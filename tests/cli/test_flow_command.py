@@ -1,6 +1,7 @@
 """`flow`: a picture, numbers on grids, a summary; with a sphere's exact flow in place of the robot's."""
 
 import json
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -122,3 +123,12 @@ def test_the_example_of_the_help_runs(run: Callable[..., Any], tmp_path: Path, m
     example = re.search(r"Example: spirillum (.*)", run("flow", "--help").out)
     assert example
     assert run(*example[1].split()).code == 0
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_closed_folder_is_named_before_any_work(run: Callable[..., Any], tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o500)
+    outcome = run("flow", "biorob2012-wide", "-o", str(closed / "flow.png"))
+    assert outcome.code == 2
+    assert "permission denied" in outcome.err

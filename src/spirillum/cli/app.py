@@ -221,6 +221,7 @@ def simulate(
     samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
+    accuracy: Accuracy = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -244,6 +245,7 @@ def simulate(
             samples_per_turn=samples_per_turn,
             calibrated=not no_calibration,
             calibration=calibration,
+            accuracy=accuracy,
         )
     write_dataset(dataset, target)
     text.show(text.simulation_answer(dataset, output), text.simulation, json=json)

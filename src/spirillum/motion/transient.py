@@ -186,6 +186,7 @@ def simulate(
     duration: str | float | None = None,
     on: Sequence[tuple[str | float, str | float]] | None = None,
     samples_per_turn: int = 100,
+    accuracy: str | None = None,
 ) -> xr.Dataset:
     """Simulate axial swimming (two degrees of freedom) from rest.
 
@@ -200,6 +201,7 @@ def simulate(
         on: times (start, stop) between which the remote switches the motor on, each with its unit (``"2 s"``) or a
             float in s; None: on throughout.
         samples_per_turn: samples of the output per steady turn of the tail.
+        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
 
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
@@ -208,7 +210,9 @@ def simulate(
     Raises:
         InputError: for wrong input or a drive without a motor.
     """
-    prediction = predict(robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration)
+    prediction = predict(
+        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, accuracy=accuracy
+    )
     batch = RobotBatch.of(prediction.robot)
     if batch.drive != "dc-motor" or batch.electrics is None:
         raise InputError(f"drive.kind = '{batch.drive}'; allowed: 'dc-motor', which alone has a transient")
