@@ -207,11 +207,11 @@ class _Images:
     resistance: Samples
     """Of the solids alone, (12, 12)."""
     mobility: Samples
-    """Velocity that forces on the stations lose to the held solids, (3 stations, 3 stations)."""
+    """What the wires' forces and moments lose to the held solids; as A of `WireSystem`."""
     drift: Samples
-    """Velocity at the stations from the solids' motion, (3 stations, 12)."""
+    """Velocities and gradients at the stations from the solids' motion; as S of `WireSystem`."""
     drag: Samples
-    """The same from forces on the solids that the stations' forces exert; equal to `drift` by reciprocity."""
+    """The same from what forces and moments at the stations exert on the solids; equal to `drift` by reciprocity."""
     moving: Amplitudes
     """Densities from the solids' motion, (2, 3 nodes, 12)."""
     held: tuple[tuple[np.ndarray, Samples], ...]

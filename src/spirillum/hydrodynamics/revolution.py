@@ -98,9 +98,9 @@ class Panels:
         """8 pi mu times the velocities at rings (x, rho) of unit densities, (modes, 3 rings, 3 nodes)."""
         from spirillum.kernels.panels import layer_blocks
 
-        nodes, barycentric, weights, fine, fine_weights = _rule(self.order)
-        own = np.arange(x.size) if on_nodes else np.full(x.size, -1)
+        nodes, barycentric, fine, fine_weights, weights = self.rule
         rule = (nodes, barycentric, fine, fine_weights)
+        own = np.arange(x.size) if on_nodes else np.full(x.size, -1)
         blocks: Samples = layer_blocks(x, rho, own, self.x, self.rho, e2, modes, rule, weights)
         return blocks
 

@@ -104,6 +104,7 @@ def _solids(g: _Geometry) -> Iterator[tuple[str, Outline, int]]:
         yield name, outline, 0 if name == "body" else 1
 
 
+@lru_cache(maxsize=64)
 def _wire(g: _Geometry, spacing: float) -> Wire:
     """The tail at phase 0."""
     turns = g.tail_length / g.wavelength

@@ -12,8 +12,8 @@ import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
 from spirillum.kernels.compiled import compiled, compiled_parallel
-from spirillum.kernels.panels import Panel, cardinals, is_near
-from spirillum.kernels.rings import ring_modes
+from spirillum.kernels.panels import Panel, cardinals, is_near, next_piece
+from spirillum.kernels.rings import ring_b_v, ring_modes
 
 __all__ = ["add_blobs", "add_layer", "add_moments"]
 
@@ -105,9 +105,7 @@ def _add_ring(
             if d == 0:
                 push = dx * b[m]
             elif d == 1:
-                before = b[abs(m - 1)]
-                b_v = (a[m] - near2 * b[m]) / (2.0 * p) if near2 < 0.3 * p else b[m] - 0.5 * (b[m + 1] + before)
-                push = delta * b[m] - rho * b_v
+                push = delta * b[m] - rho * ring_b_v(m, a, b, near2, p)
             else:
                 push = m * a[m] / rho_s
             out[3] += 2.0 * weight * push * real
@@ -135,14 +133,8 @@ def _panel_field(
     stack[0, 0], stack[0, 1] = -1.0, 1.0
     depth = 1
     while depth > 0:
-        depth -= 1
+        depth = next_piece(stack, depth, 1e-6, target, panel, near, cardinal)
         low, high = stack[depth, 0], stack[depth, 1]
-        if depth < 60 and high - low > 1e-6 and is_near(low, high, target, panel, near, cardinal):
-            middle = 0.5 * (low + high)
-            stack[depth, 0], stack[depth, 1] = middle, high
-            stack[depth + 1, 0], stack[depth + 1, 1] = low, middle
-            depth += 2
-            continue
         for q in range(abscissas.size):
             u = low + 0.5 * (high - low) * (1.0 + abscissas[q])
             cardinals(u, nodes, barycentric, cardinal)

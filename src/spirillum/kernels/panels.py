@@ -16,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 from spirillum.kernels.rings import ring_modes
 
-__all__ = ["cardinals", "is_near", "layer_blocks"]
+__all__ = ["cardinals", "is_near", "layer_blocks", "next_piece"]
 
 Target: TypeAlias = tuple[float, float, float]
 """x, rho, and the square of the blob radius."""
@@ -128,21 +128,36 @@ def _own_panel(u_0: float, target: Target, panel: Panel, rule: Rule, work: Work,
 
 
 @compiled
+def next_piece(
+    stack: Samples, depth: int, smallest: float, target: Target, panel: Panel, rule: Rule, cardinal: Samples
+) -> int:
+    """Halve the piece on top of a stack of pieces (low, high) until it is shorter than its distance from the target.
+
+    Returns:
+        Place of that piece, which is also how many are left below it.
+    """
+    depth -= 1
+    while depth < 60 and stack[depth, 1] - stack[depth, 0] > smallest:
+        low, high = stack[depth, 0], stack[depth, 1]
+        if not is_near(low, high, target, panel, rule, cardinal):
+            break
+        middle = 0.5 * (low + high)
+        stack[depth, 0], stack[depth, 1] = middle, high
+        depth += 1
+        stack[depth, 0], stack[depth, 1] = low, middle
+    return depth
+
+
+@compiled
 def _other_panel(target: Target, panel: Panel, rule: Rule, work: Work, block: Samples) -> None:
     """Integrals over a panel that the target lies off: halved until each piece is shorter than its distance."""
     stack = np.empty((64, 2))
     stack[0, 0], stack[0, 1] = -1.0, 1.0
     depth = 1
     while depth > 0:
-        depth -= 1
+        depth = next_piece(stack, depth, 1e-9, target, panel, rule, work[0])
         low, high = stack[depth, 0], stack[depth, 1]
-        if depth < 60 and high - low > 1e-9 and is_near(low, high, target, panel, rule, work[0]):
-            middle = 0.5 * (low + high)
-            stack[depth, 0], stack[depth, 1] = middle, high
-            stack[depth + 1, 0], stack[depth + 1, 1] = low, middle
-            depth += 2
-        else:
-            _add_piece(low, high, 1, low, target, panel, rule, work, block)
+        _add_piece(low, high, 1, low, target, panel, rule, work, block)
 
 
 @compiled

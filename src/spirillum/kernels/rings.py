@@ -22,7 +22,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["ring_blocks", "ring_integrals", "ring_modes"]
+__all__ = ["ring_b_v", "ring_blocks", "ring_integrals", "ring_modes"]
 
 
 @compiled
@@ -86,6 +86,14 @@ def ring_integrals(
 
 
 @compiled
+def ring_b_v(m: int, a: Samples, b: Samples, near2: float, p: float) -> float:
+    """Integral of v cos(m phi)/r^3 with v = 1 - cos(phi): from A_m where the rings are close, since B_m cancels."""
+    close = near2 < 0.3 * p
+    value: float = (a[m] - near2 * b[m]) / (2.0 * p) if close else b[m] - 0.5 * (b[m + 1] + b[abs(m - 1)])
+    return value
+
+
+@compiled
 def ring_modes(
     dx: float, delta: float, rho: float, rho_s: float, e2: float, modes: int, a: Samples, b: Samples, k: Samples
 ) -> None:
@@ -107,16 +115,14 @@ def ring_modes(
     ring_integrals(dx, delta, rho, rho_s, e2, modes + 1, a, b)
     p = rho * rho_s
     near2 = dx * dx + delta * delta + e2
-    close = near2 < 0.3 * p
     for m in range(modes):
         before = abs(m - 1)
         a_m, b_m = a[m], b[m]
         a_cos, a_sin = 0.5 * (a[m + 1] + a[before]), 0.5 * (a[before] - a[m + 1])
         if m == 0:
             a_sin = 0.0
-        b_cos = 0.5 * (b[m + 1] + b[before])
         a_v = a_m - a_cos  # v = 1 - cos(phi)
-        b_v = (a_m - near2 * b_m) / (2.0 * p) if close else b_m - b_cos
+        b_v = ring_b_v(m, a, b, near2, p)
         b_cos = b_m - b_v
         p_b_sin = m * a_m
         h_m, h_cos, h_sin = a_m + e2 * b_m, a_cos + e2 * b_cos, a_sin + e2 * p_b_sin / p
