@@ -69,3 +69,56 @@ class StokesSphere:
 def sphere() -> StokesSphere:
     """The flow around a sphere that moves and turns."""
     return StokesSphere()
+
+
+# A made-up resistance beside that of resistive force theory: symmetric, N s/m, N s, N m s.
+_WALLS = np.array(
+    [
+        [1.1, 2e-5, -0.25, 3e-5],
+        [2e-5, 4e-5, -4e-5, -6e-7],
+        [-0.25, -4e-5, 0.6, 1e-4],
+        [3e-5, -6e-7, 1e-4, 6e-6],
+    ]
+)
+_WRENCH_PER_FLOW = np.array([[2.1, -3e-5, 0.9, 4e-4]])
+_PLUG = (0.2, 1e-5, 0.15, -2e-5)
+
+
+@pytest.fixture
+def walled(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A model with made-up walls and a made-up imposed flow, known by its name: its truth is linear algebra."""
+    from spirillum.answer import quantity
+    from spirillum.hydrodynamics import MODELS, SWIMMER_MODELS
+    from spirillum.hydrodynamics.rft import Rft
+    from spirillum.robot.limits import Limit
+
+    class Walled(Rft):
+        name = "walled"
+        title = "made up"
+        placed = True
+
+        def domain(self, batch: Any) -> list[Limit]:
+            gap = np.full(1, batch.placement.gap or 0.0)
+            return [
+                *super().domain(batch),
+                Limit.of("placement.gap", gap, "at most", 5e-3, "mm", "the body has to fit", "gap-too-wide"),
+            ]
+
+        def axial(self, batch: Any) -> np.ndarray:
+            return super().axial(batch) + _WALLS
+
+        def axial_load(self, batch: Any) -> np.ndarray:
+            return (batch.placement.flow or 0.0) * _WRENCH_PER_FLOW
+
+        def mean_flow(self, batch: Any) -> np.ndarray:
+            return np.array([[*_PLUG, 0.7 * (batch.placement.flow or 0.0)]])
+
+        def placement_of(self, batch: Any) -> dict[str, Any]:
+            place = batch.placement
+            ends = place.ends_of(float(batch.channel_length[0]))
+            return {"kind": "in the channel", "gap": quantity(place.gap, "m"), "ends": ends}
+
+    model = Walled()
+    monkeypatch.setitem(SWIMMER_MODELS, model.name, model)
+    monkeypatch.setitem(MODELS, model.name, model)
+    return model

@@ -14,7 +14,20 @@ if TYPE_CHECKING:
 else:
     _Floats = _Complexes = _Truths = np.ndarray
 
-__all__ = ["Amplitudes", "Axial", "Flags", "Matrix6", "Matrix12", "PerRobot", "Samples", "Tensors", "Values", "Vectors"]
+__all__ = [
+    "Amplitudes",
+    "Axial",
+    "AxialLoad",
+    "Flags",
+    "Matrix6",
+    "Matrix12",
+    "MeanFlow",
+    "PerRobot",
+    "Samples",
+    "Tensors",
+    "Values",
+    "Vectors",
+]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
@@ -32,6 +45,10 @@ Flags: TypeAlias = Bool[_Truths, "#n"]
 """One truth value for each robot, or one for all."""
 Axial: TypeAlias = Float[_Floats, "*#n 4 4"]
 """Axial resistance of both parts: rows and columns (F_x, T_x; U_x, Omega_x) of body, then of rotor."""
+AxialLoad: TypeAlias = Float[_Floats, "*#n 4"]
+"""Axial wrench (F_x, T_x) on body, then on rotor."""
+MeanFlow: TypeAlias = Float[_Floats, "*#n 5"]
+"""Mean velocity of the fluid per unit (U_x, Omega_x) of body and of rotor, and with the robot at rest."""
 Matrix6: TypeAlias = Float[_Floats, "*#n 6 6"]
 """Resistance matrix of one rigid part: force then torque against velocity then rotation."""
 Matrix12: TypeAlias = Float[_Floats, "*#n 12 12"]

@@ -46,6 +46,10 @@ REFERENCES: dict[str, str] = {
         "C. Pozrikidis. Boundary Integral and Singularity Methods for Linearized Viscous Flow. "
         "Cambridge University Press, 1992."
     ),
+    "dagan1982": (
+        "Z. Dagan, S. Weinbaum and R. Pfeffer. An infinite-series solution for the creeping motion through an orifice "
+        "of finite length. Journal of Fluid Mechanics 115:505-523, 1982."
+    ),
     "rodenborn2013": (
         "B. Rodenborn, C.-H. Chen, H. L. Swinney, B. Liu and H. P. Zhang. Propulsion of microorganisms by a helical "
         "flagellum. Proceedings of the National Academy of Sciences 110:E338-E347, 2013."

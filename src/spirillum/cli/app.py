@@ -3,30 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
+from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
 from spirillum.cli.options import (
     Accuracy,
     Calibration,
+    Eccentricity,
+    Ends,
     Friction,
+    Gap,
+    ImposedFlow,
     Json,
     Model,
     NoCalibration,
     Output,
+    Phases,
     Picture,
+    Pitch,
     RobotArgument,
     Settings,
+    TailDrop,
     TailRate,
+    Tolerance,
     complete_frames,
     complete_models,
     complete_parts,
     complete_planes,
-    complete_presets,
     complete_resistance_models,
     complete_schemas,
 )
+from spirillum.cli.robot_commands import robot_app
 
 __all__ = ["app"]
 
@@ -38,7 +47,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-robot_app = typer.Typer(no_args_is_help=True, help="Make, show and check robot files.", rich_markup_mode="markdown")
 app.add_typer(robot_app, name="robot")
 
 
@@ -71,6 +79,14 @@ def predict(
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
     accuracy: Accuracy = None,
+    gap: Gap = None,
+    eccentricity: Eccentricity = None,
+    pitch: Pitch = None,
+    tail_drop: TailDrop = None,
+    ends: Ends = None,
+    flow: ImposedFlow = None,
+    tolerance: Tolerance = None,
+    phases: Phases = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -83,13 +99,16 @@ def predict(
 
     with text.patience(model, quiet=json):
         result = answer(
-            _loaded(robot, settings),
+            loaded_robot(robot, settings),
             model=model,
             tail_rate=tail_rate,
             friction=friction,
             calibrated=not no_calibration,
             calibration=calibration,
             accuracy=accuracy,
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            tolerance=tolerance,
+            phases=phases,
         )
     text.show(result.to_dict(), text.prediction, json=json)
 
@@ -107,6 +126,14 @@ def compare_models(
     calibrated: Annotated[bool, typer.Option("--calibrated", help="Apply the robot's calibration factors.")] = False,
     calibration: Calibration = None,
     accuracy: Accuracy = None,
+    gap: Gap = None,
+    eccentricity: Eccentricity = None,
+    pitch: Pitch = None,
+    tail_drop: TailDrop = None,
+    ends: Ends = None,
+    flow: ImposedFlow = None,
+    tolerance: Tolerance = None,
+    phases: Phases = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -119,7 +146,7 @@ def compare_models(
     from spirillum.motion.comparison import compare_models as answer
 
     target = None if output is None else output_target(output, PICTURES, "models.png")
-    loaded = _loaded(robot, settings)
+    loaded = loaded_robot(robot, settings)
     with text.progress_bar(quiet=json) as progress:
         result = answer(
             loaded,
@@ -129,6 +156,9 @@ def compare_models(
             calibrated=calibrated or None,
             calibration=calibration,
             accuracy=accuracy,
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            tolerance=tolerance,
+            phases=phases,
             progress=progress,
         )
     if target is not None:
@@ -149,12 +179,19 @@ def resistance(
     model: Annotated[
         str,
         typer.Option(
-            autocompletion=complete_resistance_models, help="perrin (body only), rft, slender or sbt (axial)."
+            autocompletion=complete_resistance_models, help="perrin (body only), rft, slender, tube or sbt (axial)."
         ),
     ] = "rft",
     about: Annotated[str, typer.Option(help="Reference point: body (its mid-length) or tail-root.")] = "body",
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     accuracy: Accuracy = None,
+    gap: Gap = None,
+    eccentricity: Eccentricity = None,
+    pitch: Pitch = None,
+    tail_drop: TailDrop = None,
+    ends: Ends = None,
+    flow: ImposedFlow = None,
+    tolerance: Tolerance = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -167,12 +204,14 @@ def resistance(
 
     with text.patience(model, quiet=json):
         result = answer(
-            _loaded(robot, settings),
+            loaded_robot(robot, settings),
             part=part,
             model=model,
             about=about,
             phase=text.angle(phase),
             accuracy=accuracy,
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            tolerance=tolerance,
         )
     text.show(result.to_dict(), text.resistance, json=json)
 
@@ -199,7 +238,7 @@ def study(
         from spirillum.studies.run import study as answer
 
         dataset = answer(
-            source, observations=observations, output=output, overrides=_overrides(settings), progress=progress
+            source, observations=observations, output=output, overrides=overrides_from(settings), progress=progress
         )
     text.show(text.study_answer(dataset, output), text.study, json=json)
 
@@ -236,7 +275,7 @@ def simulate(
     target = netcdf_target(output)
     with text.patience(model, quiet=json):
         dataset = answer(
-            _loaded(robot, settings),
+            loaded_robot(robot, settings),
             model=model,
             friction=friction,
             turns=turns,
@@ -292,7 +331,7 @@ def flow(
     from spirillum.motion.flow import flow as answer
 
     flow_text.check_targets(output, volume)
-    loaded = _loaded(robot, settings)
+    loaded = loaded_robot(robot, settings)
     plane_around(loaded, plane, offset, extent, resolution)
     if volume is not None:
         box_around(loaded, extent, volume_resolution)
@@ -314,49 +353,6 @@ def flow(
         for path, dataset in written.items():
             flow_text.write(found, dataset, path)
     text.show(flow_text.flow_answer(found, written), flow_text.flow_table, json=json)
-
-
-@robot_app.command("new")
-def robot_new(
-    path: Annotated[Path, typer.Argument(help="Robot file to write.")],
-    preset: Annotated[
-        str, typer.Option("--from", autocompletion=complete_presets, help="Preset to start from.")
-    ] = "biorob2012-wide",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it is there.")] = False,
-) -> None:
-    """Write a robot file to edit, with every field of a preset.
-
-    Example: `spirillum robot new my-robot.toml --from biorob2012-wide`
-    """
-    from spirillum.robot.load import new_robot_file
-
-    new_robot_file(path, preset, overwrite=force)
-    typer.echo(f"{path} written; see what follows from it with: spirillum robot show {path}")
-
-
-@robot_app.command("show")
-def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
-    """Show a robot's fields and what follows from them: arc length, volumes, weight.
-
-    Example: `spirillum robot show biorob2012-narrow`
-    """
-    from spirillum.cli import text
-
-    text.show(text.robot_answer(_loaded(robot, settings)), text.robot, json=json)
-
-
-@robot_app.command("check")
-def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = False) -> None:
-    """Check a robot file and list every problem at once; exit code 1 if there is one.
-
-    Example: `spirillum robot check biorob2012-wide`
-    """
-    from spirillum.cli import text
-
-    problems, warnings = text.checked(robot, _overrides(settings))
-    text.show(text.check_answer(robot, problems, warnings), text.check, json=json)
-    if problems:
-        raise typer.Exit(1)
 
 
 @app.command()
@@ -384,15 +380,3 @@ def citation(
     from spirillum.citations import citation as answer
 
     typer.echo(answer(model))
-
-
-def _overrides(settings: list[str] | None) -> dict[str, Any]:
-    from spirillum.robot.load import parse_setting
-
-    return dict(parse_setting(text) for text in settings or [])
-
-
-def _loaded(robot: str, settings: list[str] | None) -> Any:
-    from spirillum.robot.load import load
-
-    return load(robot, **_overrides(settings))

@@ -10,15 +10,23 @@ import typer
 __all__ = [
     "Accuracy",
     "Calibration",
+    "Eccentricity",
+    "Ends",
     "Friction",
+    "Gap",
+    "ImposedFlow",
     "Json",
     "Model",
     "NoCalibration",
     "Output",
+    "Phases",
     "Picture",
+    "Pitch",
     "RobotArgument",
     "Settings",
+    "TailDrop",
     "TailRate",
+    "Tolerance",
     "complete_frames",
     "complete_models",
     "complete_parts",
@@ -47,12 +55,12 @@ def _complete_robots(incomplete: str) -> list[str]:
 
 def complete_models(incomplete: str) -> list[str]:
     """Names of models that make a robot swim."""
-    return _starting(("rft", "sbt", "slender"), incomplete)
+    return _starting(("rft", "sbt", "slender", "tube"), incomplete)
 
 
 def complete_resistance_models(incomplete: str) -> list[str]:
     """Names of models that give a resistance matrix."""
-    return _starting(("perrin", "rft", "sbt", "slender"), incomplete)
+    return _starting(("perrin", "rft", "sbt", "slender", "tube"), incomplete)
 
 
 def complete_parts(incomplete: str) -> list[str]:
@@ -79,15 +87,24 @@ def _complete_accuracies(incomplete: str) -> list[str]:
     return _starting(("high", "standard"), incomplete)
 
 
+def _complete_ends(incomplete: str) -> list[str]:
+    return _starting(("closed", "open"), incomplete)
+
+
 def _complete_friction(incomplete: str) -> list[str]:
     return _starting(("body", "none", "paper", "rotor"), incomplete)
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=_complete_robots, help="A preset's name or a TOML file.")]
-Model = Annotated[str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft or slender.")]
+Model = Annotated[
+    str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft, slender or tube.")
+]
 Accuracy = Annotated[
     str | None,
-    typer.Option(autocompletion=_complete_accuracies, help="Of the model slender: standard or high; else the robot's."),
+    typer.Option(
+        autocompletion=_complete_accuracies,
+        help="Of the models slender and tube: standard or high; else the robot's.",
+    ),
 ]
 Friction = Annotated[
     str | None,
@@ -114,4 +131,39 @@ Picture = Annotated[
 TailRate = Annotated[
     str | None,
     typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
+]
+Gap = Annotated[
+    str | None, typer.Option(metavar="LENGTH", help="Model tube: smallest distance of body and glass, such as 0.5mm.")
+]
+Eccentricity = Annotated[
+    float | None,
+    typer.Option(help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1."),
+]
+Pitch = Annotated[
+    str | None, typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is raised, such as 2deg.")
+]
+TailDrop = Annotated[
+    str | None,
+    typer.Option(metavar="LENGTH", help="Model tube: distance by which the tail's axis is lowered (a surrogate)."),
+]
+Ends = Annotated[
+    str | None,
+    typer.Option(
+        autocompletion=_complete_ends,
+        help="Model tube: open or closed ends of the channel; else open if it has a length.",
+    ),
+]
+ImposedFlow = Annotated[
+    str | None,
+    typer.Option(
+        "--flow", metavar="VELOCITY", help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s."
+    ),
+]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's."),
+]
+Phases = Annotated[
+    int | None,
+    typer.Option(help="Model tube: number of phases of the tail to average over, 1 to 64; else the robot's."),
 ]

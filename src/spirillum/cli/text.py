@@ -97,7 +97,22 @@ def prediction(answer: Answer, console: Console) -> None:
     table = grid(title, "quantity", "value", "unit", "SI")
     add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(table)
+    _show_placement(answer["placement"], console)
     _show_error(answer["error_estimate"], console)
+
+
+def _show_placement(placement: Answer, console: Console) -> None:
+    """Where the model places the robot, unless nothing is around it."""
+    if len(placement) == 1:
+        return
+    said = [escape(str(placement["kind"]))]
+    for name, item in placement.items():
+        if isinstance(item, Mapping) and item.get("value") is not None:
+            value, unit = _friendly(item["value"], item["unit"])
+            said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip())
+        elif name != "kind" and isinstance(item, str):
+            said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
+    console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
 
 
 def _show_error(error: Answer, console: Console) -> None:
@@ -122,6 +137,7 @@ def resistance(answer: Answer, console: Console) -> None:
         table.add_row(name, *("-" if entry is None else f"{entry:.4g}" for entry in row))
     console.print(table)
     console.print("N s/m (upper left), N s, N m s (lower right); F = -B V", highlight=False)
+    _show_placement(answer["placement"], console)
 
 
 def robot_answer(robot: Robot) -> dict[str, Any]:

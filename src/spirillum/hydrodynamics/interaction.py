@@ -26,7 +26,7 @@ from spirillum.robot.outline import Outline
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["Resolution", "Solution", "solve"]
+__all__ = ["Resolution", "Solution", "one_thread", "share", "solve", "surface_motion"]
 
 _EIGHT_PI = 8.0 * np.pi
 
@@ -75,11 +75,11 @@ def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int
         wires: wires, and the part with which each moves.
         resolution: how finely.
     """
-    with _one_thread():
+    with one_thread():
         return _solve(solids, wires, resolution)
 
 
-def _one_thread() -> AbstractContextManager[object]:
+def one_thread() -> AbstractContextManager[object]:
     """One thread of linear algebra: matrices of some hundred rows gain little from more, and lose on a busy machine."""
     limited: AbstractContextManager[object] = _thread_pools().limit(limits=1, user_api="blas")
     return limited
@@ -183,7 +183,7 @@ def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Resolution
     return [min(int(count), resolution.most_modes) for count in counts]
 
 
-def _surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
+def surface_motion(panels: Panels, part_of_solid: np.ndarray) -> Amplitudes:
     """Modes 0 and 1 of the surfaces' velocities for each unit twist, complex, (2, 3 nodes, 12)."""
     x, rho, part = panels.x.ravel(), panels.rho.ravel(), part_of_solid[panels.solid_of_node]
     motion = np.zeros((2, panels.size, 3, 12), complex)
@@ -239,7 +239,7 @@ class _Images:
             resolution: how finely.
         """
         sources = Sources.of(wires, system)
-        motion = _surface_motion(panels, parts)
+        motion = surface_motion(panels, parts)
         size = len(system.mobility)
         resistance, mobility = np.zeros((12, 12)), np.zeros((size, size))
         drift, drag = np.zeros((size, 12)), np.zeros((size, 12))
@@ -248,12 +248,12 @@ class _Images:
             image = mode.solve(mode.cross)
             back = (mode.weight * mode.cross).T
             turn = sources.turn(m, image.shape[1])
-            bounce = _share(m) * (back @ image) * np.real(np.conj(turn)[:, None] * turn)
+            bounce = share(m) * (back @ image) * np.real(np.conj(turn)[:, None] * turn)
             mobility += sources.columns(sources.columns(0.5 * (bounce + bounce.T)).T)
             if m < 2:
                 answer = mode.solve(motion[m].real) + 1j * mode.solve(motion[m].imag)
                 dual = (mode.weight * motion[m]).conj().T
-                resistance += np.real(dual @ answer) / _share(m)
+                resistance += np.real(dual @ answer) / share(m)
                 drift += sources.columns(np.real(np.conj(turn)[:, None] * (back @ answer)).T).T
                 drag += sources.columns(np.real((dual @ image) * turn)).T
                 moving.append(answer)
@@ -267,7 +267,7 @@ class _Images:
         for m, (rows, image) in enumerate(self.held):
             rings = self.sources.rings(strengths, image.shape[1])
             turn = self.sources.turn(m, image.shape[1])[:, None]
-            found[m, rows] -= _share(m) * (image @ (turn * rings))
+            found[m, rows] -= share(m) * (image @ (turn * rings))
         return found
 
 
@@ -305,6 +305,6 @@ def _modes(panels: Panels, sources: Sources, counts: Sequence[int]) -> Iterator[
         first = last
 
 
-def _share(m: int) -> float:
+def share(m: int) -> float:
     """Fourier coefficient of a point force over that of a ring of the same total."""
     return (1.0 if m == 0 else 2.0) / (2.0 * np.pi)

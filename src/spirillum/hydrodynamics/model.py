@@ -2,15 +2,18 @@
 
 A model maps the twists of the two rigid parts, body and rotor, to the wrenches that the fluid exerts:
 (F_body, F_rotor) = -R (V_body, V_rotor), twists about the origin in body axes, R symmetric positive
-definite. A new model is one new file with one class.
+definite. Where the fluid is made to flow past the robot, it adds a wrench on the robot at rest:
+(F_body, F_rotor) = -R (V_body, V_rotor) + L. A new model is one new file with one class.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot
+import numpy as np
+
+from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.options import ModelOptions
@@ -38,6 +41,8 @@ class ResistanceModel(ABC):
     """False for a model that solves for the flow, which takes a tenth of a second for each robot."""
     axial_only: ClassVar[bool] = False
     """True where only the entries along and about the motor axis are known; the others are NaN."""
+    placed: ClassVar[bool] = False
+    """Whether the answer depends on where in the channel the robot lies, `batch.placement`."""
 
     def stated_error(self, options: ModelOptions) -> str:
         """What the model leaves out with these options, and what that costs."""
@@ -54,6 +59,10 @@ class ResistanceModel(ABC):
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory's accuracy: where they are broken, the answer carries a warning."""
         return []
+
+    def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
+        """Where the model places robots like the first of the batch: `kind` in words, and quantities."""
+        return {"kind": "unbounded fluid"}
 
     @abstractmethod
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
@@ -83,6 +92,20 @@ class SwimmerModel(ResistanceModel):
         Asked for directly, never cut from a 12x12, so that a million robots fit into memory. Where it depends
         on the tail's phase it is the average over a turn.
         """
+
+    def axial_load(self, batch: RobotBatch) -> AxialLoad:
+        """L: axial wrench (F_x, T_x of body, F_x, T_x of rotor) of an imposed flow on the robot at rest, N and N m.
+
+        Averaged over a turn of the tail, as `axial` is. Zero where no flow is imposed.
+        """
+        return np.zeros((1, 4))
+
+    def mean_flow(self, batch: RobotBatch) -> MeanFlow | None:
+        """Mean velocity of the fluid through the channel, per unit (U_x, Omega_x) of body and of rotor, and at rest.
+
+        Columns 1, m/rad, 1, m/rad, m/s; None for a model without a channel.
+        """
+        return None
 
     @abstractmethod
     def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:

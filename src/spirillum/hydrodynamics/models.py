@@ -8,10 +8,13 @@ from spirillum.hydrodynamics.perrin import Perrin
 from spirillum.hydrodynamics.rft import Rft
 from spirillum.hydrodynamics.sbt import Sbt
 from spirillum.hydrodynamics.slender import Slender
+from spirillum.hydrodynamics.tube import Tube
+from spirillum.robot.fields import field_values
+from spirillum.robot.placement import Placement
 
-__all__ = ["MODELS", "SWIMMER_MODELS", "find_model", "find_swimmer_model"]
+__all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model"]
 
-SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender())}
+SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender(), Tube())}
 """Models that make a robot swim."""
 MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
 """Models that give a resistance matrix."""
@@ -38,3 +41,22 @@ def find_swimmer_model(name: str) -> SwimmerModel:
         hint = did_you_mean(str(name), SWIMMER_MODELS)
         raise InputError(f"model = {name!r}{hint}; allowed: {', '.join(SWIMMER_MODELS)}")
     return SWIMMER_MODELS[name]
+
+
+def check_placement(placement: Placement, *models: ResistanceModel) -> None:
+    """Refuse a placement in the channel that none of the models asks for.
+
+    Raises:
+        InputError: if something is placed and no model computes the walls.
+    """
+    if not placement.is_given or any(model.placed for model in models):
+        return
+    unset = type(placement)()
+    given = next(item for item in field_values(placement) if item.value != getattr(unset, item.path))
+    shown = f"{given.value:g} {given.unit}" if given.unit else str(given.value)
+    names = " or ".join(f"'{model.name}'" for model in models)
+    walled = ", ".join(name for name, model in MODELS.items() if model.placed)
+    raise InputError(
+        f"placement.{given.path} = {shown} with model {names}, which does not compute the channel's walls; allowed: "
+        f"{f'only with model {walled}' if walled else 'no placement'}"
+    )

@@ -14,10 +14,11 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.hydrodynamics.algebra import about_point
 from spirillum.hydrodynamics.model import PARTS, ResistanceModel
-from spirillum.hydrodynamics.models import find_model
+from spirillum.hydrodynamics.models import check_placement, find_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.load import load, with_accuracy
+from spirillum.robot.load import load, with_accuracy, with_tolerance
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 
@@ -40,6 +41,8 @@ class Resistance:
     """Reference point: the body's mid-length, or the tail's root; both on the motor axis."""
     phase: float
     """Phase of the tail, rad."""
+    placement: dict[str, Any]
+    """Where the model places the robot."""
     matrix: Samples
     """B, 6x6, SI; NaN where the model does not know an entry."""
     warnings: tuple[str, ...]
@@ -58,6 +61,7 @@ class Resistance:
             "part": self.part,
             "about": self.about,
             "phase": quantity(self.phase, "rad"),
+            "placement": self.placement,
             "matrix": {**quantity(self.matrix, ""), "unit": _UNITS},
             "references": list(self.references),
         }
@@ -72,16 +76,21 @@ def resistance(
     about: str = "body",
     phase: str | float = 0.0,
     accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
 ) -> Resistance:
     """Resistance matrix of one part alone in the same fluid.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
         part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked); None: the robot, or what the model knows.
-        model: `perrin` (body only), `rft`, `slender`, or `sbt` (axial entries only).
+        model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
-        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
+            `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
+        tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a part that the model cannot do.
@@ -89,6 +98,8 @@ def resistance(
     ready, chosen = load(robot), find_model(model)
     if accuracy is not None:
         ready = with_accuracy(ready, accuracy, model)
+    if tolerance is not None:
+        ready = with_tolerance(ready, tolerance, model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in PARTS:
@@ -98,7 +109,8 @@ def resistance(
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
     angle = parse_option("phase", phase, KINDS["angle"])
-    batch = RobotBatch.of(ready)
+    batch = RobotBatch.of(ready, Placement.of(placement))
+    check_placement(batch.placement, chosen)
     outside = broken(chosen.part_domain(batch, part))
     if outside:
         raise InputError(f"{ready.name} with model '{model}': {outside[0].sentence()}")
@@ -107,7 +119,8 @@ def resistance(
         # A shift along the axis leaves axial entries as they are, and the others of an axial model stay unknown.
         root = np.array([[-float(batch.root[0]), 0.0, 0.0]])
         matrix = matrix if chosen.axial_only else about_point(matrix, root)
-    return Resistance(ready, chosen, part, about, angle, matrix[0], _warnings(ready, chosen, batch, part))
+    place = chosen.placement_of(batch)
+    return Resistance(ready, chosen, part, about, angle, place, matrix[0], _warnings(ready, chosen, batch, part))
 
 
 def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:

@@ -94,6 +94,13 @@ class Panels:
         np.fill_diagonal(derivative, -derivative.sum(axis=1))
         return np.stack([self.rho @ derivative.T, -self.x @ derivative.T], axis=-1).reshape(-1, 2)
 
+    def cardinals(self, places: Samples) -> Samples:
+        """Lagrange polynomials of a panel's nodes at places in [-1, 1] that are no nodes, (places, p)."""
+        nodes, barycentric = _rule(self.order)[:2]
+        terms: Samples = barycentric / (places[:, None] - nodes)
+        values: Samples = terms / terms.sum(axis=1, keepdims=True)
+        return values
+
     def velocities(self, x: Samples, rho: Samples, modes: int, e2: float = 0.0, *, on_nodes: bool = False) -> Samples:
         """8 pi mu times the velocities at rings (x, rho) of unit densities, (modes, 3 rings, 3 nodes)."""
         from spirillum.kernels.panels import layer_blocks

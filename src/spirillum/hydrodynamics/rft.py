@@ -6,10 +6,11 @@ The tail's matrix is constant in a frame that turns with it. Body and tail do no
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.answer import quantity
 from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values, Vectors
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import both_parts, joint_locked, skew, two_parts_axial
@@ -203,6 +204,12 @@ class Rft(SwimmerModel):
                 )
             )
         return cautions
+
+    def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
+        """See `ResistanceModel.placement_of`; the near-floor coefficients know the height of the tail's axis."""
+        if batch.options.rft.coefficients == "brennen-winet":
+            return {"kind": "above a plane floor", "tail_axis_height": quantity(float(axis_height(batch)[0]), "m")}
+        return super().placement_of(batch)
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`; with `model.rft.row4 = "zeroed"` not symmetric, as (15) is printed."""

@@ -7,9 +7,7 @@ turned with the tail.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -18,19 +16,18 @@ from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
 from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.hydrodynamics.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
 from spirillum.hydrodynamics.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
-from spirillum.hydrodynamics.wire import Accuracy, Wire, closest_approach, station_count, stations_along
+from spirillum.hydrodynamics.wire import Accuracy, Wire, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import centreline, coil_spacing
+from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
-from spirillum.robot.outline import Outline, body_outline, solid_outlines
-from spirillum.robot.parts import End, Shape
+from spirillum.robot.outline import Outline
 
 __all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
 
 _MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
-_POINTS_PER_TURN = 200
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
 _SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
 _SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness
@@ -45,110 +42,25 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
 }
 
 
-_NUMBERS = (
-    "body_diameter",
-    "body_length",
-    "fillet",
-    "coupling_diameter",
-    "coupling_length",
-    "coupling_clearance",
-    "wavelength",
-    "amplitude",
-    "tail_length",
-    "wire_diameter",
-    "taper",
-    "hand",
-)
-
-
-class _Geometry(NamedTuple):
-    """Everything that the resistance depends on, but for the viscosity; lengths in m."""
-
-    shape: Shape
-    front: End | None
-    rear: End | None
-    body_diameter: float
-    body_length: float
-    fillet: float
-    coupling_diameter: float
-    coupling_length: float
-    coupling_clearance: float
-    wavelength: float
-    amplitude: float
-    tail_length: float
-    wire_diameter: float
-    taper: float
-    hand: float
-
-    @classmethod
-    def of(cls, batch: RobotBatch, index: int) -> _Geometry:
-        """Of robot number `index`."""
-
-        def number(name: str) -> float:
-            column = getattr(batch, name)
-            return float(column[index if column.size > 1 else 0])
-
-        return cls(
-            **{name: number(name) for name in _NUMBERS},
-            shape=batch.shape,
-            front=batch.front,
-            rear=batch.rear,
-        )
-
-
-def _solids(g: _Geometry) -> Iterator[tuple[str, Outline, int]]:
-    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution."""
-    body = body_outline(g.shape, g.body_diameter, g.body_length, g.fillet, g.front, g.rear)
-    coupling = g.coupling_diameter, g.coupling_length, g.coupling_clearance
-    for name, outline in solid_outlines(body, g.body_length, *coupling).items():
-        yield name, outline, 0 if name == "body" else 1
-
-
-@lru_cache(maxsize=64)
-def _wire(g: _Geometry, spacing: float) -> Wire:
-    """The tail at phase 0."""
-    turns = g.tail_length / g.wavelength
-    count = int(np.ceil(_POINTS_PER_TURN * turns)) + 400
-    share = np.linspace(0.0, 1.0, count)
-    xi = g.tail_length * share
-    if np.isfinite(g.taper):  # denser where the root bends
-        root = np.linspace(0.0, 1.0, 400) ** 2 * min(1.0, 20.0 / g.taper) * g.tail_length
-        xi = np.unique(np.concatenate([xi, root]))
-    columns = (g.wavelength, g.amplitude, g.tail_length, g.taper, g.hand, 0.0)
-    names = ("wavelength", "amplitude", "length", "taper", "hand", "phase")
-    values = {name: np.full(1, value) for name, value in zip(names, columns, strict=True)}
-    line = centreline(xi, root=np.full(1, 0.5 * g.body_length + g.coupling_length), **values)
-    return stations_along(line.position, 0.5 * g.wire_diameter, spacing)
-
-
 def solids_of(batch: RobotBatch, index: int) -> tuple[tuple[str, Outline, int], ...]:
     """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution of robot number `index`."""
-    return tuple(_solids(_Geometry.of(batch, index)))
+    return tuple(solids_of_geometry(Geometry.of(batch, index)))
 
 
 def tail_wire(batch: RobotBatch, index: int) -> Wire:
     """The tail of robot number `index` as a wire, at phase 0."""
-    return _wire(_Geometry.of(batch, index), 1.0)
+    return wire_of_geometry(Geometry.of(batch, index), 1.0)
 
 
 def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
     """Tractions on robot number `index` for all unit twists, at phase 0."""
-    return _solved(_Geometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
+    return _solved(Geometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
 
 
-def _solved(g: _Geometry, part: str, resolution: Resolution) -> Solution:
-    solids = [(outline, moves) for name, outline, moves in _solids(g) if name in _PIECES[part]]
-    wires = [(_wire(g, resolution.spacing), 1)] if "tail" in _PIECES[part] else []
+def _solved(g: Geometry, part: str, resolution: Resolution) -> Solution:
+    solids = [(outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part]]
+    wires = [(wire_of_geometry(g, resolution.spacing), 1)] if "tail" in PIECES[part] else []
     return solve(solids, wires, resolution)
-
-
-_PIECES = {
-    "body": ("body",),
-    "coupling": ("coupling",),
-    "tail": ("tail",),
-    "rotor": ("coupling", "tail"),
-    "robot": ("body", "coupling", "tail"),
-}
 
 
 def _slimness(batch: RobotBatch) -> list[Limit]:
@@ -170,18 +82,18 @@ def _apart(batch: RobotBatch, fit: Flags) -> Limit:
     fit = np.broadcast_to(fit & batch.known & all_hold(assembly_limits(batch)), (batch.size,))
     nearest = np.full(batch.size, np.inf)
     for index in np.flatnonzero(fit):
-        nearest[index] = _closest(_Geometry.of(batch, int(index)))
+        nearest[index] = _closest(Geometry.of(batch, int(index)))
     why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
     return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
 
 
 @lru_cache(maxsize=4096)
-def _closest(g: _Geometry) -> float:
-    return closest_approach(_wire(g, 1.0))
+def _closest(g: Geometry) -> float:
+    return closest_approach(wire_of_geometry(g, 1.0))
 
 
 @lru_cache(maxsize=4096)
-def _matrix(g: _Geometry, part: str, resolution: Resolution) -> Samples:
+def _matrix(g: Geometry, part: str, resolution: Resolution) -> Samples:
     """12x12 of a part at phase 0 and viscosity 1."""
     matrix = _solved(g, part, resolution).matrix
     matrix.flags.writeable = False
@@ -336,5 +248,5 @@ class Slender(SwimmerModel):
         found = np.full((batch.size, 12, 12), np.nan)
         for index in np.flatnonzero(answerable):
             viscosity = float(batch.viscosity[index if batch.viscosity.size > 1 else 0])
-            found[index] = viscosity * _matrix(_Geometry.of(batch, int(index)), part, resolution)
+            found[index] = viscosity * _matrix(Geometry.of(batch, int(index)), part, resolution)
         return found

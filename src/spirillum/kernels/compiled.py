@@ -14,9 +14,9 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 def _compile(function: _F, **options: Any) -> _F:
     try:
-        kernel: _F = numba.njit(cache=True, error_model="numpy", **options)(function)
+        kernel: _F = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     except RuntimeError:  # no folder to keep the machine code in: it is compiled again in every process
-        kernel = numba.njit(error_model="numpy", **options)(function)
+        kernel = numba.njit(nogil=True, error_model="numpy", **options)(function)
     return kernel
 
 

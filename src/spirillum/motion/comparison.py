@@ -11,11 +11,12 @@ from typing import Any
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.hydrodynamics import SWIMMER_MODELS, find_swimmer_model
+from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.swimming import Swimming, friction_reading
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.load import load, with_accuracy, with_calibration
+from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 
 __all__ = ["ModelComparison", "compare_models", "estimated_error", "uneven_models"]
@@ -112,7 +113,14 @@ def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Se
         calibrated: those of them that take calibration factors.
     """
     found = []
-    bare = [name for name in models if name not in calibrated]
+    walled = [name for name in models if find_swimmer_model(name).placed]
+    open_ = [name for name in models if name not in walled]
+    if walled and open_ and any(robot.channel is not None for robot in robots):
+        found.append(
+            f"the channel's walls are computed by {', '.join(walled)} and not by {', '.join(open_)}: the differences "
+            "contain them"
+        )
+    bare = [name for name in open_ if name not in calibrated]
     if calibrated and bare:
         found.append(
             f"calibration factors stand for the walls with {', '.join(calibrated)} and not with {', '.join(bare)}: the "
@@ -142,6 +150,9 @@ def compare_models(
     calibrated: bool | None = None,
     calibration: str | Path | None = None,
     accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> ModelComparison:
     """Predict the steady swimming of one robot with several models.
@@ -157,7 +168,10 @@ def compare_models(
         calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
             factors that stand for walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.
-        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.
+        tolerance: of the model `tube`, relative; None: the robot's own.
+        phases: of the model `tube`, number of phases of the tail; None: the robot's own.
         progress: told what is being computed, how many models are done, and of how many.
 
     Raises:
@@ -169,15 +183,28 @@ def compare_models(
         ready = with_calibration(ready, calibration)
     if accuracy is not None:
         ready = with_accuracy(ready, accuracy)
+    if tolerance is not None:
+        ready = with_tolerance(ready, tolerance)
+    if phases is not None:
+        ready = with_phases(ready, phases)
     reading = friction_reading(friction or ready.friction.reading)
     names = _chosen(models)
+    place = Placement.of(placement)
+    check_placement(place, *(find_swimmer_model(name) for name in names))
     predictions: dict[str, Prediction] = {}
     refusals: dict[str, str] = {}
     for done, name in enumerate(names):
         if progress is not None:
             progress(f"model {name}", done, len(names))
         try:
-            predictions[name] = predict(ready, model=name, tail_rate=tail_rate, friction=reading, calibrated=factors)
+            predictions[name] = predict(
+                ready,
+                model=name,
+                tail_rate=tail_rate,
+                friction=reading,
+                calibrated=factors,
+                placement=place if find_swimmer_model(name).placed else None,
+            )
         except InputError as error:
             refusals[name] = str(error)
     if not predictions:

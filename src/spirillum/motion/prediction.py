@@ -12,8 +12,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
-from spirillum.hydrodynamics.coefficients import axis_height
+from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.swimming import (
     Swimming,
     calibrated_balance,
@@ -25,7 +24,8 @@ from spirillum.motion.swimming import (
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
-from spirillum.robot.load import load, with_accuracy, with_calibration
+from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option, show
 
@@ -49,6 +49,8 @@ class Prediction:
     """Reading of the friction."""
     calibrated: bool
     """Whether calibration factors were applied."""
+    batch: RobotBatch = field(repr=False)
+    """The robot in its place, as a batch of one."""
     swimming: Swimming = field(repr=False)
     """The quantities, as arrays of length one."""
     error_estimate: float
@@ -70,10 +72,7 @@ class Prediction:
     @cached_property
     def placement(self) -> dict[str, Any]:
         """Where the model places the robot."""
-        if self.model.name == "rft" and self.robot.model.rft.coefficients == "brennen-winet":
-            height = float(axis_height(RobotBatch.of(self.robot))[0])
-            return {"kind": "above a plane floor", "tail_axis_height": quantity(height, "m")}
-        return {"kind": "unbounded fluid"}
+        return self.model.placement_of(self.batch)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum predict --json`."""
@@ -111,26 +110,33 @@ def predict(
     calibrated: bool = True,
     calibration: str | Path | None = None,
     accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `sbt`, `rft` or `slender`.
+        model: `sbt`, `rft`, `slender` or `tube`.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
             the effective friction from (18).
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
-        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
+            `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
+        tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
+        phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
     """
-    ready, chosen, batch = prepared(robot, model, calibration, accuracy)
+    ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
     reading = friction_reading(friction or ready.friction.reading)
-    rate = _rate(tail_rate)
+    rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
 
@@ -150,7 +156,7 @@ def predict(
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
     error = np.nan if check is None else float(speed_difference(answer(check), result)[0])
-    return Prediction(ready, chosen, reading, applied, result, error, tuple(warnings))
+    return Prediction(ready, chosen, reading, applied, batch, result, error, tuple(warnings))
 
 
 def prepared(
@@ -158,8 +164,11 @@ def prepared(
     model: str,
     calibration: str | Path | None = None,
     accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
-    """A loaded robot with its model and batch, inside the model's domain.
+    """A loaded robot with its model and batch, in its place and inside the model's domain; arguments as `predict`.
 
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
@@ -169,28 +178,33 @@ def prepared(
         ready = with_calibration(ready, calibration)
     if accuracy is not None:
         ready = with_accuracy(ready, accuracy, model)
+    if tolerance is not None:
+        ready = with_tolerance(ready, tolerance, model)
+    if phases is not None:
+        ready = with_phases(ready, phases, model)
     chosen = find_swimmer_model(model)
-    return ready, chosen, checked_batch(ready, chosen)
+    return ready, chosen, checked_batch(ready, chosen, Placement.of(placement))
 
 
-def checked_batch(robot: Robot, model: SwimmerModel) -> RobotBatch:
-    """The robot as a batch of one.
+def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:
+    """The robot in its place, as a batch of one.
 
     Raises:
-        InputError: if it is outside the model's domain.
+        InputError: if it is outside the model's domain, or placed for a model that does not compute the walls.
     """
-    batch = RobotBatch.of(robot)
+    batch = RobotBatch.of(robot, placement)
+    check_placement(batch.placement, model)
     outside = broken(requirements(batch, model))
     if outside:
         raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}")
     return batch
 
 
-def _rate(value: str | float | None) -> float | None:
+def _rate(value: str | float | None, placement: Placement) -> float | None:
     if value is None:
         return None
     rate = parse_option("tail-rate", value, KINDS["rate"])
-    if rate == 0:
+    if rate == 0 and not placement.flow:
         raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
     return rate
 
@@ -198,8 +212,18 @@ def _rate(value: str | float | None) -> float | None:
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
     """What has to hold for the answer to be accurate; each broken one is a warning."""
     inertia = "inertia is neglected (Stokes flow)"
+    flow = abs(batch.placement.flow or 0.0)
     return [
         *model.cautions(batch),
+        Limit.of(
+            "Reynolds number (imposed flow, body diameter)",
+            batch.density * flow * batch.body_diameter / batch.viscosity,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "flow-reynolds-number",
+        ),
         Limit.of(
             "Reynolds number (body diameter)",
             result.reynolds_number,
@@ -240,7 +264,12 @@ def _why_not(
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[str]:
-    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry."""
+    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
+
+    A model that computes the walls takes none.
+    """
+    if find_swimmer_model(model).placed:
+        return []
     entry = robot.calibration.get(model)
     if entry is None:
         walls = "" if robot.channel is None else ", and nothing stands for the channel's walls"

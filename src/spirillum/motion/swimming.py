@@ -7,14 +7,15 @@ from typing import cast, get_args
 
 import numpy as np
 
-from spirillum.arrays import Flags, PerRobot
+from spirillum.arrays import Flags, MeanFlow, PerRobot
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.motion.balance import FrictionTorques, TorqueBalance, force_free, friction_torques, rates_per_torque
-from spirillum.motion.motor import battery_voltage, run_time, steady_current
+from spirillum.motion.balance import TorqueBalance, force_free
+from spirillum.motion.drives import DriveState, at_rate, driven, one_piece
+from spirillum.motion.motor import battery_voltage, run_time
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 
 __all__ = ["Swimming", "calibrated_balance", "friction_reading", "requirements", "speed_difference", "swim"]
@@ -82,7 +83,13 @@ class Swimming:
     friction_power: PerRobot = field(
         metadata={"unit": "W", "meaning": "power lost to friction", "source": "eqs (18), (19)"}
     )
-    dissipated_power: PerRobot = field(metadata={"unit": "W", "meaning": "viscous dissipation", "source": "eq. (9)"})
+    dissipated_power: PerRobot = field(
+        metadata={
+            "unit": "W",
+            "meaning": "viscous dissipation (in an imposed flow: what the robot adds to it)",
+            "source": "eq. (9)",
+        }
+    )
     hydrodynamic_efficiency: PerRobot = field(
         metadata={
             "unit": "1",
@@ -102,6 +109,13 @@ class Swimming:
     )
     battery_run_time: PerRobot = field(
         metadata={"unit": "s", "meaning": "time until the rated charge is spent", "source": "Table II"}
+    )
+    plug_velocity: PerRobot = field(
+        metadata={
+            "unit": "m/s",
+            "meaning": "mean velocity of the fluid through the channel",
+            "source": "models with a channel",
+        }
     )
     valid: Flags = field(
         metadata={
@@ -126,7 +140,7 @@ def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bo
         r = np.array(np.broadcast_to(r, (np.broadcast_shapes(r.shape[:1], factors.body_drag.shape)[0], 4, 4)))
         r[:, 0, 0] += (factors.body_drag - 1.0) * drag
         r[:, 1, 1] += (factors.body_rotation - 1.0) * rotation
-    return force_free(r)
+    return force_free(r, model.axial_load(batch))
 
 
 def swim(
@@ -196,18 +210,6 @@ def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
     return np.broadcast_to(array, (batch.size,))
 
 
-@dataclass(frozen=True)
-class _State:
-    """Rates and what the motor does to keep them."""
-
-    body_rate: PerRobot
-    tail_rate: PerRobot
-    current: PerRobot
-    effective: PerRobot
-    torques: FrictionTorques
-    residual: PerRobot
-
-
 def _swim_block(
     batch: RobotBatch,
     model: SwimmerModel,
@@ -222,121 +224,17 @@ def _swim_block(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         balance = calibrated_balance(batch, model, calibrated=calibrated)
         if batch.joint == "fixed":
-            state = _one_piece(batch, balance, tail_rate)
+            state = one_piece(batch, balance, tail_rate)
         elif free:
-            state = _driven(batch, balance, friction)
+            state = driven(batch, balance, friction)
         else:
-            state = _at_rate(batch, balance, tail_rate, motor_rate, friction)
-        return _answer(batch, balance, state, valid)
+            state = at_rate(batch, balance, tail_rate, motor_rate, friction)
+        return _answer(batch, balance, state, valid, model.mean_flow(batch))
 
 
-def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
-    """(B_eff or B, B_m); unset, B_eff is the rotor's own B_m alone and the wall's B is zero."""
-    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
-    if friction == "none":
-        return np.zeros(1), rotor
-    unset = np.isnan(batch.effective_friction)
-    return np.where(unset, 0.0 if friction == "body" else rotor, batch.effective_friction), rotor
-
-
-def _driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> _State:
-    """Motion under the robots' own drive: rates are linear in the joint torque, the motor closes it."""
-    effective, rotor = _joint_friction(batch, friction)
-    t = friction_torques(friction, effective, rotor)
-    none = np.full(1, np.nan)
-    if batch.drive == "rate":
-        body_rate, tail = _rates_by_torque_sum(s, t, batch.drive_rate, none)
-        return _State(body_rate, tail, none, effective, t, none)
-    body_per_torque, tail_per_torque = rates_per_torque(s, t)
-    if batch.drive == "torque":
-        torque, current = batch.drive_torque, none
-    elif batch.drive == "dc-motor" and batch.electrics is not None:
-        motor = batch.electrics
-        slip = tail_per_torque - body_per_torque
-        per_current = motor.back_emf_constant * motor.torque_constant * slip
-        current = motor.polarity * steady_current(motor, np.zeros(1), per_current)
-        torque = motor.torque_constant * current
-    else:
-        raise InputError("drive is missing; allowed: a [drive] table, or a tail rate (--tail-rate)")
-    # Reading `paper` pushes the tail backwards once B_eff exceeds E_x: no steady motion of that kind.
-    tail_per_torque = np.where(tail_per_torque > 0, tail_per_torque, np.nan)
-    return _State(body_per_torque * torque, tail_per_torque * torque, current, effective, t, none)
-
-
-def _at_rate(
-    batch: RobotBatch,
-    s: TorqueBalance,
-    tail_rate: PerRobot,
-    motor_rate: PerRobot,
-    friction: FrictionReading,
-) -> _State:
-    """Motion at prescribed rates; with a DC-motor the friction follows from (17) and (18)."""
-    effective, rotor = _joint_friction(batch, friction)
-    none = np.full(1, np.nan)
-    motor = batch.electrics
-    if batch.drive != "dc-motor" or motor is None:
-        t = friction_torques(friction, effective, rotor)
-        body_rate, tail = _rates_by_torque_sum(s, t, tail_rate, motor_rate)
-        return _State(body_rate, tail, none, effective, t, none)
-    if friction == "paper":
-        return _at_rate_paper(s, motor, tail_rate, motor_rate)
-    wall = effective if friction == "body" else np.zeros(1)
-    # What acts inside the joint cancels in the sum of both torques and does not change the motion.
-    body_rate, tail = _rates_by_torque_sum(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
-    slip = np.where(np.isnan(motor_rate), tail - body_rate, motor_rate)
-    current = _current_at(motor, slip)
-    spare = motor.torque_constant * current - s.rotor_load(body_rate, tail)
-    if friction == "rotor":
-        inferred = spare / slip
-        t = friction_torques("rotor", inferred, rotor)
-        return _State(body_rate, tail, current, inferred, t, none)
-    t = friction_torques(friction, effective, rotor)
-    residual = spare - (rotor * slip if friction == "body" else 0.0)
-    return _State(body_rate, tail, current, effective, t, residual)
-
-
-def _rates_by_torque_sum(
-    s: TorqueBalance, t: FrictionTorques, tail_rate: PerRobot, motor_rate: PerRobot
-) -> tuple[PerRobot, PerRobot]:
-    """(Omega, omega) from the sum of both torque rows, in which the joint torque cancels."""
-    on_body, on_tail = (s.bb + s.rb) + (t.bb + t.rb), (s.br + s.rr) + (t.br + t.rr)
-    on_body = np.where(on_body > 0, on_body, np.nan)  # `paper` beyond E_x: as in `_driven`
-    tail = np.where(np.isnan(tail_rate), motor_rate * on_body / (on_body + on_tail), tail_rate)
-    return -on_tail / on_body * tail, tail
-
-
-def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, motor_rate: PerRobot) -> _State:
-    """Reading `paper`: the body row holds -K_m I alone, so the current decides the body's rate."""
-    k, k_b = motor.torque_constant, motor.back_emf_constant
-    observed = ~np.isnan(motor_rate)
-    emf = k_b * motor.polarity * np.where(observed, motor_rate, tail_rate * (1.0 + s.br / s.bb))
-    current = motor.polarity * steady_current(motor, emf, np.where(observed, 0.0, k_b * k / s.bb))
-    from_motor = -(k * current + s.br * motor_rate) / (s.bb + s.br)
-    body_rate = np.where(np.isnan(tail_rate), from_motor, -(k * current + s.br * tail_rate) / s.bb)
-    tail = np.where(np.isnan(tail_rate), body_rate + motor_rate, tail_rate)
-    slip = np.where(observed, motor_rate, tail - body_rate)
-    tail = np.where(tail * slip > 0, tail, np.nan)  # B_eff beyond E_x pushes the tail backwards: as in `_driven`
-    inferred = (k * current - s.rotor_load(body_rate, tail)) / slip
-    t = friction_torques("paper", inferred, motor.rotor_friction)
-    return _State(body_rate, tail, current, inferred, t, np.full(1, np.nan))
-
-
-def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
-    """Signed current at a given motor rate, from (17)."""
-    return motor.polarity * steady_current(motor, motor.back_emf_constant * motor.polarity * motor_rate, np.zeros(1))
-
-
-def _one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> _State:
-    """Fixed joint: body and tail turn together under an external torque or rate."""
-    load = s.bb + s.br + s.rb + s.rr
-    own = batch.drive_rate if batch.drive == "rate" else batch.drive_torque / load
-    rate = np.where(np.isnan(tail_rate), own, tail_rate)
-    zero = np.zeros(1)
-    none = np.full(1, np.nan)
-    return _State(rate, rate, none, none, FrictionTorques(zero, zero, zero, zero, zero), none)
-
-
-def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) -> Swimming:
+def _answer(
+    batch: RobotBatch, s: TorqueBalance, state: DriveState, valid: Flags, mean_flow: MeanFlow | None
+) -> Swimming:
     body_rate, tail_rate = state.body_rate, state.tail_rate
     speed = s.speed(body_rate, tail_rate)
     slip = tail_rate - body_rate
@@ -357,7 +255,7 @@ def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) ->
         lasting = run_time(motor, current)
     values = {
         "forward_velocity": speed,
-        "advance_per_radian": speed / tail_rate,
+        "advance_per_radian": np.where(tail_rate == 0, np.nan, speed / tail_rate),
         "tail_rotation_rate": tail_rate,
         "body_rotation_rate": body_rate,
         "motor_rotation_rate": slip,
@@ -375,6 +273,7 @@ def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) ->
         "reynolds_number": batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity,
         "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
         "battery_run_time": lasting,
+        "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
     }
     # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
     moving = valid & np.isfinite(speed) & ~np.isinf(state.effective)
@@ -386,3 +285,9 @@ def _answer(batch: RobotBatch, s: TorqueBalance, state: _State, valid: Flags) ->
         **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
         valid=np.array(np.broadcast_to(moving, (size,))),
     )
+
+
+def _plug_velocity(mean_flow: MeanFlow, speed: PerRobot, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    """Mean velocity of the fluid through the channel, m/s, as `SwimmerModel.mean_flow` gives it per unit motion."""
+    per_speed = mean_flow[..., 0] + mean_flow[..., 2]
+    return per_speed * speed + mean_flow[..., 1] * body_rate + mean_flow[..., 3] * tail_rate + mean_flow[..., 4]

@@ -24,7 +24,7 @@ from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.swimming import calibrated_balance
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +83,16 @@ class MotorTransient:
 
 
 def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
-    """The robot's linear answer to a joint torque, for the prediction's model, friction and calibration."""
+    """The robot's linear answer to a joint torque, for the prediction's model, friction and calibration.
+
+    Raises:
+        InputError: for robots in an imposed flow, whose rates are not proportional to the torque.
+    """
+    if batch.placement.flow:
+        raise InputError(
+            f"placement.flow = {show(batch.placement.flow, 'mm/s')}: a run in time starts from rest; allowed: no flow, "
+            "or `predict` for the steady motion"
+        )
     s = calibrated_balance(batch, prediction.model, calibrated=prediction.calibrated)
     rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
     t = friction_torques(prediction.friction, np.array([prediction.effective_friction]), rotor)
@@ -192,7 +201,7 @@ def simulate(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
-        model: `sbt`, `rft` or `slender`.
+        model: `sbt`, `rft`, `slender` or `tube`.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
@@ -201,7 +210,7 @@ def simulate(
         on: times (start, stop) between which the remote switches the motor on, each with its unit (``"2 s"``) or a
             float in s; None: on throughout.
         samples_per_turn: samples of the output per steady turn of the tail.
-        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
 
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
@@ -213,7 +222,7 @@ def simulate(
     prediction = predict(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, accuracy=accuracy
     )
-    batch = RobotBatch.of(prediction.robot)
+    batch = prediction.batch
     if batch.drive != "dc-motor" or batch.electrics is None:
         raise InputError(f"drive.kind = '{batch.drive}'; allowed: 'dc-motor', which alone has a transient")
     if prediction.tail_rotation_rate == 0:

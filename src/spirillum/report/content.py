@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from spirillum.citations import REFERENCES
 from spirillum.hydrodynamics import SWIMMER_MODELS
-from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions
+from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,6 +80,7 @@ def _options(table: Mapping[str, Any]) -> ModelOptions:
     return ModelOptions.model_construct(
         rft=RftOptions.model_construct(**table.get("rft", {})),
         slender=SlenderOptions.model_construct(**table.get("slender", {})),
+        tube=TubeOptions.model_construct(**table.get("tube", {})),
     )
 
 

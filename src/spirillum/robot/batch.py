@@ -15,6 +15,7 @@ from spirillum.robot import geometry
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.parts import End, Shape
+from spirillum.robot.placement import Placement
 
 if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
@@ -98,7 +99,8 @@ class RobotBatch:
     """Robots as a struct of arrays, SI units.
 
     Every array has one axis: as long as there are robots, or of length 1 where all robots share the value.
-    What is not a number (outline of the body, model options, drive, friction reading) is shared by the batch.
+    What is not a number (outline of the body, model options, drive, friction reading) is shared by the batch, and so
+    is the placement.
     An unset number is NaN, an absent channel has infinite size, a tail without taper an infinite `taper`.
     """
 
@@ -131,10 +133,15 @@ class RobotBatch:
     drive: Literal["dc-motor", "rate", "torque"] | None
     joint: Literal["revolute", "fixed"]
     friction: FrictionReading
+    placement: Placement
 
     @classmethod
-    def of(cls, robots: Robot | Sequence[Robot]) -> RobotBatch:
+    def of(cls, robots: Robot | Sequence[Robot], placement: Placement | None = None) -> RobotBatch:
         """Stack robots that differ in numbers only.
+
+        Args:
+            robots: one robot, or several.
+            placement: where in their channels they lie, all in the same way; None: nothing is known.
 
         Raises:
             InputError: if they differ in anything that a batch shares; use `batches` for mixed lists.
@@ -159,7 +166,12 @@ class RobotBatch:
             drive=first.drive.kind if first.drive else None,
             joint=first.drive.joint if first.drive else "revolute",
             friction=first.friction.reading,
+            placement=placement or Placement(),
         )
+
+    def placed(self, placement: Placement) -> RobotBatch:
+        """Return the same robots placed otherwise."""
+        return replace(self, placement=placement)
 
     def with_values(self, values: Mapping[str, np.ndarray | Sequence[float] | float]) -> RobotBatch:
         """Return the batch with columns replaced, SI.
@@ -319,9 +331,9 @@ def _shared(robot: Robot) -> tuple[object, ...]:
     )
 
 
-def batches(robots: Sequence[Robot]) -> list[tuple[list[int], RobotBatch]]:
+def batches(robots: Sequence[Robot], placement: Placement | None = None) -> list[tuple[list[int], RobotBatch]]:
     """Group a mixed list of robots into batches; each comes with the positions of its robots in the list."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, robot in enumerate(robots):
         groups.setdefault(_shared(robot), []).append(index)
-    return [(indices, RobotBatch.of([robots[i] for i in indices])) for indices in groups.values()]
+    return [(indices, RobotBatch.of([robots[i] for i in indices], placement)) for indices in groups.values()]

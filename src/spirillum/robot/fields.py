@@ -23,6 +23,7 @@ __all__ = [
     "Length",
     "LengthOrZero",
     "Mass",
+    "Pitch",
     "Rate",
     "Resistance",
     "ResistancePerCurrent",
@@ -31,6 +32,7 @@ __all__ = [
     "Text",
     "Torque",
     "TorqueConstant",
+    "Velocity",
     "Viscosity",
     "Voltage",
     "field_values",
@@ -118,6 +120,8 @@ Density = Annotated[float, *_quantity("density")]
 Viscosity = Annotated[float, *_quantity("viscosity")]
 Rate = Annotated[float, *_quantity("rate")]
 Torque = Annotated[float, *_quantity("torque")]
+Pitch = Annotated[float, *_quantity("pitch")]
+Velocity = Annotated[float, *_quantity("velocity")]
 RotaryFriction = Annotated[float, *_quantity("rotary friction")]
 Voltage = Annotated[float, *_quantity("voltage")]
 Resistance = Annotated[float, *_quantity("resistance")]

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeVar
-
-from pydantic import BaseModel, ValidationError
+from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import parse_toml, read_toml, write_text
-from spirillum.robot.options import CalibrationFile, SlenderOptions
+from spirillum.robot.fields import Section
+from spirillum.robot.options import CalibrationFile
+from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 
 __all__ = [
@@ -24,10 +24,11 @@ __all__ = [
     "parse_setting",
     "preset_names",
     "preset_text",
-    "problems_in",
     "raw_table",
     "with_accuracy",
     "with_calibration",
+    "with_phases",
+    "with_tolerance",
 ]
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -163,7 +164,7 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
 
 
 def with_accuracy(robot: Robot, accuracy: str, model: str = "slender") -> Robot:
-    """The robot with another accuracy of the model `slender`.
+    """The robot with another form of the wire, `model.slender.accuracy`, which the model `tube` reads too.
 
     Args:
         robot: a checked robot.
@@ -173,12 +174,48 @@ def with_accuracy(robot: Robot, accuracy: str, model: str = "slender") -> Robot:
     Raises:
         InputError: for any other accuracy, or a model in closed form, which has none.
     """
-    if model != "slender":
-        raise InputError(f"accuracy = {accuracy!r} with model {model!r}; allowed: only with model 'slender'")
-    checked = problems_in(SlenderOptions, {"accuracy": accuracy})
+    return _with_option(robot, "slender.accuracy", accuracy, "standard, high", model, ("slender", "tube"))
+
+
+def with_tolerance(robot: Robot, tolerance: float, model: str = "tube") -> Robot:
+    """The robot with another tolerance of the model `tube`.
+
+    Args:
+        robot: a checked robot.
+        tolerance: relative tolerance of the speed per turn, 0.0001 to 0.05.
+        model: the model that is asked.
+
+    Raises:
+        InputError: for any other tolerance, or another model.
+    """
+    return _with_option(robot, "tube.tolerance", tolerance, "0.0001 to 0.05", model, ("tube",))
+
+
+def with_phases(robot: Robot, phases: int, model: str = "tube") -> Robot:
+    """The robot with another number of phases over which the model `tube` averages.
+
+    Args:
+        robot: a checked robot.
+        phases: number of phases of the tail, 1 to 64.
+        model: the model that is asked.
+
+    Raises:
+        InputError: for any other number, or another model.
+    """
+    return _with_option(robot, "tube.phases", phases, "a whole number from 1 to 64", model, ("tube",))
+
+
+def _with_option(robot: Robot, path: str, value: object, allowed: str, model: str, models: tuple[str, ...]) -> Robot:
+    """The robot with one option of a model replaced; `models` are those that read it."""
+    section, name = path.split(".")
+    if model not in models:
+        readers = " or ".join(f"'{reader}'" for reader in models)
+        raise InputError(f"{name} = {value!r} with model {model!r}; allowed: only with model {readers}")
+    own: Section = getattr(robot.model, section)
+    checked = problems_in(type(own), {**own.model_dump(), name: value})
     if isinstance(checked, list):
-        raise InputError(f"accuracy = {accuracy!r}; allowed: standard, high")
-    return robot.model_copy(update={"model": robot.model.model_copy(update={"slender": checked})})
+        raise InputError(f"{name} = {value!r}; allowed: {allowed}")
+    return robot.model_copy(update={"model": robot.model.model_copy(update={section: checked})})
 
 
 def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:
@@ -271,68 +308,3 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> R
         return problems
     more = f" (and {len(problems) - 1} more: `spirillum robot check` lists them)" if len(problems) > 1 else ""
     raise InputError(f"{source}: {problems[0]}{more}", [f"{source}: {problem}" for problem in problems])
-
-
-_M = TypeVar("_M", bound=BaseModel)
-
-
-def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
-    """Check a raw table; return the model, or every problem as a sentence."""
-    try:
-        return model.model_validate(table)
-    except ValidationError as error:
-        sentences: list[str] = []
-        for problem in error.errors(include_url=False):
-            sentences += _sentences(model, problem)
-        return list(dict.fromkeys(sentences))
-    except RecursionError:
-        return ["its tables are nested too deeply; see `spirillum schema robot`"]
-
-
-def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[str]:
-    """Our sentences for one of pydantic's findings."""
-    kind, context = problem["type"], problem.get("ctx", {})
-    names = [str(name) for name in problem["loc"] if name != "[key]"]
-    if kind == "assembly":
-        return str(context["sentences"]).split("\n")
-    field = ".".join(names)
-    if kind == "quantity":
-        return [f"{field} {context['sentence']}"]
-    if kind == "missing":
-        return [f"{field} is missing; it has to be given"]
-    if kind == "extra_forbidden":
-        allowed = list(_fields_at(model, names[:-1]))
-        hint = did_you_mean(names[-1][:60], allowed)
-        return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
-    shown = repr(problem.get("input"))
-    shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
-    hint = ""
-    if kind == "literal_error":
-        allowed_words = str(context["expected"])
-        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", allowed_words))
-    elif kind == "value_error":
-        allowed_words = str(context["error"])
-    elif kind == "model_type":
-        allowed_words = f"a [{field}] table"
-    else:
-        allowed_words = str(problem["msg"]).removeprefix("Input should be ")
-    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {allowed_words}"]
-
-
-def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
-    """Field names of the section that a location leads to."""
-    for name in names:
-        if name in model.model_fields:
-            found = _section(model.model_fields[name].annotation)
-            model = found or model
-    return tuple(model.model_fields)
-
-
-def _section(annotation: Any) -> type[BaseModel] | None:
-    """The section class inside an annotation such as ``Channel | Literal['none']``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for part in getattr(annotation, "__args__", ()):
-        if (found := _section(part)) is not None:
-            return found
-    return None

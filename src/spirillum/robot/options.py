@@ -18,6 +18,7 @@ __all__ = [
     "RftOptions",
     "SbtOptions",
     "SlenderOptions",
+    "TubeOptions",
 ]
 
 
@@ -78,6 +79,15 @@ class SlenderOptions(Section):
     """Form of the wire and resolution of the surfaces."""
 
 
+class TubeOptions(Section):
+    """Options of the robot in its tube; the form of the wire is that of `SlenderOptions`."""
+
+    tolerance: Annotated[float, Field(strict=True, ge=1e-4, le=0.05, allow_inf_nan=False)] = 0.005
+    """Relative tolerance of the speed per turn, from which the resolution follows."""
+    phases: Annotated[int, Field(strict=True, ge=1, le=64)] = 2
+    """Number of phases of the tail, evenly over a turn, that an answer is averaged over."""
+
+
 class ModelOptions(Section):
     """Options of the hydrodynamic models."""
 
@@ -89,6 +99,8 @@ class ModelOptions(Section):
     """Slender-body theory."""
     slender: SlenderOptions = SlenderOptions()
     """Resolved tail and body."""
+    tube: TubeOptions = TubeOptions()
+    """Resolved tail and body in their tube."""
 
 
 class FittedTo(Section):

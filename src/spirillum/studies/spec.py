@@ -15,10 +15,12 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
-from spirillum.hydrodynamics import SWIMMER_MODELS
+from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.fields import Length, Rate, Section, Text
-from spirillum.robot.load import load, problems_in
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 from spirillum.units import Hz
 
@@ -61,6 +63,8 @@ class Study(Section):
     """A grid of robots."""
     robots: Annotated[list[_Name], Field(min_length=1, max_length=100_000)] | None = None
     """A list of robots (presets or files) instead of a grid."""
+    placement: Placement = Placement()
+    """Where in their channels the robots lie, for models that compute the walls."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -156,6 +160,10 @@ def load_study(
     sources = list(study.grid.channels.values()) if study.grid else study.robots or []
     robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
     _check_drives(study, sources, robots, name)
+    try:
+        check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     return LoadedStudy(study, robots, question)
 

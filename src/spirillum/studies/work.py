@@ -109,13 +109,16 @@ def _groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
     """Batches of robots with their places: one a channel of the grid, or one a kind of listed robots."""
     grid = loaded.study.grid
     if grid is None:
-        for indices, batch in batches(loaded.robots):
+        for indices, batch in batches(loaded.robots, loaded.study.placement):
             yield np.array(indices, dtype=np.intp), batch
         return
     wavelength, amplitude = (column.ravel() for column in np.meshgrid(grid.wavelengths, grid.amplitudes, indexing="ij"))
     for index, robot in enumerate(loaded.robots):
         tails = {"tail.wavelength": wavelength, "tail.amplitude": amplitude}
-        yield index * wavelength.size + np.arange(wavelength.size), RobotBatch.of(robot).with_values(tails)
+        yield (
+            index * wavelength.size + np.arange(wavelength.size),
+            RobotBatch.of(robot, loaded.study.placement).with_values(tails),
+        )
 
 
 def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:

@@ -1,0 +1,114 @@
+"""Where in the channel a robot lies, and what the fluid around it is made to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from spirillum.errors import InputError
+from spirillum.robot.fields import Length, LengthOrZero, Pitch, Section, Velocity, field_values
+from spirillum.robot.problems import problems_in
+from spirillum.units import show
+
+__all__ = ["Ends", "Placement"]
+
+Ends = Literal["open", "closed"]
+"""Ends of the channel: both open into a bath, or closed (no net flux)."""
+
+
+class Placement(Section):
+    """Seat of a robot in its channel, for models that compute the walls; frozen, SI inside.
+
+    The channel is horizontal, the robot's axis lies in the vertical plane through the channel's axis. What is None
+    was left open: a model then takes its own default, or answers with a band over what is open.
+    """
+
+    gap: Length | None = None
+    """Smallest distance between the body's surface and the glass."""
+    eccentricity: Annotated[float | None, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = None
+    """Instead of `gap`, for a level robot: offset of the body's centre over R - a, towards the floor; 0 on the axis."""
+    pitch: Pitch | None = None
+    """Angle by which the nose is raised, about the body's mid-length."""
+    tail_drop: LengthOrZero = 0.0
+    """Distance by which the tail's axis is lowered: a surrogate, for no rigid tail on a revolute joint does it."""
+    ends: Ends | None = None
+    """`open` or `closed`; unset: `open` where the robot has a `channel.length`, else `closed`."""
+    flow: Velocity | None = None
+    """Imposed mean velocity of the fluid far from the robot, signed about +x; instead of `ends`."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        problems = []
+        if self.eccentricity is not None and self.gap is not None:
+            problems.append(
+                f"placement.eccentricity = {self.eccentricity:g} is given together with "
+                f"placement.gap = {show(self.gap, 'mm')}; allowed: one of them"
+            )
+        if self.eccentricity is not None and self.pitch:
+            problems.append(
+                f"placement.pitch = {show(self.pitch, 'deg')} is given together with placement.eccentricity; "
+                "allowed: 0 deg, or placement.gap for a pitched robot"
+            )
+        if self.flow is not None and self.ends is not None:
+            problems.append(
+                f"placement.ends = '{self.ends}' is given together with placement.flow = {show(self.flow, 'mm/s')}; "
+                "allowed: one of them, for an imposed flow leaves the ends no say"
+            )
+        if problems:
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
+        return self
+
+    @classmethod
+    def of(cls, value: Placement | Mapping[str, Any] | None) -> Placement:
+        """A placement from what a caller may give.
+
+        Args:
+            value: a placement, its fields (quantities with their unit, ``{"gap": "0.5 mm"}``, or floats in SI), or
+                None: nothing is known. A field that is None is as if left out.
+
+        Raises:
+            InputError: for an unknown field, a wrong value, or fields that exclude each other.
+        """
+        if isinstance(value, cls):
+            return value
+        if not (value is None or isinstance(value, Mapping)):
+            raise InputError(f"placement = {str(value)[:60]!r}; allowed: {', '.join(cls.model_fields)}, each by name")
+        units = {item.path: item.unit for item in field_values(cls())}
+        given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
+        checked = problems_in(_Placed, {"placement": given})
+        if isinstance(checked, list):
+            raise InputError(checked[0], checked)
+        return checked.placement
+
+    @property
+    def is_given(self) -> bool:
+        """Whether anything is known or asked for."""
+        return self != type(self)()
+
+    @property
+    def level(self) -> bool:
+        """Whether the robot's axis is known to be parallel to the channel's."""
+        return self.pitch == 0 or self.eccentricity is not None
+
+    def ends_of(self, channel_length: float) -> Ends | None:
+        """Ends in force for a channel of that length, m (infinite or NaN: none is known); None with an imposed flow."""
+        if self.flow is not None:
+            return None
+        return self.ends or ("open" if np.isfinite(channel_length) else "closed")
+
+
+class _Placed(Section):
+    """The fields under the name by which sentences call them."""
+
+    placement: Placement
+
+
+def _with_unit(value: Any, unit: str | None) -> Any:
+    """A number as a quantity in SI; anything else as it is."""
+    if unit is None or isinstance(value, bool) or not isinstance(value, (int, float, np.floating)):
+        return value
+    return f"{float(value)!r} {unit}"

@@ -1,0 +1,77 @@
+"""What is wrong with a table, in our sentences: field, value, and what is allowed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from spirillum.errors import did_you_mean
+
+__all__ = ["problems_in"]
+
+_M = TypeVar("_M", bound=BaseModel)
+
+
+def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
+    """Check a raw table; return the model, or every problem as a sentence."""
+    try:
+        return model.model_validate(table)
+    except ValidationError as error:
+        sentences: list[str] = []
+        for problem in error.errors(include_url=False):
+            sentences += _sentences(model, problem)
+        return list(dict.fromkeys(sentences))
+    except RecursionError:
+        return ["its tables are nested too deeply; see `spirillum schema robot`"]
+
+
+def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[str]:
+    """Our sentences for one of pydantic's findings."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    names = [str(name) for name in problem["loc"] if name != "[key]"]
+    if kind == "assembly":
+        return str(context["sentences"]).split("\n")
+    field = ".".join(names)
+    if kind == "quantity":
+        return [f"{field} {context['sentence']}"]
+    if kind == "missing":
+        return [f"{field} is missing; it has to be given"]
+    if kind == "extra_forbidden":
+        allowed = list(_fields_at(model, names[:-1]))
+        hint = did_you_mean(names[-1][:60], allowed)
+        return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
+    shown = repr(problem.get("input"))
+    shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
+    hint = ""
+    if kind == "literal_error":
+        allowed_words = str(context["expected"])
+        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", allowed_words))
+    elif kind == "value_error":
+        allowed_words = str(context["error"])
+    elif kind == "model_type":
+        allowed_words = f"a [{field}] table"
+    else:
+        allowed_words = str(problem["msg"]).removeprefix("Input should be ")
+    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {allowed_words}"]
+
+
+def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:
+    """Field names of the section that a location leads to."""
+    for name in names:
+        if name in model.model_fields:
+            found = _section(model.model_fields[name].annotation)
+            model = found or model
+    return tuple(model.model_fields)
+
+
+def _section(annotation: Any) -> type[BaseModel] | None:
+    """The section class inside an annotation such as ``Channel | Literal['none']``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in getattr(annotation, "__args__", ()):
+        if (found := _section(part)) is not None:
+            return found
+    return None

@@ -1,0 +1,177 @@
+"""Where a robot sits in its tube, against closed forms and against points on its surface."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spirillum.robot.geometry import centreline
+from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
+from spirillum.robot.seat import (
+    STEEPEST_PITCH,
+    body_gap,
+    contact_pitch,
+    largest_gap,
+    offset_for_gap,
+    tail_clearance,
+)
+
+R = 0.02
+SHAPES: dict[str, Outline] = {
+    "capsule": body_outline("capsule", 0.018, 0.035, 0.0, "hemisphere", "flat"),
+    "rounded": body_outline("capsule", 0.018, 0.035, 0.0, "hemisphere", "hemisphere"),
+    "cylinder": body_outline("cylinder", 0.012, 0.03, 0.002, "fillet", "flat"),
+    "spheroid": body_outline("spheroid", 0.01, 0.05, 0.0, None, None),
+    "sphere": body_outline("sphere", 0.018, 0.018, 0.0, None, None),
+}
+pitches = st.floats(0.0, np.radians(30))
+offsets = st.floats(-0.009, 0.009)
+
+
+def in_tube(points: np.ndarray, e: float, pitch: float) -> np.ndarray:
+    """Distance of points of the robot's frame from the tube's axis, by turning and shifting them."""
+    x, y, z = points.T
+    return np.hypot(y, -e + x * np.sin(pitch) + z * np.cos(pitch))
+
+
+def surface(outline: Outline, along: int = 400, around: int = 721) -> np.ndarray:
+    """Points on the whole surface of revolution, edges included."""
+    x, rho = (
+        np.concatenate(part) for part in zip(*(p.points(np.linspace(0, 1, along)) for p in outline.pieces), strict=True)
+    )
+    theta = np.linspace(0, 2 * np.pi, around)[:, None]
+    return np.stack([x + 0 * theta, rho * np.cos(theta), rho * np.sin(theta)], axis=-1).reshape(-1, 3)
+
+
+def helix(phase: float = 0.0, count: int = 1501) -> np.ndarray:
+    """The paper's tail (25, 2.5 mm)."""
+    columns = {"root": 0.0275, "wavelength": 0.025, "amplitude": 0.0025, "length": 0.06, "taper": 100.0, "hand": 1.0}
+    arrays = {name: np.full(1, value) for name, value in {**columns, "phase": phase}.items()}
+    return centreline(np.linspace(0, 0.06, count), **arrays).position
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(e=offsets, pitch=pitches)
+def test_gap_against_points_on_the_surface(shape: str, e: float, pitch: float) -> None:
+    brute = R - in_tube(surface(SHAPES[shape]), e, pitch).max()
+    found = body_gap(SHAPES[shape], R, e, pitch)
+    assert found <= brute + 1e-15  # no point of the surface is closer
+    assert found == pytest.approx(brute, abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(share=st.floats(0.0, 0.999))
+def test_level_body(shape: str, share: float) -> None:
+    """E = R - a - gap, and no gap is larger than R - a."""
+    a = max(float(p.points(np.linspace(0, 1, 3))[1].max()) for p in SHAPES[shape].pieces)
+    gap = (R - a) * (1 - share)
+    e = offset_for_gap(SHAPES[shape], R, gap)
+    assert e == pytest.approx(R - a - gap, abs=1e-15)
+    assert body_gap(SHAPES[shape], R, e) == pytest.approx(gap, abs=1e-15)
+    assert largest_gap(SHAPES[shape], R) == pytest.approx(R - a, abs=1e-15)
+    assert np.isnan(offset_for_gap(SHAPES[shape], R, 1.001 * (R - a)))
+
+
+@given(e=offsets, pitch=pitches)
+def test_sphere_does_not_feel_its_pitch(e: float, pitch: float) -> None:
+    assert body_gap(SHAPES["sphere"], R, e, pitch) == pytest.approx(R - 0.009 - abs(e), abs=1e-12)
+    shifted = Outline((Arc((-0.02, 0.0), (0.004, 0.004), (0.0, np.pi)),), ())  # off the centre of rotation
+    centre = abs(-e - 0.02 * np.sin(pitch))
+    assert body_gap(shifted, R, e, pitch) == pytest.approx(R - 0.004 - centre, abs=1e-12)
+
+
+@given(e=offsets, pitch=pitches)
+def test_capsule_is_a_ball_along_a_line(e: float, pitch: float) -> None:
+    """Two hemispheres and their hull: the ball's centre is farthest from the axis at one end of the line."""
+    ends = np.abs(-e + np.array([1, -1]) * 0.0085 * np.sin(pitch))
+    assert body_gap(SHAPES["rounded"], R, e, pitch) == pytest.approx(R - 0.009 - ends.max(), abs=1e-12)
+
+
+@given(gap=st.floats(1e-5, 3e-3), pitch=st.floats(0.0, np.radians(15)))
+def test_offset_of_a_pitched_capsule(gap: float, pitch: float) -> None:
+    e = offset_for_gap(SHAPES["rounded"], R, gap, pitch)
+    assert e == pytest.approx(R - 0.009 - gap - 0.0085 * np.sin(pitch), abs=1e-12)
+
+
+@pytest.mark.parametrize("shape", ["capsule", "cylinder", "spheroid"])
+@given(gap=st.floats(1e-5, 2e-3), pitch=st.floats(0.0, np.radians(20)))
+def test_offset_and_gap_are_inverse(shape: str, gap: float, pitch: float) -> None:
+    e = offset_for_gap(SHAPES[shape], R, gap, pitch)
+    assert body_gap(SHAPES[shape], R, e, pitch) == pytest.approx(gap, abs=1e-14)
+    assert body_gap(SHAPES[shape], R, e + 1e-5, pitch) < gap < largest_gap(SHAPES[shape], R, pitch)
+
+
+def test_nose_at_the_top_leaves_no_place() -> None:
+    steep = np.radians(44)
+    assert largest_gap(SHAPES["rounded"], R, steep) == pytest.approx(R - 0.009 - 0.0085 * np.sin(steep), abs=1e-9)
+    assert np.isnan(offset_for_gap(SHAPES["rounded"], R, 0.0052, steep))
+    assert not np.isnan(offset_for_gap(SHAPES["rounded"], R, 0.005, steep))
+
+
+@given(e=st.floats(0.0, 0.005), pitch=pitches, drop=st.floats(0.0, 0.002))
+def test_straight_rod(e: float, pitch: float, drop: float) -> None:
+    """A rod on the motor axis: its far end is lowest, -e - x sin(pitch) - drop cos(pitch)."""
+    rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
+    found = tail_clearance(rod, 0.0005, R, e, pitch, drop)
+    depth = e + 0.0875 * np.sin(pitch) + drop * np.cos(pitch)
+    assert found.clearance == pytest.approx(R - 0.0005 - depth, abs=1e-15)
+    assert found.index == 60 or pitch < 1e-12
+
+
+@given(e=st.floats(0.0, 0.009), pitch=pitches, drop=st.floats(0.0, 0.003))
+def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
+    """The closed form is the limit of many phases, attained at the phase and point that it names."""
+    points = helix()
+    whole = tail_clearance(points, 0.0005, R, e, pitch, drop)
+    many = tail_clearance(points, 0.0005, R, e, pitch, drop, np.linspace(0, 2 * np.pi, 361))
+    assert 0 <= many.clearance - whole.clearance + 1e-15 <= 0.0025 * np.radians(1) ** 2
+    there = tail_clearance(points, 0.0005, R, e, pitch, drop, np.array([whole.phase]))
+    assert there.clearance == pytest.approx(whole.clearance, abs=1e-14)
+
+
+@given(phase=st.floats(0.0, 6.28), e=st.floats(0.0, 0.009), pitch=pitches)
+def test_phase_is_that_of_the_wires_equation(phase: float, e: float, pitch: float) -> None:
+    found = tail_clearance(helix(), 0.0005, R, e, pitch, phases=np.array([phase]))
+    turned = in_tube(helix(phase), e, pitch)
+    assert found.clearance == pytest.approx(R - 0.0005 - turned.max(), abs=1e-14)
+
+
+def test_contact_of_a_straight_rod_against_its_angle() -> None:
+    """A ball with a rod behind it: e = R - a - gap at any pitch, and the tip touches where e + l sin(pitch) = R - b."""
+    rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
+    for gap, keep in ((1e-4, 0.0), (5e-4, 0.0), (5e-4, 2e-4)):
+        found = contact_pitch(SHAPES["sphere"], rod, 0.0005, R, gap, clearance=keep)
+        expected = np.arcsin((R - 0.0005 - keep - (R - 0.009 - gap)) / 0.0875)
+        assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_contact_of_the_papers_robot(batch_of: Callable[..., Any]) -> None:
+    b = batch_of()
+    body = body_outline(b.shape, 0.018, 0.035, 0.0, b.front, b.rear)
+    coupling = solid_outlines(body, 0.035, 0.008, 0.01, 0.0005)["coupling"]
+    for gap in (1e-4, 5e-4, 1e-3):
+        found = contact_pitch(body, helix(), 0.0005, R, gap, coupling=coupling)
+        e = offset_for_gap(body, R, gap, found)
+        assert tail_clearance(helix(), 0.0005, R, e, found).clearance == pytest.approx(0, abs=1e-10)
+        steeper = found + 1e-4
+        lower = offset_for_gap(body, R, gap, steeper)
+        assert tail_clearance(helix(), 0.0005, R, lower, steeper).clearance < 0
+        assert contact_pitch(body, helix(), 0.0005, R, gap, tail_drop=1e-3) < found
+
+
+def test_contact_is_bounded_by_coupling_nose_and_the_largest_pitch() -> None:
+    body, stub = SHAPES["sphere"], np.array([[-0.0275, 0.0, 0.0], [-0.028, 0.0, 0.0]])
+    thick = cylinder_outline(0.014, -0.0095, -0.027)
+    by_coupling = contact_pitch(body, stub, 0.0005, R, 5e-4, coupling=thick)
+    e = offset_for_gap(body, R, 5e-4, by_coupling)
+    assert body_gap(thick, R, e, by_coupling) == pytest.approx(0, abs=1e-10)
+    assert contact_pitch(body, stub, 0.0005, 0.03, 0.015) == STEEPEST_PITCH
+    assert np.isnan(contact_pitch(body, stub, 0.0005, R, 5e-4, tail_drop=0.012))
+    assert np.isnan(contact_pitch(body, stub, 0.0005, R, 0.0111))  # no place for that gap, even level
+    # Two hemispheres in a tube hardly wider: the nose reaches the top before a short tail the floor.
+    capsule = SHAPES["rounded"]
+    found = contact_pitch(capsule, np.array([[-0.018, 0.0, 0.0]]), 0.0005, 0.0095, 1e-4)
+    assert found == pytest.approx(np.arcsin((0.0095 - 0.009 - 1e-4) / 0.0085), abs=1e-6)
