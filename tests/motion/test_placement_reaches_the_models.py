@@ -83,7 +83,7 @@ def test_models_without_walls_refuse(walled: Any) -> None:
     ):
         text = refused(call)
         assert "placement.gap = 0.0005 m with model '" in text
-        assert text.endswith("which does not compute the channel's walls; allowed: only with model walled")
+        assert text.endswith("which does not compute the channel's walls; allowed: only with model tube, walled")
     assert "placement.ends = closed" in refused(lambda: sp.predict(WIDE, placement={"ends": "closed"}))
     assert "placement.gap = 6 mm; allowed: at most 5 mm" in refused(
         lambda: sp.predict(WIDE, model="walled", placement={"gap": "6 mm"})

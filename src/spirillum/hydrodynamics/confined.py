@@ -18,7 +18,7 @@ from spirillum.hydrodynamics.algebra import axis_rotation
 from spirillum.hydrodynamics.interaction import one_thread, share
 from spirillum.hydrodynamics.sources import Sources
 from spirillum.hydrodynamics.tube_solids import MOTIONS, Solids
-from spirillum.hydrodynamics.tube_wall import point_reflection, waves_between
+from spirillum.hydrodynamics.tube_wall import Seat, point_reflection, waves_between
 from spirillum.hydrodynamics.wire import Wire, WireSystem, wire_system
 
 __all__ = ["Held", "Strengths", "held_in_tube"]
@@ -32,7 +32,7 @@ _MOST_STEPS = 200
 class Strengths:
     """What solids and wires do to the fluid, for each of the 12 unit twists and the flow held back; viscosity 1."""
 
-    solids: Solids | None
+    solids: Solids
     """Solids, with the unknowns of `tractions`."""
     tractions: tuple[Samples, Samples]
     """Modes of the tractions, even and odd, (unknowns, 13)."""
@@ -67,6 +67,8 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
         drop: how far the wires lie below where they turn, m.
     """
     with one_thread():
+        if solids.none:
+            return _wires_alone(_Link.of(solids, wires, drop))
         matrix = solids.wrenches(solids.moving)
         tractions, forces = solids.moving, np.zeros((0, MOTIONS))
         lines: tuple[Wire, ...] = ()
@@ -81,6 +83,17 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
             forces = strengths[: sum(line.points.size for line in lines)]
     found = Strengths(solids, (_EIGHT_PI * tractions[0], _EIGHT_PI * tractions[1]), lines, _EIGHT_PI * forces)
     return _held(_EIGHT_PI * matrix, found)
+
+
+def _wires_alone(link: _Link) -> Held:
+    from scipy.linalg import cho_factor, cho_solve
+
+    strengths = cho_solve(cho_factor(link.mobility, lower=True, check_finite=False), link.motion, check_finite=False)
+    matrix = link.motion.T @ strengths
+    matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
+    forces = strengths[: sum(line.points.size for line in link.wires)]
+    nothing = np.zeros((0, MOTIONS))
+    return _held(_EIGHT_PI * matrix, Strengths(link.solids, (nothing, nothing), link.wires, _EIGHT_PI * forces))
 
 
 def turned_motions() -> Samples:
@@ -114,8 +127,8 @@ class _Link:
     """Of the wires with the wall, the solids not there."""
     motion: Samples
     """Velocities at the stations (and gradients along moments), (3 n + q n, 13)."""
-    sent: tuple[Samples, Samples]
-    """Velocities on the solids from unit forces and moments at the stations, even and odd."""
+    sent: tuple[Samples, ...]
+    """Velocities on the solids from unit forces and moments at the stations, even and odd; nothing without solids."""
 
     @classmethod
     def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:
@@ -130,10 +143,17 @@ class _Link:
         along = np.kron(np.eye(len(points)), seat.rotation)  # from forces in robot axes to those in the tube's
         mobility = system.mobility.copy()
         mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
+        start = 0
+        for wire in lines:
+            here = slice(start, start + wire.points.size)
+            mobility[here, here] += _near_wall(wire, seat)
+            start = here.stop
         motion = np.zeros((len(system.motion), MOTIONS))
         motion[:, : MOTIONS - 1] = system.motion
         speed = 2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / seat.radius**2
         motion[:forces, MOTIONS - 1] = (speed[:, None] * seat.rotation[0]).ravel()
+        if solids.none:
+            return cls(solids, lines, system, mobility, motion, ())
         sent = _sent_unbounded(solids, lines, system)
         waves = solids.waves(0.5 * (solids.gap + distance), placed)
         for family, wall in zip(sent, solids.rings.sent(waves, solids.rows, placed), strict=True):
@@ -145,6 +165,37 @@ class _Link:
         answer = [self.solids.solve(parity, self.sent[parity] @ strengths) for parity in (0, 1)]
         velocities: Samples = self.mobility @ strengths - self.solids.wrenches(answer, self.sent)
         return velocities
+
+
+def _near_wall(wire: Wire, seat: Seat) -> Samples:
+    """What a line of forces lacks of a wire of finite thickness at a wall, (3 n, 3 n), robot axes.
+
+    A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
+    2 log(2 h/a) - 2 along itself, sideways and towards the plane, without the factor 1/(8 pi mu); a cylinder has
+    arccosh(h/a) in place of the logarithm, and 2 sqrt(1 - (a/h)^2) in place of 2 (Jeffrey and Onishi, 1981). The
+    difference is spread over a length h of the wire, for shorter waves of force do not feel the wall.
+    """
+    placed, tangents = seat.placed(wire.points), wire.tangents @ seat.rotation.T
+    rho = np.hypot(placed[:, 1], placed[:, 2])
+    height = seat.radius - rho
+    ratio = height / wire.radius
+    outward = placed * np.array([0.0, 1.0, 1.0]) / np.maximum(rho, 1e-300)[:, None]
+    normal = outward - np.sum(outward * tangents, axis=1, keepdims=True) * tangents
+    missing = np.arccosh(ratio) - np.log(2.0 * ratio)
+    film = 1.0 - np.sqrt(1.0 - ratio**-2)
+    local = missing[:, None, None] * (np.eye(3) + _dyads(tangents)) + film[:, None, None] * _dyads(normal)
+    local = 2.0 * seat.rotation.T @ local @ seat.rotation
+    apart = np.linalg.norm(wire.points[:, None] - wire.points, axis=-1)
+    width = 0.5 * (height[:, None] + height)
+    spread = np.exp(-0.5 * (apart / width) ** 2) / (np.sqrt(2.0 * np.pi) * width)
+    both = 0.5 * spread[:, :, None, None] * (local[:, None] + local)
+    matrix: Samples = both.swapaxes(1, 2).reshape(3 * len(placed), -1)
+    return matrix
+
+
+def _dyads(vectors: Samples) -> Samples:
+    products: Samples = vectors[:, :, None] * vectors[:, None, :]
+    return products
 
 
 def _turned(wire: Wire) -> Wire:

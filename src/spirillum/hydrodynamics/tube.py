@@ -36,8 +36,9 @@ from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import body_gap, largest_gap, offset_for_gap, tail_clearance
+from spirillum.units import show
 
-__all__ = ["END_LOSS", "GAP_BAND", "GAP_SHARE", "Tube", "held_robot", "seat_of"]
+__all__ = ["END_LOSS", "GAP_BAND", "GAP_SHARE", "WIRE_FILM", "Tube", "held_robot", "seat_of"]
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -45,6 +46,8 @@ GAP_SHARE = 1.0 / 18.0
 """Gap over the body's radius where none is given: 0.5 mm for the paper's robot."""
 GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
 """The same for the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
+WIRE_FILM = 0.75
+"""Thinnest film between the wire's surface and the glass over the wire's radius: thinner ones are not resolved."""
 _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
 _COARSER = 10.0
@@ -250,7 +253,7 @@ class Tube(SwimmerModel):
         placed, fine = np.full(size, np.inf), np.full(size, 0.0)
         there = np.isfinite(np.broadcast_to(batch.channel_diameter, size))
         asked = np.zeros(size)
-        clear = np.full(size, np.inf)
+        clear, where = np.full(size, np.inf), ""
         for index in np.flatnonzero(fit & there):
             g, radius = Geometry.of(batch, int(index)), 0.5 * _number(batch.channel_diameter, int(index))
             asked[index] = _gap(batch, int(index))
@@ -259,7 +262,7 @@ class Tube(SwimmerModel):
             if place is None:
                 continue
             if "tail" in PIECES[part]:
-                clear[index] = _clearance(g, place)
+                clear[index], where = _clearance(g, place)
             if clear[index] > 0:
                 fine[index] = _size(_solid_key(g, part, place, self.fineness(batch.options)))
         ends = batch.placement.ends_of(np.inf) == "closed" and batch.placement.ends == "open"
@@ -286,12 +289,13 @@ class Tube(SwimmerModel):
                 "placement.gap", asked, "at most", placed, "mm", "the body would rise above the axis", "gap-too-wide"
             ),
             Limit.of(
-                "clearance of tail and glass",
+                f"clearance of tail and glass{where}",
                 clear,
-                "more than",
-                0.0,
+                "at least",
+                WIRE_FILM * 0.5 * batch.wire_diameter,
                 "mm",
-                "the tail would pass through the wall (placement.pitch, placement.tail_drop, tail.amplitude)",
+                f"the film under the wire is resolved down to {WIRE_FILM:g} of its radius, and below 0 the tail would "
+                "pass through the wall (placement.pitch, placement.tail_drop, tail.amplitude)",
                 "tail-in-wall",
             ),
             Limit.of(
@@ -385,6 +389,9 @@ def _largest(body: Outline, radius: float, pitch: float) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _clearance(g: Geometry, place: _Place) -> float:
+def _clearance(g: Geometry, place: _Place) -> tuple[float, str]:
+    """Smallest clearance of the tail over a turn, m, and where it is, in words."""
     wire = wire_of_geometry(g, 1.0)
-    return tail_clearance(wire.points, wire.radius, *place).clearance
+    found = tail_clearance(wire.points, wire.radius, *place)
+    behind = show(-float(wire.points[found.index, 0]), "mm")
+    return found.clearance, f" {behind} behind the body's middle at phase {show(found.phase, 'deg')}"

@@ -19,7 +19,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.hydrodynamics.interaction import one_thread, share, surface_motion
 from spirillum.hydrodynamics.revolution import Panels, panels_of
-from spirillum.hydrodynamics.tube_wall import LevelRings, Rings, Rows, Seat, TiltedRings, Waves, waves_between
+from spirillum.hydrodynamics.tube_rings import LevelRings, Rings, Rows, TiltedRings
+from spirillum.hydrodynamics.tube_wall import Seat, Waves, waves_between
 from spirillum.hydrodynamics.wire import Accuracy
 from spirillum.robot.outline import Outline
 
@@ -52,7 +53,7 @@ class Solids:
         """Cut into panels and count modes; nothing is solved for yet.
 
         Args:
-            solids: outlines, and the part (0 body, 1 rotor) with which each moves.
+            solids: outlines, and the part (0 body, 1 rotor) with which each moves; none for wires alone.
             seat: where in the tube they are.
             fineness: how finely.
             lines: points of wires (x, rho, blob radius) that come close, (n, 3), m.
@@ -60,9 +61,16 @@ class Solids:
         self.seat, self.fineness = seat, fineness
         self.parts = np.array([part for _, part in solids])
         near = np.zeros((0, 3)) if lines is None else lines
+        if not solids:
+            return
         longest = _longest(solids, seat, fineness, near)
         self.panels = panels_of([outline for outline, _ in solids], longest, fineness.order)
         self.counts = _mode_counts(self.panels, seat, fineness, near)
+
+    @property
+    def none(self) -> bool:
+        """Whether there are no solids: then there is nothing but `seat` and `fineness`."""
+        return self.parts.size == 0
 
     @property
     def modes(self) -> int:
@@ -72,7 +80,7 @@ class Solids:
     @property
     def size(self) -> int:
         """Number of unknowns of each parity."""
-        return int(3 * self.counts.sum())
+        return 0 if self.none else int(3 * self.counts.sum())
 
     @cached_property
     def gap(self) -> float:
@@ -97,7 +105,7 @@ class Solids:
         """How the rings of the solids meet the wall's waves."""
         if self.seat.pitch == 0:
             return LevelRings(self.panels, self.seat.offset, self.modes)
-        return TiltedRings(self.panels, self.seat, self.modes)
+        return TiltedRings(self.panels, self.seat, self.counts)
 
     def waves(self, distance: float, points: Samples | None = None) -> Waves:
         """The waves that matter between the solids, or solids and points about the tube's axis.

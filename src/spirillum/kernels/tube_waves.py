@@ -237,3 +237,40 @@ def station_waves(extensions: Samples, angle: Samples, phase: Samples, out: Samp
                     out[n, 1, 1, parity, p, w] = y * imaginary
                     out[n, 2, 0, parity, p, w] = z * real
                     out[n, 2, 1, parity, p, w] = z * imaginary
+
+
+@compiled
+def tilted_waves(
+    extensions: Samples, angle: Samples, phase: Samples, theta: Samples, pitch: float, out: Samples
+) -> None:
+    """Velocities (x, rho, theta) of all waves on rings about a pitched axis, in cylindrical components about it.
+
+    Args:
+        extensions: at the rings' points, (angles, n, orders, 3, 3).
+        angle: polar angles of the points about the tube's axis, (angles, n).
+        phase: k x there, (angles, n).
+        theta: angles about the rings' axis, (angles,).
+        pitch: angle by which that axis rises forward.
+        out: to be filled: component; even, odd; angle; ring; real, imaginary; order; wall component.
+    """
+    c, s = math.cos(pitch), math.sin(pitch)
+    for t in range(theta.size):
+        cos_t, sin_t = math.cos(theta[t]), math.sin(theta[t])
+        for n in range(angle.shape[1]):
+            cos_a, sin_a = math.cos(angle[t, n]), math.sin(angle[t, n])
+            real, imaginary = math.cos(phase[t, n]), math.sin(phase[t, n])
+            for p in range(extensions.shape[2]):
+                cos, sin = math.cos(p * angle[t, n]), math.sin(p * angle[t, n])
+                for w in range(3):
+                    u = extensions[t, n, p, 0, w]
+                    rho, v = extensions[t, n, p, 1, w], extensions[t, n, p, 2, w]
+                    for parity in range(2):
+                        like, other = (cos, -sin) if parity == 0 else (-sin, -cos)
+                        y, z = rho * like * cos_a - v * other * sin_a, rho * like * sin_a + v * other * cos_a
+                        for part in range(2):
+                            x = -u * like * imaginary if part == 0 else u * like * real
+                            wave = real if part == 0 else imaginary
+                            up, side = c * y * wave - s * x, z * wave
+                            out[0, parity, t, n, part, p, w] = c * x + s * y * wave
+                            out[1, parity, t, n, part, p, w] = up * cos_t + side * sin_t
+                            out[2, parity, t, n, part, p, w] = side * cos_t - up * sin_t
