@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import quantity
 from spirillum.arrays import Axial, AxialLoad, Flags, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.algebra import axis_rotation, joint_locked
@@ -28,84 +27,24 @@ from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.hydrodynamics.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
 from spirillum.hydrodynamics.slender import Slender
 from spirillum.hydrodynamics.tube_cache import kept_or_computed
+from spirillum.hydrodynamics.tube_place import Place, number_of, place_of, placement_answer, seat_limits
 from spirillum.hydrodynamics.tube_solids import MOTIONS, Fineness, Solids
-from spirillum.hydrodynamics.tube_wall import Seat
 from spirillum.hydrodynamics.wire import Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
-from spirillum.robot.seat import body_gap, largest_gap, offset_for_gap, tail_clearance
-from spirillum.units import show
 
-__all__ = ["END_LOSS", "GAP_BAND", "GAP_SHARE", "WIRE_FILM", "Tube", "held_robot", "seat_of"]
+__all__ = ["END_LOSS", "Tube", "held_robot"]
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
-GAP_SHARE = 1.0 / 18.0
-"""Gap over the body's radius where none is given: 0.5 mm for the paper's robot."""
-GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
-"""The same for the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
-WIRE_FILM = 0.75
-"""Thinnest film between the wire's surface and the glass over the wire's radius: thinner ones are not resolved."""
 _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
 _COARSER = 10.0
 """The same of the resolution that gives the error estimate."""
 _MOST_UNKNOWNS = 11_000
 """Of one parity: 2 GiB for the factors of both."""
-_AXIAL = np.array([0, 3, 6, 9])
-
-
-class _Place(NamedTuple):
-    """Where a robot is: tube, seat, and the surrogate's drop of the tail; m and rad."""
-
-    radius: float
-    offset: float
-    pitch: float
-    drop: float
-
-    @property
-    def seat(self) -> Seat:
-        """The seat alone."""
-        return Seat(self.radius, self.offset, self.pitch)
-
-
-def _number(column: PerRobot, index: int) -> float:
-    return float(column[index if column.size > 1 else 0])
-
-
-def _body(g: Geometry) -> Outline:
-    return next(outline for name, outline, _ in solids_of_geometry(g) if name == "body")
-
-
-def _place(batch: RobotBatch, index: int) -> _Place:
-    """Place of robot number `index`; what the placement leaves open is level, and a gap of `GAP_SHARE`."""
-    placement, g = batch.placement, Geometry.of(batch, index)
-    radius, pitch = 0.5 * _number(batch.channel_diameter, index), placement.pitch or 0.0
-    if placement.eccentricity is not None:
-        offset = placement.eccentricity * (radius - 0.5 * g.body_diameter)
-    else:
-        offset = _offset(_body(g), radius, _gap(batch, index), pitch)
-    return _Place(radius, offset, pitch, placement.tail_drop)
-
-
-def _gap(batch: RobotBatch, index: int) -> float:
-    """Gap in force; no larger than the robot's on the axis where none is given."""
-    if batch.placement.gap is not None:
-        return batch.placement.gap
-    room = 0.5 * (_number(batch.channel_diameter, index) - _number(batch.body_diameter, index))
-    return min(GAP_SHARE * 0.5 * _number(batch.body_diameter, index), room)
-
-
-@lru_cache(maxsize=256)
-def _offset(body: Outline, radius: float, gap: float, pitch: float) -> float:
-    return offset_for_gap(body, radius, gap, pitch)
-
-
-def seat_of(batch: RobotBatch, index: int = 0) -> Seat:
-    """Where in its tube robot number `index` lies."""
-    return _place(batch, index).seat
 
 
 def _near(g: Geometry) -> Samples:
@@ -121,11 +60,11 @@ class _SolidKey(NamedTuple):
 
     solids: tuple[tuple[Outline, int], ...]
     near: tuple[tuple[float, ...], ...]
-    place: _Place
+    place: Place
     fineness: Fineness
 
 
-def _solid_key(g: Geometry, part: str, place: _Place, fineness: Fineness) -> _SolidKey:
+def _solid_key(g: Geometry, part: str, place: Place, fineness: Fineness) -> _SolidKey:
     solids = tuple((outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part])
     near = tuple(map(tuple, _near(g).tolist())) if "tail" in PIECES[part] else ()
     return _SolidKey(solids, near, place._replace(drop=0.0), fineness)
@@ -153,7 +92,7 @@ class _Question(NamedTuple):
 
     geometry: Geometry
     part: str
-    place: _Place
+    place: Place
     fineness: Fineness
     phase: float
 
@@ -188,7 +127,7 @@ def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
         phase: of the tail, rad.
     """
     fineness = Tube().fineness(batch.options)
-    return _held(_Question(Geometry.of(batch, index), "robot", _place(batch, index), fineness, phase))
+    return _held(_Question(Geometry.of(batch, index), "robot", place_of(batch, index), fineness, phase))
 
 
 class Tube(SwimmerModel):
@@ -221,93 +160,23 @@ class Tube(SwimmerModel):
         """See `ResistanceModel.placement_of`."""
         if not np.all(all_hold(self.domain(batch))):
             return {"kind": "in the channel"}
-        place, body = _place(batch, 0), _body(Geometry.of(batch, 0))
-        room = place.radius - 0.5 * _number(batch.body_diameter, 0)
-        found: dict[str, Any] = {
-            "kind": "in the channel",
-            "gap": quantity(body_gap(body, place.radius, place.offset, place.pitch), "m"),
-            "eccentricity": quantity(place.offset / room, "1"),
-            "pitch": quantity(place.pitch, "rad"),
-            "ends": batch.placement.ends_of(_number(batch.channel_length, 0)),
-        }
-        if place.drop:
-            found["tail_drop"] = quantity(
-                place.drop, "m", note="a surrogate: no rigid tail on a revolute joint does it"
-            )
-        if batch.placement.flow is not None:
-            found["flow"] = quantity(batch.placement.flow, "m/s")
-        return found
+        return placement_answer(batch)
 
     def domain(self, batch: RobotBatch) -> list[Limit]:
-        """What `slender` asks for, and a robot that lies in a tube without touching it."""
-        return [*Slender().domain(batch), *self._seated(batch, "robot")]
+        """What `slender` asks for, and a place in a tube where the flow can be resolved."""
+        return self.part_domain(batch, "robot")
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        return [*Slender().part_domain(batch, part), *self._seated(batch, part)]
-
-    def _seated(self, batch: RobotBatch, part: str) -> list[Limit]:
-        """Requirements on the place in the tube."""
-        size = (batch.size,)
-        fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch)), size)
-        placed, fine = np.full(size, np.inf), np.full(size, 0.0)
-        there = np.isfinite(np.broadcast_to(batch.channel_diameter, size))
-        asked = np.zeros(size)
-        clear, where = np.full(size, np.inf), ""
-        for index in np.flatnonzero(fit & there):
-            g, radius = Geometry.of(batch, int(index)), 0.5 * _number(batch.channel_diameter, int(index))
-            asked[index] = _gap(batch, int(index))
-            placed[index] = _largest(_body(g), radius, batch.placement.pitch or 0.0)
-            place = _place(batch, int(index)) if asked[index] <= placed[index] else None
-            if place is None:
-                continue
-            if "tail" in PIECES[part]:
-                clear[index], where = _clearance(g, place)
-            if clear[index] > 0:
-                fine[index] = _size(_solid_key(g, part, place, self.fineness(batch.options)))
-        ends = batch.placement.ends_of(np.inf) == "closed" and batch.placement.ends == "open"
-        return [
-            Limit.of(
-                "channel.diameter",
-                np.where(there, 0.0, np.inf),
-                "less than",
-                np.inf,
-                "mm",
-                "model 'tube' computes the walls of a channel",
-                "no-channel",
-            ),
-            Limit.of(
-                "channel.length",
-                np.where(ends, batch.channel_length, 0.0),
-                "less than",
-                np.inf,
-                "mm",
-                "open ends matter by the length of tube between them (placement.ends = 'closed' needs none)",
-                "no-channel-length",
-            ),
-            Limit.of(
-                "placement.gap", asked, "at most", placed, "mm", "the body would rise above the axis", "gap-too-wide"
-            ),
-            Limit.of(
-                f"clearance of tail and glass{where}",
-                clear,
-                "at least",
-                WIRE_FILM * 0.5 * batch.wire_diameter,
-                "mm",
-                f"the film under the wire is resolved down to {WIRE_FILM:g} of its radius, and below 0 the tail would "
-                "pass through the wall (placement.pitch, placement.tail_drop, tail.amplitude)",
-                "tail-in-wall",
-            ),
-            Limit.of(
-                "unknowns that gap and tolerance ask for",
-                fine,
-                "at most",
-                float(_MOST_UNKNOWNS),
-                "1",
-                "they would fill the memory: a wider placement.gap or a larger model.tube.tolerance",
-                "gap-too-thin",
-            ),
-        ]
+        limits = [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
+        fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch) + limits), (batch.size,))
+        unknowns = np.zeros(batch.size)
+        for index in np.flatnonzero(fit).tolist():
+            g = Geometry.of(batch, index)
+            unknowns[index] = _size(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+        why = "they would fill the memory: a wider placement.gap or a larger model.tube.tolerance"
+        name = "unknowns that gap and tolerance ask for"
+        return [*limits, Limit.of(name, unknowns, "at most", float(_MOST_UNKNOWNS), "1", why, "gap-too-thin")]
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`: the average over `model.tube.phases` phases, ends condensed."""
@@ -376,22 +245,8 @@ class Tube(SwimmerModel):
         fineness = self.fineness(batch.options)
         turns = np.broadcast_to(phase, (batch.size,))
         for index in np.flatnonzero(answerable):
-            g, place = Geometry.of(batch, int(index)), _place(batch, int(index))
+            g, place = Geometry.of(batch, int(index)), place_of(batch, int(index))
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
             question = _Question(g, part, place, fineness, turn)
-            found[index] = _number(batch.viscosity, int(index)) * _answer(question)
+            found[index] = number_of(batch.viscosity, int(index)) * _answer(question)
         return found
-
-
-@lru_cache(maxsize=4096)
-def _largest(body: Outline, radius: float, pitch: float) -> float:
-    return largest_gap(body, radius, pitch)
-
-
-@lru_cache(maxsize=4096)
-def _clearance(g: Geometry, place: _Place) -> tuple[float, str]:
-    """Smallest clearance of the tail over a turn, m, and where it is, in words."""
-    wire = wire_of_geometry(g, 1.0)
-    found = tail_clearance(wire.points, wire.radius, *place)
-    behind = show(-float(wire.points[found.index, 0]), "mm")
-    return found.clearance, f" {behind} behind the body's middle at phase {show(found.phase, 'deg')}"

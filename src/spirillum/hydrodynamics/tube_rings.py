@@ -335,7 +335,8 @@ class TiltedRings(Rings):
             if average is not None:
                 both = np.matmul(average, both.reshape(tier.modes, *x.shape, -1))
             modes = both.reshape(tier.modes, -1, 2, orders, 3)
-            found.append(np.concatenate([values[rows] for values, rows in zip(modes, of_mode, strict=True)]))
+            joined: Samples = np.concatenate([values[rows] for values, rows in zip(modes, of_mode, strict=True)])
+            found.append(joined)
         return found
 
 
