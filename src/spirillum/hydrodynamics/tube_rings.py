@@ -6,7 +6,8 @@ Axes here: x along the robot, y up, z to the right; angles count from y.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from threading import Lock
 from typing import NamedTuple
 
@@ -99,16 +100,32 @@ class LevelRings(Rings):
 
         def lessen(family: Rows) -> None:
             starts, matrix = family.starts, matrices[family.parity]
-            for m, here in enumerate(family.of_mode):
-                target = at_nodes[m][here].transpose(1, 0, 2, 3).reshape(waves.k.size, -1, 3)
-                for n, there in enumerate(family.of_mode):
-                    pressed = np.matmul(target, np.ascontiguousarray(between[family.parity][:, m, :, n, :]))
-                    left = pressed.reshape(waves.k.size, here.size, 6).swapaxes(0, 1).reshape(here.size, -1)
-                    block = left @ averages[n][there].reshape(there.size, -1).T
-                    columns = slice(starts[n], starts[n + 1])
-                    matrix[starts[m] : starts[m + 1], columns] -= block * family.dual[columns]
+            for band, near in self._bands(waves):
+                active = [np.flatnonzero(near[here]) for here in family.of_mode]
+                size = waves.k[band].size
+                sources = [
+                    averages[n][there[some], band].reshape(some.size, 6 * size)
+                    for n, (there, some) in enumerate(zip(family.of_mode, active, strict=True))
+                ]
+                for m, (here, some) in enumerate(zip(family.of_mode, active, strict=True)):
+                    target = at_nodes[m][here[some], band].swapaxes(0, 1).reshape(size, 2 * some.size, 3)
+                    pressed = target @ between[family.parity][band, m].reshape(size, 3, 3 * self.modes)
+                    shaped = pressed.reshape(size, some.size, 2, self.modes, 3).transpose(3, 1, 0, 2, 4)
+                    left = np.ascontiguousarray(shaped).reshape(self.modes, some.size, 6 * size)
+                    lines = starts[m] + some[:, None]
+                    for n, source in enumerate(sources):
+                        columns = starts[n] + active[n]
+                        matrix[lines, columns] -= (left[n] @ source.T) * family.dual[columns]
 
         each(lessen, rows)
+
+    def _bands(self, waves: Waves) -> Iterator[tuple[slice, np.ndarray]]:
+        """Bands of k, each with the rows (of 3 a node) that its waves reach before they are damped, there and back."""
+        distance = np.repeat(waves.radius - self.offset - self.panels.rho.ravel(), 3)
+        edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
+        for low, high in pairwise([0, *edges.tolist(), waves.k.size]):
+            if high > low:
+                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + 3.0
 
     def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
         """See `Rings.sent`."""
@@ -285,7 +302,7 @@ class TiltedRings(Rings):
         """See `Rings.sent`."""
         tiers = self._tiers(rows)
         away = waves.radius - float(np.max(np.hypot(points[:, 1], points[:, 2])))
-        found = [np.zeros((family.dual.size, 3 * len(points))) for family in rows]
+        found: list[Samples] = [np.zeros((family.dual.size, 3 * len(points))) for family in rows]
         lock = Lock()
 
         def add(number: int) -> None:
