@@ -139,7 +139,7 @@ class _Link:
         seat, forces = solids.seat, 3 * len(points)
         placed = seat.placed(points)
         distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
-        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.tolerance)
+        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.damping)
         along = np.kron(np.eye(len(points)), seat.rotation)  # from forces in robot axes to those in the tube's
         mobility = system.mobility.copy()
         mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along

@@ -150,7 +150,7 @@ class Tube(SwimmerModel):
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""
-        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, 0.1))
+        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, 0.01))
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel:
         """See `SwimmerModel.checked_by`."""
