@@ -1,0 +1,55 @@
+"""The sideways force on a turning body off the tube's axis, per length, against the closed form of long cylinders."""
+
+import numpy as np
+import pytest
+
+from spirillum.hydrodynamics.confined import held_in_tube
+from spirillum.hydrodynamics.tube_solids import Fineness, Solids
+from spirillum.hydrodynamics.tube_wall import Seat
+from spirillum.robot.outline import body_outline
+
+
+def rotation_in_a_tube(a: float, R: float, e: float) -> tuple[float, float]:
+    """Force across the line of centres and torque per length over mu Omega (Jeffery 1922; Wannier 1950).
+
+    The constants of Jeffery's stream function (1/h)[(A + B xi) cosh xi + (C + D xi) sinh xi + ...] in bipolar
+    coordinates, xi = alpha on the cylinder and beta on the tube.
+    """
+    alpha = np.arccosh((R * R - a * a - e * e) / (2 * a * e))
+    beta = np.arccosh((R * R - a * a + e * e) / (2 * R * e))
+    d, c = alpha - beta, a * np.sinh(alpha)
+    s, size = np.sinh(d), np.sinh(d) ** 2 - d * d
+    gap = d - np.tanh(d)
+    flow = -a * (d * np.sinh(alpha) - s * np.sinh(beta)) / (d + s * np.cosh(alpha + beta) + size / gap)
+    B = -flow / gap
+    D = (a * (s * np.cosh(beta) - d * np.cosh(alpha)) - flow * s * np.sinh(alpha + beta)) / size
+    return -4 * np.pi * D, 4 * np.pi * c * (B + D / np.tanh(alpha))
+
+
+def test_force_and_torque_per_length_of_the_papers_body() -> None:
+    """Difference of two capsules in the wide tube at a gap of 1 mm; mm, viscosity 1.
+
+    The capsule lies below the axis. Turning about +x, its lowest line moves to +y and the fluid pushes it there.
+    """
+    a, R, gap = 9.0, 20.0, 1.0
+
+    def matrix(length: float) -> np.ndarray:
+        outline = body_outline("capsule", 2 * a, length, 0.0, "hemisphere", "hemisphere")
+        return held_in_tube(Solids([(outline, 0)], Seat(R, R - a - gap, 0.0), Fineness(tolerance=3e-4)), []).matrix
+
+    short, long = 75.0, 95.0
+    slope = (matrix(long) - matrix(short)) / (long - short)
+    force, torque = rotation_in_a_tube(a, R, R - a - gap)
+    assert -slope[1, 3] == pytest.approx(force, rel=3e-3)
+    assert slope[3, 3] == pytest.approx(torque, rel=1e-3)
+    assert slope[3, 1] == slope[1, 3]
+
+
+def test_closed_form_is_sommerfelds_in_a_thin_annulus() -> None:
+    """12 pi mu a (a/c)^2 E/((2 + E^2) sqrt(1 - E^2)) for a clearance c << a and the eccentricity E = e/c."""
+    a, c = 1.0, 1e-3
+    for eccentricity in (0.2, 0.7):
+        thin = 12 * np.pi * a * (a / c) ** 2 * eccentricity
+        thin /= (2 + eccentricity**2) * np.sqrt(1 - eccentricity**2)
+        force, _ = rotation_in_a_tube(a, a + c, eccentricity * c)
+        assert force == pytest.approx(thin, rel=5e-3)
