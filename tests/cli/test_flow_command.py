@@ -4,6 +4,7 @@ import json
 import os
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,21 @@ SMALL = ("--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2H
 def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model in closed form for the motion, and a sphere for the flow."""
     import spirillum.hydrodynamics.flow as core
+    import spirillum.hydrodynamics.tube_flow as tube
     import spirillum.motion.flow as module
+    from spirillum.hydrodynamics.tube import Tube
+    from spirillum.motion.prediction import predict, prepared
 
-    monkeypatch.setattr(module, "MODEL", "sbt")
+    def quick(robot: Any, **options: Any) -> Any:
+        known = {"model": "sbt", "accuracy": None, "tolerance": None}
+        if options["model"] != "tube":
+            return predict(robot, **{**options, **known})
+        placed = prepared(robot, "tube", placement=options["placement"], tolerance=options["tolerance"])[2]
+        found = predict(robot, **{**options, **known, "placement": None})
+        return replace(found, model=Tube(), batch=placed)
+
+    monkeypatch.setattr(module, "predict", quick)
+    monkeypatch.setattr(tube, "tube_flow_field", lambda *_: sphere)
     monkeypatch.setattr(core, "flow_field", lambda *_: sphere)
 
 
@@ -70,6 +83,23 @@ def test_a_box_alone_is_written(run: Callable[..., Any], tmp_path: Path, name: s
     assert "box, 20 x 9 x 9 points" in outcome.out
 
 
+def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
+    """The placement goes into the answer, and what is said of unbounded fluid is gone."""
+    files = ("-o", str(tmp_path / "plane.nc"), "--volume", str(tmp_path / "box.vti"))
+    place = ("--model", "tube", "--gap", "1mm", "--pitch", "2deg", "--ends", "closed", "--tolerance", "0.05")
+    answer = json.loads(run("flow", WIDE, *SMALL, *files, *place, "--json").out)
+    assert answer["model"] == "tube"
+    assert answer["placement"]["gap"]["value"] == pytest.approx(1e-3)
+    assert answer["placement"]["ends"] == "closed"
+    assert "plug_velocity" in answer
+    assert not any("walls" in warning for warning in answer["warnings"])
+    table = run("flow", WIDE, *SMALL, *files, *place).out
+    assert "model tube, lab frame" in table
+    assert "ends of the channel: closed" in table
+    assert "gap" in table
+    assert run("flow", WIDE, *SMALL, "--model", "tube", "--flow=-1mm/s", "-o", str(tmp_path / "flow.png")).code == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -89,6 +119,11 @@ def test_a_box_alone_is_written(run: Callable[..., Any], tmp_path: Path, name: s
         (["--volume", "flow.vti", "--volume-resolution", "900"], "allowed: at most 2000000 points"),
         (["-o", "flow.png", "--phase", "1"], 'phase = "1" has no unit'),
         (["-o", "flow.png", "--frame", "tail"], "frame = 'tail'"),
+        (["-o", "flow.png", "--model", "rft"], "model = 'rft'; allowed: slender, tube"),
+        (["-o", "flow.png", "--model", "tube", "--gap", "50mm"], "placement.gap"),
+        (["-o", "flow.png", "--model", "tube", "--ends", "shut"], "placement.ends"),
+        (["-o", "flow.png", "--model", "tube", "--tolerance", "2"], "tolerance = 2.0"),
+        (["-o", "flow.png", "--model", "tube", "--resolution", "1"], "resolution = 1; allowed"),
         (["-o", "flow.png", "--tail-rate", "0Hz"], "a tail at rest"),
         (["-o", "flow.png", "--friction", "ice"], "friction = 'ice'"),
         (["-o", "flow.png", "--set", "tail.wavelength=20"], "has no unit"),

@@ -1,5 +1,6 @@
 """The picture of a flow is to scale, shows the field's numbers, and covers all that is solid."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import LogNorm, SymLogNorm
 from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path as Path2D
 
 import spirillum as sp
 from spirillum.motion.flow import Flow
@@ -21,6 +23,20 @@ WIDE = "biorob2012-wide"
 def around(sphere: Any) -> Flow:
     """A sphere's flow under the name of a robot."""
     return Flow(sp.predict(WIDE, tail_rate="1.2 Hz"), sphere, 0.4, "lab")
+
+
+@pytest.fixture(scope="module")
+def in_tube(sphere: Any) -> Callable[..., Flow]:
+    """A sphere's flow under the name of a robot that lies in a tube."""
+    from spirillum.hydrodynamics.tube import Tube
+    from spirillum.robot.placement import Placement
+
+    def make(**placement: str) -> Flow:
+        prediction = sp.predict(WIDE, tail_rate="1.2 Hz")
+        placed = prediction.batch.placed(Placement.of(placement))
+        return Flow(replace(prediction, model=Tube(), batch=placed), sphere, 0.4, "lab")
+
+    return make
 
 
 def _words(figure: Any) -> str:
@@ -130,3 +146,48 @@ def test_any_robot_can_be_drawn(fields: dict[str, str], sphere: Any, tmp_path: P
 def test_a_plane_inside_a_solid_is_drawn(around: Flow, sphere: Any, tmp_path: Path) -> None:
     solid = replace(around, field=replace(sphere, radius=1.0))
     save_as(flow_figure(solid, solid.plane(resolution=20)), tmp_path / "flow.png")
+
+
+@pytest.mark.parametrize(("plane", "offset"), [("xz", 0.0), ("xz", 0.012), ("xy", 0.004), ("yz", -0.05)])
+@pytest.mark.parametrize("pitch", ["0 deg", "3 deg"])
+def test_the_glass_covers_all_beyond_the_wall(
+    in_tube: Callable[..., Flow], plane: str, offset: float, pitch: str
+) -> None:
+    flow = in_tube(gap="1 mm", pitch=pitch, ends="closed")
+    assert flow.seat is not None
+    axes = flow_figure(flow, flow.plane(plane, offset=offset, resolution=30)).axes[0]
+    (glass,) = [patch for patch in axes.patches if type(patch) is PathPatch]
+    first, second = (limits for limits in (axes.get_xlim(), axes.get_ylim()))
+    spots = np.random.default_rng(1).uniform([first[0], second[0]], [first[1], second[1]], (400, 2))
+    points = np.full((400, 3), offset)
+    points[:, ["xyz".index(axis) for axis in plane]] = 1e-3 * spots
+    turned = np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+    rho = np.hypot(*flow.seat.placed(turned)[:, 1:].T)
+    clear = np.abs(rho - 0.02) > 2e-5
+    frame, bore = (Path2D(corners) for corners in glass.get_path().to_polygons())
+    drawn = frame.contains_points(spots) & ~bore.contains_points(spots)
+    np.testing.assert_array_equal(drawn[clear], (rho > 0.02)[clear])
+
+
+def test_words_and_the_third_panel_tell_of_the_tube(in_tube: Callable[..., Flow]) -> None:
+    flow = in_tube(gap="1 mm", pitch="2 deg", ends="closed", tail_drop="1 mm")
+    data = flow.plane(resolution=30)
+    figure = flow_figure(flow, data)
+    words = _words(figure)
+    for wanted in ("gap 1 mm", "pitch 2°", "ends closed", "tail lowered by 1 mm", "mean of the tube's ends"):
+        assert wanted in words
+    assert "no walls" not in words
+    (line,) = [line for line in figure.axes[-1].lines if len(line.get_xdata()) > 2]
+    x, pressure = (np.asarray(values, dtype=float) for values in line.get_data())
+    column = data["pressure"].sel(x=1e-3 * x[7], method="nearest").dropna("z")
+    largest = np.abs(pressure).max() / np.abs(pressure[7])
+    uppermost = [data["pressure"].sel(x=1e-3 * place, method="nearest").dropna("z").values[-1] for place in x]
+    assert np.abs(uppermost).max() / abs(float(column[-1])) == pytest.approx(largest)
+    assert len(flow_figure(flow, flow.plane("yz", resolution=20)).axes) == len(figure.axes) - 1
+
+
+def test_imposed_flow_and_open_ends_are_told(in_tube: Callable[..., Flow]) -> None:
+    imposed = in_tube(gap="1 mm", flow="-2 mm/s")
+    assert "imposed mean flow" in _words(flow_figure(imposed, imposed.plane(resolution=20)))
+    opened = in_tube(gap="1 mm")
+    assert "ends open, mean flow" in _words(flow_figure(opened, opened.plane(resolution=20)))

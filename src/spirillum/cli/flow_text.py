@@ -70,6 +70,7 @@ def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any
         "frame": flow.frame,
         "phase": quantity(flow.phase, "rad"),
         **{name: quantity(getattr(flow.prediction, name), unit) for name, unit in _MOTION.items()},
+        **({} if flow.seat is None else {"plug_velocity": quantity(flow.prediction.plug_velocity, "m/s")}),
         "held_force": quantity(flow.held_force, "N", direction="sideways"),
         "placement": flow.prediction.placement,
         "files": [_file(path, dataset) for path, dataset in written.items()],
@@ -122,8 +123,10 @@ def flow_table(answer: Answer, console: Console) -> None:
     """Tables of `flow`."""
     title = f"{answer['robot']}: flow, model {answer['model']}, {answer['frame']} frame"
     table = grid(title, "quantity", "value", "unit", "SI")
-    add_quantities(table, answer)
+    add_quantities(table, {**answer, **answer["placement"]})
     console.print(table)
+    if answer["placement"].get("ends"):
+        console.print(f"ends of the channel: {answer['placement']['ends']}", highlight=False)
     for item in answer["files"]:
         points = item["grid"]["points"]
         shape = f"plane {''.join(points)}" if len(points) == 2 else "box"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,7 +15,7 @@ from spirillum.hydrodynamics.slender import robot_solution, solids_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
 
-__all__ = ["FlowField", "flow_field"]
+__all__ = ["FlowField", "checked_points", "flow_field", "in_fluid"]
 
 
 _FARTHEST = 1e9
@@ -41,7 +42,7 @@ class FlowField:
         Args:
             points: (n, 3), m.
         """
-        turned = self._tail_frame(_checked(points))
+        turned = self._tail_frame(checked_points(points))
         x, rho = turned[:, 0], np.hypot(turned[:, 1], turned[:, 2])
         names = np.full(len(turned), "", dtype="U8")
         for wire in self.solution.wires:
@@ -82,13 +83,7 @@ class FlowField:
         Raises:
             InputError: if a point lies inside a solid, or is not finite.
         """
-        places = _checked(points)
-        names = self.part_at(places)
-        if np.any(names != ""):
-            first = int(np.argmax(names != ""))
-            at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
-            raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
-        turned = self._tail_frame(places)
+        turned = self._tail_frame(in_fluid(points, self.part_at))
         field = self._sum(turned)
         velocity = field[:, :3] @ _rotation(self.phase).T / (8.0 * np.pi)
         return velocity, self.viscosity * field[:, 3] / (8.0 * np.pi)
@@ -136,7 +131,12 @@ def _rotation(angle: float) -> Samples:
     return rotation
 
 
-def _checked(points: Samples) -> Samples:
+def checked_points(points: Samples) -> Samples:
+    """Points as floats, (n, 3).
+
+    Raises:
+        InputError: if they have another shape, are not finite or lie too far away.
+    """
     try:
         places = np.asarray(points, dtype=float)
     except (TypeError, ValueError) as error:
@@ -146,6 +146,25 @@ def _checked(points: Samples) -> Samples:
     if np.any(np.abs(places) > _FARTHEST):
         raise InputError(f"points lie farther away than {_FARTHEST:g} m; allowed: nearer ones")
     return np.ascontiguousarray(places)
+
+
+def in_fluid(points: Samples, part_at: Callable[[Samples], np.ndarray]) -> Samples:
+    """Points that lie in the fluid.
+
+    Args:
+        points: (n, 3), m.
+        part_at: gives the name of the part in which each point lies, empty for the fluid.
+
+    Raises:
+        InputError: if one of them does not, or as `checked_points`.
+    """
+    places = checked_points(points)
+    names = part_at(places)
+    if np.any(names != ""):
+        first = int(np.argmax(names != ""))
+        at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
+        raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
+    return places
 
 
 def flow_field(batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float) -> FlowField:

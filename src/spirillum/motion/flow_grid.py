@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.hydrodynamics.tube_wall import Seat
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ _MOST_POINTS = 2_000_000
 _LARGEST_RESOLUTION = 10_000
 _BLOCK = 2048
 _MARGIN = 1.2  # of the robot's largest diameter
+_GLASS = 0.05  # what is shown of the glass, over the tube's radius
+_WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,9 @@ class Grid:
         return points
 
 
-def plane_grid(robot: Robot, plane: str, offset: float, margin: float | None, resolution: int) -> Grid:
+def plane_grid(
+    robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: Seat | None = None
+) -> Grid:
     """A grid on one of `PLANES`.
 
     Args:
@@ -62,24 +67,25 @@ def plane_grid(robot: Robot, plane: str, offset: float, margin: float | None, re
         offset: place on the axis across it, m.
         margin: how far it reaches beyond the robot, m; None: a default.
         resolution: points along the longer side.
+        seat: the robot's place in a tube, beyond whose glass there is no grid.
 
     Raises:
         InputError: if the grid would be too small or too large.
     """
-    box = {axis: side for axis, side in _box(robot, margin).items() if axis in plane}
+    box = {axis: side for axis, side in _box(robot, margin, seat).items() if axis in plane}
     return _grid(box, {PLANES[plane]: np.array([offset])}, resolution, "resolution")
 
 
-def volume_grid(robot: Robot, margin: float | None, resolution: int) -> Grid:
+def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> Grid:
     """A grid in a box around the robot; arguments as for `plane_grid`.
 
     Raises:
         InputError: if the grid would be too small or too large.
     """
-    return _grid(_box(robot, margin), {}, resolution, "volume resolution")
+    return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
 
 
-def _box(robot: Robot, margin: float | None) -> dict[str, tuple[float, float]]:
+def _box(robot: Robot, margin: float | None, seat: Seat | None) -> dict[str, tuple[float, float]]:
     """Both ends of the box along each axis, m."""
     wire = 0.5 * robot.tail.wire_diameter
     coupling = 0.5 * robot.coupling.diameter if robot.coupling.length > 0 else 0.0
@@ -87,11 +93,29 @@ def _box(robot: Robot, margin: float | None) -> dict[str, tuple[float, float]]:
     beyond = _MARGIN * 2.0 * radius if margin is None else margin
     nose = 0.5 * robot.body.length
     across = (-radius - beyond, radius + beyond)
-    return {
+    box = {
         "x": (-nose - robot.coupling.length - robot.tail.length - wire - beyond, nose + beyond),
         "y": across,
         "z": across,
     }
+    return box if seat is None else _in_glass(box, seat, whole=margin is None)
+
+
+def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -> dict[str, tuple[float, float]]:
+    """The box, cut off a little outside of a tube's wall.
+
+    Args:
+        box: both ends along each axis, m.
+        seat: the tube.
+        whole: show all of a tube that is not much wider than the box.
+    """
+    reach = (1.0 + _GLASS) * seat.radius
+    heights = [(seat.offset - x * np.sin(seat.pitch)) / np.cos(seat.pitch) for x in box["x"]]
+    up = reach / np.cos(seat.pitch)
+    glass = {"y": (-reach, reach), "z": (min(heights) - up, max(heights) + up)}
+    if whole and reach < _WIDEST * box["y"][1]:
+        return {**box, **glass}
+    return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}
 
 
 def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> Grid:
@@ -132,6 +156,7 @@ def dataset_on(
     fields: Callable[[Samples], tuple[Samples, Samples]],
     frame: str,
     progress: Progress | None,
+    seat: Seat | None = None,
 ) -> xr.Dataset:
     """The flow on a grid, NaN inside solids; an axis with one point becomes a scalar.
 
@@ -141,6 +166,7 @@ def dataset_on(
         fields: velocity (n, 3) and pressure (n,) at points in the fluid.
         frame: the velocity's frame, for its description.
         progress: told how many points are done.
+        seat: the robot's place in a tube, in whose glass points lie too.
     """
     import xarray as xr
 
@@ -162,13 +188,14 @@ def dataset_on(
     shape = tuple(count for count in grid.shape if count > 1)
     columns = {
         **{f"velocity_{axis}": ("m/s", f"fluid velocity along {axis}, frame: {frame}") for axis in _AXES},
-        "pressure": ("Pa", "fluid pressure, zero far away"),
+        "pressure": ("Pa", f"fluid pressure, {'zero far away' if seat is None else 'above the mean of both ends'}"),
     }
     data: dict[str, Any] = {
         name: (dims, values[:, place].reshape(shape), {"units": unit, "long_name": meaning})
         for place, (name, (unit, meaning)) in enumerate(columns.items())
     }
-    meaning = "whether the point lies inside body, coupling or tail"
+    solids = "body, coupling or tail" if seat is None else "body, coupling or tail, or outside the tube"
+    meaning = f"whether the point lies inside {solids}"
     data["inside"] = (dims, solid.reshape(shape), {"units": "1", "long_name": meaning})
     return xr.Dataset(data, coords=dict(_coordinates(grid)))
 

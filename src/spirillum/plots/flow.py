@@ -1,4 +1,4 @@
-"""The flow around a robot on a plane: speed with streamlines, and pressure."""
+"""The flow around a robot on a plane: speed with streamlines, and pressure; in a tube the pressure along it too."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.ticker import NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Values
 from spirillum.plots.scene import HALO
-from spirillum.plots.section import draw_section
+from spirillum.plots.section import draw_glass, draw_section
 from spirillum.plots.style import COLOURS, Scale, new_figure, plain, styled
 from spirillum.units import Hz
 
@@ -29,6 +29,8 @@ __all__ = ["flow_figure"]
 
 _LEFT, _RIGHT, _HEAD, _FOOT, _X_LABEL, _GAP = 0.72, 0.95, 0.86, 0.52, 0.46, 0.3
 """Margins of the figure, room below a panel, and room between panels, inches."""
+_LINE, _STRIP = 0.18, 1.1
+"""Height of a further line of words above the panels, and of the panel of the pressure along a tube, inches."""
 _WIDE, _SQUARE, _TALLEST = 6.6, 3.3, 4.2
 """Width of a panel among stacked ones and of one beside another; largest height, inches."""
 _SPEED_DECADES = 3.0
@@ -36,6 +38,7 @@ _SPEED_DECADES = 3.0
 _PRESSURE_DECADES = 2.0
 """Range of the pressure's logarithmic colours on each side; below it they are linear."""
 _LINES_PER_INCH = 0.36
+_LINES = "direction of the velocity's part in the plane"
 
 
 @dataclass(frozen=True)
@@ -92,13 +95,19 @@ class _View:
 def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
     """Two panels to scale: speed (logarithmic colours) with streamlines, and pressure (colours about zero).
 
+    In a tube a plane along it gets a third one: the pressure at the glass that the robot does not lie on.
+
     Args:
         flow: what `spirillum.flow` returns.
         plane: what its `plane` returns.
     """
     view = _View.of(plane)
     with styled():
-        figure, panels, bars = _panels(float(np.ptp(view.x)), float(np.ptp(view.y)))
+        words = list(_conditions(flow, view))
+        strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
+        figure, panels, bars = _panels(
+            view, _HEAD + _LINE * (len(words) - 2), _STRIP + _GAP + _X_LABEL if strip else 0.0
+        )
         scale = 72.0 * figure.get_size_inches()[0] * panels[0].get_position().width / float(np.ptp(view.x))
         unit = view.lengths.factor
         for letter, axes in zip("ab", panels, strict=True):
@@ -107,31 +116,43 @@ def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
             axes.set_title(f"{letter})", loc="left", pad=3, weight="bold")
             axes.set_xlabel(f"${view.first}$ ({view.lengths.unit})")
             axes.set_ylabel(f"${view.second}$ ({view.lengths.unit})")
-            draw_section(axes, flow.robot, view.name, view.offset, phase=flow.phase, unit=unit, points=scale)
+            if flow.seat is not None:
+                draw_glass(axes, flow.seat, view.name, view.offset, unit)
+            drop = flow.prediction.batch.placement.tail_drop
+            draw_section(axes, flow.robot, view.name, view.offset, phase=flow.phase, unit=unit, points=scale, drop=drop)
         _draw_speed(figure, panels[0], bars[0], view)
         _draw_lines(figure, panels[0], view)
         _draw_pressure(figure, panels[1], bars[1], view)
         if flow.frame == "lab" and view.first == "x":
-            _draw_heading(panels[0], flow, unit)
-        _write_words(figure, flow, view)
+            _draw_heading(panels[0], flow, view)
+        if strip:
+            _draw_strip(figure, panels[1], view)
+        _write_words(figure, flow, words, list(_notes(flow, view)))
         return figure
 
 
-def _panels(width: float, height: float) -> tuple[Figure, list[Axes], list[Axes]]:
-    """Figure, panels and the axes of their colour bars: stacked for a long plane, else side by side."""
+def _panels(view: _View, head: float, below: float) -> tuple[Figure, list[Axes], list[Axes]]:
+    """Figure, panels and the axes of their colour bars: stacked for a long plane, else side by side.
+
+    Args:
+        view: the plane.
+        head: room above the panels, inches.
+        below: room below them for another one, inches.
+    """
+    width, height = float(np.ptp(view.x)), float(np.ptp(view.y))
     stacked = width > 1.25 * height
     across = _WIDE if stacked else _SQUARE
     share = min(1.0, _TALLEST / (across * height / width))
     w, h = across * share, across * height / width * share
     columns, rows = (1, 2) if stacked else (2, 1)
     total_w = columns * (_LEFT + w + _RIGHT)
-    total_h = _HEAD + rows * (h + _X_LABEL) + (rows - 1) * _GAP + _FOOT
+    total_h = head + rows * (h + _X_LABEL) + (rows - 1) * _GAP + below + _FOOT
     figure = new_figure(total_w, total_h)
     panels, bars = [], []
     for number in range(2):
         column, row = (0, number) if stacked else (number, 0)
         left = column * (_LEFT + w + _RIGHT) + _LEFT
-        bottom = total_h - _HEAD - (row + 1) * h - row * (_X_LABEL + _GAP)
+        bottom = total_h - head - (row + 1) * h - row * (_X_LABEL + _GAP)
         panels.append(figure.add_axes((left / total_w, bottom / total_h, w / total_w, h / total_h)))
         bars.append(figure.add_axes(((left + w + 0.1) / total_w, bottom / total_h, 0.13 / total_w, h / total_h)))
         # Ticks are made when they are drawn, which a caller may do outside `styled`.
@@ -215,18 +236,20 @@ def _draw_lines(figure: Figure, axes: Axes, view: _View) -> None:
     )
 
 
-def _draw_heading(axes: Axes, flow: Flow, unit: float) -> None:
+def _draw_heading(axes: Axes, flow: Flow, view: _View) -> None:
     """An arrow before the nose, or behind the tail: where the robot swims."""
+    unit = view.lengths.factor
     ahead = flow.prediction.forward_velocity >= 0
     body, coupling, tail = flow.robot.body, flow.robot.coupling, flow.robot.tail
     end = 0.5 * body.length if ahead else -0.5 * body.length - coupling.length - tail.length
     sense, reach = (1.0 if ahead else -1.0), 0.35 * body.diameter
-    start = (end + sense * 0.2 * reach) / unit
-    stop = (end + sense * 1.4 * reach) / unit
+    along = flow.heading[["xyz".index(view.first), "xyz".index(view.second)]]
+    start = np.array([end + sense * 0.2 * reach, 0.0]) / unit
+    stop = start + sense * 1.2 * reach / unit * along
     axes.add_patch(
         FancyArrowPatch(
-            (start, 0.0),
-            (stop, 0.0),
+            (float(start[0]), float(start[1])),
+            (float(stop[0]), float(stop[1])),
             arrowstyle="simple,head_length=0.5,head_width=0.55,tail_width=0.2",
             mutation_scale=18,
             facecolor=COLOURS["orange"],
@@ -235,18 +258,45 @@ def _draw_heading(axes: Axes, flow: Flow, unit: float) -> None:
             zorder=9,
         )
     )
-    place = (0.5 * (start + stop), 0.28 * body.diameter / unit)
-    axes.text(*place, "$U_x$", ha="center", va="center", size=9, color="black", path_effects=[HALO], zorder=10)
+    x, y = 0.5 * (start + stop) + np.array([0.0, 0.28 * body.diameter / unit])
+    axes.text(x, y, "$U_x$", ha="center", va="center", size=9, color="black", path_effects=[HALO], zorder=10)
 
 
-def _write_words(figure: Figure, flow: Flow, view: _View) -> None:
+def _at_glass(view: _View) -> tuple[Values, Values]:
+    """Places along the tube, and pressures (Pa) at the plane's uppermost points of the fluid there."""
+    pressure = view.values("pressure")
+    free = np.isfinite(pressure)
+    there = np.flatnonzero(free.any(axis=0))
+    upper = len(free) - 1 - np.argmax(free[::-1], axis=0)
+    return view.x[there], pressure[upper[there], there]
+
+
+def _draw_strip(figure: Figure, above: Axes, view: _View) -> None:
+    """The pressure along the tube, below a panel that shows the plane."""
+    x, pressure = _at_glass(view)
+    scale = Scale.of(pressure, "Pa")
+    place, height = above.get_position(), float(figure.get_size_inches()[1])
+    bottom = place.y0 - (_X_LABEL + _GAP + _STRIP) / height
+    axes = figure.add_axes((place.x0, bottom, place.width, _STRIP / height))
+    axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)
+    axes.axhline(0.0, color="#888888", linewidth=0.6)
+    axes.set_xlim(above.get_xlim())
+    axes.set_title("c)", loc="left", pad=3, weight="bold")
+    axes.set_xlabel(above.get_xlabel())
+    axes.set_ylabel(f"pressure ({scale.unit})")
+    axes.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
+    side = "upper glass" if view.second == "z" else "glass on the left"
+    axes.set_title(f"at the {side}", loc="right", pad=3, size=8, color="#333333")
+
+
+def _write_words(figure: Figure, flow: Flow, words: list[str], notes: list[str]) -> None:
     width, height = figure.get_size_inches()
     left = 0.15 / width
     title = f"Flow around {plain(flow.robot.name, 50)}"
     figure.text(left, 1 - 0.12 / height, title, va="top", size=11, weight="bold")
-    words = "\n".join(_conditions(flow, view)).replace("-", "−")
-    figure.text(left, 1 - 0.36 / height, words, va="top", size=9, color="#333", linespacing=1.25)
-    for number, line in enumerate(_notes(flow, view)):
+    lines = "\n".join(words).replace("-", "−")
+    figure.text(left, 1 - 0.36 / height, lines, va="top", size=9, color="#333", linespacing=1.25)
+    for number, line in enumerate(notes):
         figure.text(left, (0.40 - 0.17 * number) / height, line, va="top", size=8, color="#333")
 
 
@@ -260,16 +310,39 @@ def _conditions(flow: Flow, view: _View) -> Iterator[str]:
         f"$U_x$ = {motion.forward_velocity / speed.factor:.4g} {speed.unit}, "
         f"tail {motion.tail_rotation_rate / Hz:.4g} Hz, body {motion.body_rotation_rate / Hz:.4g} Hz"
     )
+    if flow.seat is not None:
+        yield ", ".join(_place(flow, unit))
+
+
+def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
+    """Where in its tube the robot lies, and what the fluid is made to do."""
+    placement, motion = flow.prediction.placement, flow.prediction
+    yield f"gap {placement['gap']['value'] / lengths.factor:.4g} {lengths.unit}"
+    if flow.seat is not None and flow.seat.pitch:
+        yield f"pitch {np.degrees(flow.seat.pitch):.4g}°"
+    if "tail_drop" in placement:
+        yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
+    mean = Scale.of(np.array([motion.plug_velocity]), "m/s")
+    through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
+    if motion.batch.placement.flow is not None:
+        yield f"imposed mean flow {through}"
+    elif placement["ends"] == "closed":
+        yield "ends closed"
+    else:
+        yield f"ends open, mean flow {through}"
 
 
 def _notes(flow: Flow, view: _View) -> Iterator[str]:
-    drawn = ["grey: robot where the plane cuts it"]
+    oblique = flow.seat is not None and (view.name == "xy" or view.offset != 0)
+    lines = "velocity's part in the plane, ending at oblique glass" if oblique else _LINES
+    drawn = ["grey: robot where it is cut" if oblique else "grey: robot where the plane cuts it"]
     if view.first == "x":
         drawn.append("white band: tail")
         drawn += ["dashed: its full outline"] if view.offset != 0 else []
-    yield f"Lines: direction of the velocity's part in the plane; {', '.join(drawn)}."
+    yield f"Lines: {lines}; {', '.join(drawn)}."
     held = ""
     if flow.held_force > 0:
         force = Scale.of(np.array([flow.held_force]), "N")
         held = f" Held from moving sideways by {flow.held_force / force.factor:.2g} {force.unit}."
-    yield f"Unbounded fluid: no walls.{held} Computed, nothing is measured."
+    walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
+    yield f"{walls}{held} Computed, nothing is measured."

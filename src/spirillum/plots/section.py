@@ -6,15 +6,18 @@ from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path
 
 from spirillum.arrays import Values
+from spirillum.hydrodynamics.tube_wall import Seat
 from spirillum.plots.solids import wire_line
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.robot import Robot
 
-__all__ = ["draw_section"]
+__all__ = ["draw_glass", "draw_section"]
 
+_GLASS, _RIM = "#dfe9f1", "#5d7486"
 _FILL, _EDGE, _BEYOND = "#a3a8ac", "#22292e", "#4a5258"
 _SAMPLES = np.linspace(0.0, 1.0, 400)
 _CELLS_PER_RADIUS = 6.0
@@ -22,7 +25,15 @@ _MOST_CELLS = 400_000
 
 
 def draw_section(
-    axes: Axes, robot: Robot, plane: str, offset: float, *, phase: float, unit: float, points: float
+    axes: Axes,
+    robot: Robot,
+    plane: str,
+    offset: float,
+    *,
+    phase: float,
+    unit: float,
+    points: float,
+    drop: float = 0.0,
 ) -> None:
     """Draw the robot on a plane, on whose axes the panel stands.
 
@@ -34,8 +45,9 @@ def draw_section(
         phase: phase of the tail, rad.
         unit: length of one drawing unit, m.
         points: typographic points in one drawing unit.
+        drop: distance by which the tail's axis is lowered, m.
     """
-    line = wire_line(robot, phase, 1.0)
+    line = wire_line(robot, phase, 1.0) - np.array([0.0, 0.0, drop])
     across = next(number for number, axis in enumerate("xyz") if axis not in plane)
     along = [number for number in range(3) if number != across]
     if plane != "yz":
@@ -52,6 +64,44 @@ def draw_section(
         if (cut := _cut(outline, plane, offset)) is not None:
             axes.add_patch(Polygon(cut / unit, closed=True, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=7))
     _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
+
+
+def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
+    """Draw the glass of a tube, cut by a plane, over all that lies beyond its wall.
+
+    Args:
+        axes: the panel, in `unit`, its limits set.
+        seat: the tube, and where in it the robot lies.
+        plane: `xz`, `xy` or `yz`, horizontal axis first.
+        offset: place of the plane on the axis across it, m.
+        unit: length of one drawing unit, m.
+    """
+    wall = _bore(seat, plane, offset, np.array(axes.get_xlim()) * unit) / unit
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    frame = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
+    # A path with a hole: the bore runs against the frame.
+    codes = [[Path.MOVETO, *[Path.LINETO] * (len(line) - 1)] for line in (frame, wall)]
+    glass = Path(np.concatenate([frame, wall]), np.concatenate(codes))
+    axes.add_patch(PathPatch(glass, facecolor=_GLASS, edgecolor="none", zorder=5.5))
+    axes.add_patch(Polygon(wall, closed=True, fill=False, edgecolor=_RIM, linewidth=1.0, zorder=5.6))
+
+
+def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
+    """Corners of the bore's section, clockwise, m, (n, 2); it is carried on beyond both ends of the panel."""
+    cos, sin = np.cos(seat.pitch), np.sin(seat.pitch)
+    if plane == "yz":
+        angle = -2.0 * np.pi * _SAMPLES
+        height = (seat.offset - offset * sin) / cos
+        return np.column_stack([seat.radius * np.cos(angle), height + seat.radius / cos * np.sin(angle)])
+    x = ends.mean() + 0.55 * np.ptp(ends) * np.linspace(-1.0, 1.0, 800)
+    if plane == "xz":
+        middle = (seat.offset - x * sin) / cos
+        half = np.full(x.size, np.sqrt(max(seat.radius**2 - offset**2, 0.0)) / cos)
+    else:
+        middle = np.zeros(x.size)
+        half = np.sqrt(np.maximum(seat.radius**2 - (x * sin + offset * cos - seat.offset) ** 2, 0.0))
+    upper, lower = np.column_stack([x, middle + half]), np.column_stack([x, middle - half])
+    return np.concatenate([upper, lower[::-1]])
 
 
 def _outlines(robot: Robot) -> Iterable[Outline]:

@@ -1,0 +1,104 @@
+"""`sp.flow` with the model `tube`: its motion, its grids in the glass, its frame, and what it refuses."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.motion.flow import box_around, plane_around, seat_in_tube
+
+WIDE, R = "biorob2012-wide", 0.02
+PLACE = {"gap": "1.5 mm", "pitch": "2 deg"}
+
+
+@pytest.fixture(scope="module")
+def swimming() -> sp.Flow:
+    """The paper's robot, nose up, in the open tube."""
+    return sp.flow(WIDE, model="tube", tail_rate="1.2 Hz", phase="40 deg", placement=PLACE, tolerance=0.05)
+
+
+def test_motion_is_the_predicted_one(swimming: sp.Flow) -> None:
+    alone = sp.predict(WIDE, model="tube", tail_rate="1.2 Hz", placement=PLACE, tolerance=0.05, band=False)
+    assert swimming.prediction.forward_velocity == alone.forward_velocity
+    speed, c, s = alone.forward_velocity, np.cos(np.radians(2.0)), np.sin(np.radians(2.0))
+    np.testing.assert_allclose(swimming.heading, [c, 0.0, -s])
+    field: Any = swimming.field
+    np.testing.assert_allclose(field.twists[[0, 2, 6, 8]], speed * np.array([c, -s, c, -s]))
+    assert field.twists[3] == alone.body_rotation_rate
+    assert field.twists[9] == alone.tail_rotation_rate
+    assert field.mean_flow == alone.plug_velocity != 0.0
+    assert not any("walls" in warning for warning in swimming.warnings)
+
+
+def test_held_force_is_across_the_tube(swimming: sp.Flow) -> None:
+    force = swimming.field.wrench()[:3]
+    along = float(force @ swimming.heading)
+    assert swimming.held_force == pytest.approx(np.sqrt(force @ force - along**2))
+    assert abs(along) < 0.3 * swimming.held_force
+
+
+def test_grids_end_at_the_glass(swimming: sp.Flow) -> None:
+    seat = swimming.seat
+    assert seat is not None
+    data = swimming.plane("yz", offset="30 mm", resolution=41)
+    y, z = np.meshgrid(data["y"], data["z"], indexing="ij")
+    c, s = np.cos(seat.pitch), np.sin(seat.pitch)
+    rho = np.hypot(y, 0.03 * s + z * c - seat.offset)
+    np.testing.assert_array_equal(data["inside"], rho >= R)
+    np.testing.assert_array_equal(np.isnan(data["velocity_x"]), rho >= R)
+    assert R < float(data["y"][-1]) < 1.2 * R
+    assert "outside the tube" in data["inside"].attrs["long_name"]
+    assert "mean of both ends" in data["pressure"].attrs["long_name"]
+    assert data.attrs["plug_velocity"] == swimming.prediction.plug_velocity
+    assert data.attrs["model"] == "tube"
+
+
+def test_as_much_flows_through_planes_as_the_mean_flow_says(swimming: sp.Flow) -> None:
+    data = swimming.plane("yz", offset="30 mm", resolution=41).fillna(0.0)
+    through = data["velocity_x"] * swimming.heading[0] + data["velocity_z"] * swimming.heading[2]
+    mean = float(through.integrate(["y", "z"])) / (np.pi * R**2)
+    assert mean == pytest.approx(swimming.prediction.plug_velocity, abs=0.02 * float(np.abs(through).max()))
+
+
+def test_the_body_frame_lacks_the_velocity_along_the_tube(swimming: sp.Flow) -> None:
+    from dataclasses import replace
+
+    points = np.array([[0.03, 0.0, 0.0], [-0.05, 0.008, 0.0]])
+    difference = swimming.velocity(points) - replace(swimming, frame="body").velocity(points)
+    np.testing.assert_allclose(difference, np.tile(swimming.prediction.forward_velocity * swimming.heading, (2, 1)))
+
+
+def test_boxes_show_a_tube_whole_unless_it_is_wide_or_an_extent_is_given() -> None:
+    robot = sp.load(WIDE)
+    seat = seat_in_tube(robot, "tube", {"gap": "1 mm"})
+    assert seat is not None
+    whole = plane_around(robot, "yz", seat=seat).axes
+    assert whole[1][-1] == pytest.approx(1.05 * R, rel=0.02)
+    assert (whole[2][0], whole[2][-1]) == pytest.approx((0.01 - 1.05 * R, 0.01 + 1.05 * R), abs=2e-4)
+    closer = box_around(robot, "3 mm", seat=seat).axes
+    assert closer[2][0] == pytest.approx(0.01 - 1.05 * R, abs=1e-3)
+    assert closer[2][-1] == pytest.approx(0.012, abs=1e-3)
+    broad = sp.load(WIDE, **{"channel.diameter": "300 mm"})
+    axes = plane_around(broad, "yz", seat=seat_in_tube(broad, "tube", {"gap": "1 mm"})).axes
+    assert axes[2][-1] == pytest.approx(0.009 + 1.2 * 0.018, abs=3e-4)
+    assert axes[2][0] == pytest.approx(-0.01 - 0.05 * 0.15, abs=3e-4)
+    assert seat_in_tube(robot, "slender") is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"model": "sbt"}, "model = 'sbt'.*allowed: slender, tube"),
+        ({"model": "tubes"}, "model = 'tubes' .did you mean tube"),
+        ({"placement": {"gap": "0.5 mm"}}, "placement"),
+        ({"tolerance": 0.01}, "tolerance = 0.01 with model 'slender'"),
+        ({"model": "tube", "placement": {"gap": "5 cm"}}, "placement.gap"),
+        ({"model": "tube", "placement": {"height": "5 cm"}}, "height"),
+        ({"model": "tube", "tolerance": 1.0}, "tolerance = 1.0; allowed"),
+        ({"model": "tube", "robot": {"extends": WIDE, "channel": "none"}}, "channel"),
+    ],
+)
+def test_wrong_questions_are_named(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(sp.InputError, match=words):
+        sp.flow(**{"robot": WIDE, "tail_rate": "1.2 Hz", **arguments})
