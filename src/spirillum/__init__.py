@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from spirillum.motion.comparison import ModelComparison, compare_models
     from spirillum.motion.flow import Flow, flow
     from spirillum.motion.prediction import Prediction, predict
+    from spirillum.motion.settling import Settling, settle
     from spirillum.motion.swimming import Swimming, swim
     from spirillum.motion.transient import simulate
     from spirillum.robot import Robot, RobotBatch, load
@@ -30,6 +31,7 @@ __all__ = [
     "Resistance",
     "Robot",
     "RobotBatch",
+    "Settling",
     "Swimming",
     "citation",
     "compare_models",
@@ -37,6 +39,7 @@ __all__ = [
     "load",
     "predict",
     "resistance",
+    "settle",
     "simulate",
     "study",
     "swim",
@@ -50,6 +53,7 @@ _HOME = {
     "Resistance": "spirillum.hydrodynamics.resistance",
     "Robot": "spirillum.robot",
     "RobotBatch": "spirillum.robot",
+    "Settling": "spirillum.motion.settling",
     "Swimming": "spirillum.motion.swimming",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
@@ -57,6 +61,7 @@ _HOME = {
     "load": "spirillum.robot",
     "predict": "spirillum.motion.prediction",
     "resistance": "spirillum.hydrodynamics.resistance",
+    "settle": "spirillum.motion.settling",
     "simulate": "spirillum.motion.transient",
     "study": "spirillum.studies",
     "swim": "spirillum.motion.swimming",

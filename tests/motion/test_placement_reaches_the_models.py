@@ -35,27 +35,27 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str
 
 
 def test_prediction(walled: Any) -> None:
-    answer = sp.predict(WIDE, model="walled", tail_rate="1.2 Hz", placement=LOW)
+    answer = sp.predict(WIDE, model="walled", tail_rate="1.2 Hz", placement=LOW, band=False)
     assert answer.batch.placement == Placement.of(LOW)
     assert answer.placement == {"kind": "in the channel", "gap": {"value": 5e-4, "unit": "m"}, "ends": "open"}
     written = answer.to_dict()
     assert written["placement"] == answer.placement
     assert written["plug_velocity"] == {"value": answer.plug_velocity, "unit": "m/s"}
     assert not any("no calibration" in sentence for sentence in answer.warnings)
-    carried = sp.predict(WIDE, model="walled", tail_rate="1.2 Hz", placement={"flow": 1e-3})
+    carried = sp.predict(WIDE, model="walled", tail_rate="1.2 Hz", placement={"flow": 1e-3}, band=False)
     assert carried.forward_velocity > answer.forward_velocity
     assert sp.predict(WIDE, tail_rate="1 Hz").to_dict()["plug_velocity"]["value"] is None
 
 
 def test_a_tail_at_rest_is_carried_by_a_flow(walled: Any) -> None:
-    answer = sp.predict(WIDE, model="walled", tail_rate=0.0, placement={"flow": 1e-3})
+    answer = sp.predict(WIDE, model="walled", tail_rate=0.0, placement={"flow": 1e-3}, band=False)
     assert answer.forward_velocity > 0
     assert answer.to_dict()["advance_per_radian"]["value"] is None
     assert "a tail at rest drives nothing" in refused(lambda: sp.predict(WIDE, model="walled", tail_rate=0.0))
 
 
 def test_fast_flow_warns(walled: Any) -> None:
-    answer = sp.predict(WIDE, model="walled", tail_rate="1 Hz", placement={"flow": "-50 mm/s"})
+    answer = sp.predict(WIDE, model="walled", tail_rate="1 Hz", placement={"flow": "-50 mm/s"}, band=False)
     assert any("Reynolds number (imposed flow, body diameter) = 0.25" in sentence for sentence in answer.warnings)
 
 
@@ -92,7 +92,7 @@ def test_models_without_walls_refuse(walled: Any) -> None:
 
 def test_study(walled: Any) -> None:
     placed = sp.study({**STUDY, "models": ["walled", "sbt"], "placement": {"flow": "-1 mm/s"}})
-    alone = sp.predict(WIDE, model="walled", placement={"flow": "-1 mm/s"})
+    alone = sp.predict(WIDE, model="walled", placement={"flow": "-1 mm/s"}, band=False)
     found = placed.sel(model="walled", friction="rotor", robot=WIDE)
     assert float(found["forward_velocity"]) == alone.forward_velocity
     assert float(found["plug_velocity"]) == alone.plug_velocity
@@ -114,12 +114,12 @@ def test_study_file_needs_units(walled: Any) -> None:
 
 def test_command_line(walled: Any, run: Callable[..., tuple[int, str, str]]) -> None:
     model = ("--model", "walled")
-    code, out, _ = run("predict", WIDE, *model, "--gap", "0.5mm", "--ends", "closed", "--json")
+    code, out, _ = run("predict", WIDE, *model, "--gap", "0.5mm", "--ends", "closed", "--no-band", "--json")
     answer = json.loads(out)
     assert (code, answer["placement"]["gap"]["value"], answer["placement"]["ends"]) == (0, 5e-4, "closed")
-    direct = sp.predict(WIDE, model="walled", placement={"gap": 5e-4, "ends": "closed"})
+    direct = sp.predict(WIDE, model="walled", placement={"gap": 5e-4, "ends": "closed"}, band=False)
     assert answer["forward_velocity"]["value"] == direct.forward_velocity
-    code, out, _ = run("predict", WIDE, *model, "--flow", "-2mm/s", "--tail-rate", "1Hz")
+    code, out, _ = run("predict", WIDE, *model, "--flow", "-2mm/s", "--tail-rate", "1Hz", "--no-band")
     assert code == 0
     assert "placement: in the channel, gap - mm" not in out
     assert "plug velocity" in out

@@ -34,7 +34,20 @@ def fig5(paper_study: Any) -> Any:
 
 
 def test_paper_study_has_the_papers_figures(paper_study: Any) -> None:
-    assert list(study_figures(paper_study)) == ["fig5-wide", "fig6-narrow", "bound"]
+    assert list(study_figures(paper_study)) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
+
+
+def test_drop_equals_the_dataset_and_has_the_papers_mean(paper_study: Any) -> None:
+    figure = study_figures(paper_study)["drop"].figure()
+    free = paper_study.sel(friction="none")
+    per_turn = free["forward_velocity"] / free["motor_rotation_rate"]
+    loss = 100 * (1 - per_turn.sel(channel="narrow") / per_turn.sel(channel="wide"))
+    for column, axes in enumerate(figure.axes):
+        for model in ("sbt", "rft"):
+            (drawn,) = curves(axes, model)
+            np.testing.assert_allclose(drawn.get_ydata(), loss.sel(model=model).isel(wavelength=column))
+        assert any(list(line.get_ydata()) == [38.9, 38.9] for line in axes.get_lines())
+    assert {"SBT (Table III)", "RFT (Table III)", "paper: global mean 38.9 %"} <= set(legend_entries(figure))
 
 
 def test_panels_are_lettered_in_the_papers_order(fig5: Any) -> None:

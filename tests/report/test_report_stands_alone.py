@@ -72,7 +72,7 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, Any]:
 def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Page, Any]) -> None:
     folder = paper[0]
     assert sorted(path.name for path in folder.iterdir()) == ["claims.json", "figures", "report.html"]
-    names = ["bound", "fig5-wide", "fig6-narrow", "robot"]
+    names = ["bound", "drop", "fig5-wide", "fig6-narrow", "robot"]
     assert sorted(path.name for path in (folder / "figures").iterdir()) == sorted(
         f"{name}.{suffix}" for name in names for suffix in ("png", "svg")
     )
@@ -81,7 +81,7 @@ def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Pa
 def test_pictures_are_inside_and_described(paper: tuple[Path, Page, Any]) -> None:
     folder, page, _ = paper
     images = page.all("img")
-    assert len(images) == 4
+    assert len(images) == 5
     for image in images:
         kind, _, data = (image["src"] or "").partition(";base64,")
         assert kind == "data:image/svg+xml"

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
 from spirillum.cli.options import (
     Accuracy,
@@ -28,14 +29,13 @@ from spirillum.cli.options import (
     TailDrop,
     TailRate,
     Tolerance,
-    complete_frames,
     complete_models,
     complete_parts,
-    complete_planes,
     complete_resistance_models,
     complete_schemas,
 )
 from spirillum.cli.robot_commands import robot_app
+from spirillum.cli.settle_commands import settle
 
 __all__ = ["app"]
 
@@ -48,6 +48,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(robot_app, name="robot")
+app.command()(settle)
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
@@ -87,6 +88,10 @@ def predict(
     flow: ImposedFlow = None,
     tolerance: Tolerance = None,
     phases: Phases = None,
+    no_band: Annotated[
+        bool,
+        typer.Option("--no-band", help="Model tube: the reference place alone where gap or pitch is not given; fast."),
+    ] = False,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -97,7 +102,7 @@ def predict(
     from spirillum.cli import text
     from spirillum.motion.prediction import predict as answer
 
-    with text.patience(model, quiet=json):
+    with text.progress_bar(quiet=json) as progress:
         result = answer(
             loaded_robot(robot, settings),
             model=model,
@@ -109,6 +114,8 @@ def predict(
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
             tolerance=tolerance,
             phases=phases,
+            band=not no_band,
+            progress=progress,
         )
     text.show(result.to_dict(), text.prediction, json=json)
 
@@ -225,6 +232,18 @@ def study(
     observations: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Observed rates and speeds (CSV): B_eff is inferred from them.")
     ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(autocompletion=complete_models, help="A model instead of the study's; repeatable."),
+    ] = None,
+    band: Annotated[
+        bool | None,
+        typer.Option(
+            "--band/--no-band",
+            help="Model tube: the band over gap and pitch too (many minutes), or not; else as the study says.",
+            show_default=False,
+        ),
+    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -238,7 +257,13 @@ def study(
         from spirillum.studies.run import study as answer
 
         dataset = answer(
-            source, observations=observations, output=output, overrides=overrides_from(settings), progress=progress
+            source,
+            observations=observations,
+            output=output,
+            overrides=overrides_from(settings),
+            models=model,
+            band=band,
+            progress=progress,
         )
     text.show(text.study_answer(dataset, output), text.study, json=json)
 
@@ -290,69 +315,7 @@ def simulate(
     text.show(text.simulation_answer(dataset, output), text.simulation, json=json)
 
 
-@app.command()
-def flow(
-    robot: RobotArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
-    ] = None,
-    volume: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A box around the robot: .vti for ParaView, or .nc.")
-    ] = None,
-    plane: Annotated[
-        str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
-    ] = "xz",
-    offset: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Place of the plane on the axis across it, such as -50mm.")
-    ] = "0mm",
-    extent: Annotated[
-        str | None,
-        typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
-    ] = None,
-    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
-    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
-    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
-    frame: Annotated[
-        str, typer.Option(autocompletion=complete_frames, help="lab, or body (moving with its forward velocity).")
-    ] = "lab",
-    tail_rate: TailRate = None,
-    friction: Friction = None,
-    accuracy: Accuracy = "high",
-    settings: Settings = None,
-    json: Json = False,
-) -> None:
-    """Compute velocity and pressure of the fluid around the swimming robot: a picture, or numbers on a grid.
-
-    Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
-    """
-    from spirillum.cli import flow_text, text
-    from spirillum.motion.flow import box_around, plane_around
-    from spirillum.motion.flow import flow as answer
-
-    flow_text.check_targets(output, volume)
-    loaded = loaded_robot(robot, settings)
-    plane_around(loaded, plane, offset, extent, resolution)
-    if volume is not None:
-        box_around(loaded, extent, volume_resolution)
-    with text.progress_bar(quiet=json) as progress:
-        progress("flow: forces on the robot", 0, 1)
-        found = answer(
-            loaded,
-            tail_rate=tail_rate,
-            friction=friction,
-            accuracy=accuracy or "high",
-            phase=text.angle(phase),
-            frame=frame,
-        )
-        written = {}
-        if output is not None:
-            written[output] = found.plane(plane, offset=offset, extent=extent, resolution=resolution, progress=progress)
-        if volume is not None:
-            written[volume] = found.volume(extent=extent, resolution=volume_resolution, progress=progress)
-        for path, dataset in written.items():
-            flow_text.write(found, dataset, path)
-    text.show(flow_text.flow_answer(found, written), flow_text.flow_table, json=json)
+app.command()(flow)
 
 
 @app.command()

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Answer = Mapping[str, Any]
 _NARROWEST = 80
+_NUMBERS = ("value", "low", "high", "SI")
+"""Columns of numbers."""
 
 # What people read beside the SI value.
 _FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
@@ -60,7 +62,7 @@ def grid(title: str, *columns: str) -> Table:
     """An empty table in the look of all answers."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
     for column in columns:
-        table.add_column(column, justify="right" if column in ("value", "SI") else "left")
+        table.add_column(column, justify="right" if column in _NUMBERS else "left")
     return table
 
 
@@ -94,11 +96,33 @@ def prediction(answer: Answer, console: Console) -> None:
     """Table of `predict`."""
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}"
-    table = grid(title, "quantity", "value", "unit", "SI")
-    add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
+    quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
+    if "band" in answer:
+        table = grid(title, "quantity", "value", "low", "high", "unit")
+        _add_bands(table, quantities)
+    else:
+        table = grid(title, "quantity", "value", "unit", "SI")
+        add_quantities(table, quantities)
     console.print(table)
     _show_placement(answer["placement"], console)
+    if "band" in answer:
+        places = len(answer["band"]["gap"]["value"])
+        console.print(
+            f"band: low and high are the least and the largest of {places + 1} places, none of them likelier than "
+            "another; value: the place above",
+            highlight=False,
+            soft_wrap=True,
+        )
     _show_error(answer["error_estimate"], console)
+
+
+def _add_bands(table: Table, items: Mapping[str, Any]) -> None:
+    """A row for each quantity that has a value: name, value, low and high of its band, unit."""
+    for name, item in items.items():
+        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
+            unit = friendly_unit(item["value"], item["unit"])
+            numbers = [in_unit(item.get(key), item["unit"], unit) for key in ("value", "low", "high")]
+            table.add_row(name.replace("_", " "), *numbers, "" if unit == "1" else unit)
 
 
 def _show_placement(placement: Answer, console: Console) -> None:
@@ -109,10 +133,19 @@ def _show_placement(placement: Answer, console: Console) -> None:
     for name, item in placement.items():
         if isinstance(item, Mapping) and item.get("value") is not None:
             value, unit = _friendly(item["value"], item["unit"])
-            said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip())
+            said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip() + _band_words(item))
         elif name != "kind" and isinstance(item, str):
             said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
     console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
+
+
+def _band_words(item: Mapping[str, Any]) -> str:
+    """Over what a field of the placement is left open."""
+    if "low" not in item:
+        return ""
+    unit = friendly_unit(item["high"], item["unit"])
+    low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
+    return f" (open: band over {low} to {high} {unit})"
 
 
 def _show_error(error: Answer, console: Console) -> None:

@@ -204,6 +204,7 @@ def compare_models(
                 friction=reading,
                 calibrated=factors,
                 placement=place if find_swimmer_model(name).placed else None,
+                band=False,
             )
         except InputError as error:
             refusals[name] = str(error)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
+from spirillum.motion.band import Band, band_of
 from spirillum.motion.swimming import (
     Swimming,
     calibrated_balance,
@@ -57,6 +58,8 @@ class Prediction:
     """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
+    band: Band | None = field(default=None, repr=False)
+    """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -71,13 +74,16 @@ class Prediction:
 
     @cached_property
     def placement(self) -> dict[str, Any]:
-        """Where the model places the robot."""
-        return self.model.placement_of(self.batch)
+        """Where the model places the robot; what a band goes over has `low`, `high` and `kind` too."""
+        found = self.model.placement_of(self.batch)
+        return found if self.band is None else self.band.placed(found)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum predict --json`."""
+        band = self.band
         quantities = {
-            name: quantity(getattr(self, name), unit, **_MORE.get(name, {})) for name, (unit, _) in _QUANTITIES.items()
+            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(band.of(name) if band else {}))
+            for name, (unit, _) in _QUANTITIES.items()
         }
         content = {
             "robot": self.robot.name,
@@ -86,6 +92,7 @@ class Prediction:
             "calibrated": self.calibrated,
             **quantities,
             "placement": self.placement,
+            **({"band": band.to_dict()} if band else {}),
             "error_estimate": quantity(self.error_estimate, "1", statement=self.model.stated_error(self.robot.model)),
             "references": list(self.references),
         }
@@ -113,8 +120,14 @@ def predict(
     placement: Placement | Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     phases: int | None = None,
+    band: bool = True,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
+
+    Where the answer depends on the robot's place in its channel and `placement` leaves its gap or its pitch open, the
+    answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and has a band over the places
+    that are possible, see `spirillum.motion.band`.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -130,6 +143,9 @@ def predict(
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
         tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
         phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
+        band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
+            place alone.
+        progress: told what is being computed, how many places are done, and of how many.
 
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
@@ -140,11 +156,14 @@ def predict(
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
 
-    def answer(of: SwimmerModel) -> Swimming:
+    def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
         rates = None if rate is None else np.array([rate])
-        return swim(batch, of, tail_rate=rates, friction=reading, calibrated=calibrated)
+        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated)
 
-    result = answer(chosen)
+    tell = progress or (lambda _what, _done, _total: None)
+    if not chosen.closed_form:
+        tell(f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+    result = answer(batch)
     if not result.valid[0]:
         raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
     warnings = [
@@ -155,8 +174,10 @@ def predict(
     ]
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
-    error = np.nan if check is None else float(speed_difference(answer(check), result)[0])
-    return Prediction(ready, chosen, reading, applied, batch, result, error, tuple(warnings))
+    error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
+    over = band_of(batch, chosen, result, answer, tell) if band else None
+    left_out = () if over is None else over.left_out
+    return Prediction(ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), over)
 
 
 def prepared(

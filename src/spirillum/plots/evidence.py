@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.hydrodynamics import SWIMMER_MODELS
 from spirillum.plots.style import Scale, plain
+from spirillum.studies.places import reference_place
 from spirillum.units import Hz
 
 if TYPE_CHECKING:
@@ -149,6 +151,43 @@ class Shown:
     def advance_per_turn(self, model: str) -> Values:
         """Forward velocity over the tail's rate, m/turn; without friction, where readings differ."""
         return self.values("advance_per_radian", model=model, friction=self.own_drive_readings[0]) * Hz
+
+    @cached_property
+    def banded(self) -> tuple[str, ...]:
+        """Names of the models that have a band over the places that the placement leaves open."""
+        if "forward_velocity_low" not in self.whole:
+            return ()
+        known = self.whole["forward_velocity_low"]
+        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+
+    def band(self, name: str, model: str) -> tuple[Values, Values]:
+        """Least and largest value of a quantity of free swimming, SI; NaN without a band."""
+        reading = self.own_drive_readings[0]
+        if model not in self.banded:
+            unknown = np.full_like(self.values(name, model=model, friction=reading), np.nan)
+            return unknown, unknown
+        low, high = (self.values(f"{name}_{end}", model=model, friction=reading) for end in ("low", "high"))
+        return low, high
+
+    @property
+    def place_words(self) -> str:
+        """Where robots lie for models that compute the walls, and what their bands are; empty without such models."""
+        computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
+        if not computed:
+            return ""
+        where = f"{', '.join(computed)}: {reference_place(json.loads(self.whole.attrs.get('settings', '{}')))}."
+        return f"{where} {self._band_words()}".strip()
+
+    def _band_words(self) -> str:
+        if not self.banded:
+            return ""
+        gaps = np.asarray(self.whole["gap_at_place"].values, dtype=float)
+        pitches = np.degrees(np.asarray(self.whole["pitch_at_place"].values, dtype=float))
+        return (
+            f"Bands: the least to the largest value over gaps of {np.nanmin(gaps) * 1e3:.3g} to "
+            f"{np.nanmax(gaps) * 1e3:.3g} mm and pitches of {np.nanmin(pitches):.3g} to {np.nanmax(pitches):.3g} deg "
+            "(without friction), none of them likelier than another."
+        )
 
     def observed_motor_rate(self) -> tuple[Values, Values]:
         """Observed omega_m with the half width of its interval, rad/s; else tail less body rate.

@@ -16,14 +16,29 @@ from spirillum.plots.evidence import Shown, spread
 from spirillum.plots.style import COLOURS, Look, Scale, label_of_model, look_of_model
 from spirillum.units import Hz
 
-__all__ = ["Row", "amplitude_handles", "bound_row", "grid_rows", "model_handles", "robot_rows"]
+__all__ = [
+    "Row",
+    "amplitude_handles",
+    "band_handles",
+    "bound_row",
+    "draw_band",
+    "draw_curve",
+    "grid_rows",
+    "model_handles",
+    "robot_rows",
+]
 
 MOST_CURVES = 6
-"""Amplitudes with a curve of their own against the assumed motor rate."""
+"""Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
+FEW_CURVES = 2
+"""The same for more models."""
 MOST_LARGE_MARKS = 60
 """Robots of a list whose marks have full size."""
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
 _OBSERVED = COLOURS["black"]
+_SHADE = 0.25  # opacity of a band
+_OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
+"""Look of the rotor's own friction: no model is drawn so."""
 Draw = Callable[[Axes, Shown, Values], None]
 
 
@@ -60,7 +75,7 @@ def robot_rows(shown: Shown) -> list[Row]:
     return [_advance_row(shown), _own_rate_row(shown), bound_row(shown)]
 
 
-def _curve(
+def draw_curve(
     axes: Axes, x: Values, y: Values, look: Look, *, hollow: bool = False, ring: bool = False, joined: bool = True
 ) -> None:
     """One line of marks: filled, hollow, or a ring around what may be the same value."""
@@ -86,16 +101,30 @@ def _advance_row(shown: Shown) -> Row:
 
     def draw(axes: Axes, part: Shown, x: Values) -> None:
         for model in part.models:
-            _curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
+            low, high = part.band("advance_per_radian", model)
+            draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
+            draw_curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
 
-    return Row(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw)
+    return Row(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
+
+
+def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
+    """What lies between least and largest value: a shade along a curve, a bar behind a mark that stands alone."""
+    known = np.isfinite(low) & np.isfinite(high)
+    if not np.any(known):
+        return
+    if joined:
+        axes.fill_between(x, low, high, where=known, color=look.colour, alpha=_SHADE, linewidth=0.0, zorder=2)
+    axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=_SHADE, linewidth=4.0, zorder=2)
 
 
 def _own_drive(axes: Axes, part: Shown, x: Values, name: str, scale: Scale) -> None:
     for model in part.models:
+        low, high = part.band(name, model)
+        draw_band(axes, x, scale(low), scale(high), look_of_model(model), joined=part.grid)
         for number, reading in enumerate(part.own_drive_readings):
             y = scale(part.values(name, model=model, friction=reading))
-            _curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
+            draw_curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
 
 
 def _own_rate_row(shown: Shown) -> Row:
@@ -127,7 +156,7 @@ def bound_row(shown: Shown) -> Row:
 
 def drawn_amplitudes(shown: Shown) -> list[int]:
     """Places of the amplitudes that have a curve of their own."""
-    return spread(shown.whole.sizes["amplitude"], MOST_CURVES)
+    return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
 
 
 def _amplitude_look(number: int, count: int) -> tuple[str, str]:
@@ -160,12 +189,15 @@ def _assumed_friction_row(shown: Shown) -> Row:
         margin = 0.05 * float(np.ptp(rates)) or 0.5 * abs(float(rates[0]))
         axes.set_xlim((float(rates.min()) - margin) / Hz, (float(rates.max()) + margin) / Hz)
         if part.rotor_friction is not None:
-            axes.axhline(part.rotor_friction, color="#555555", linewidth=0.9, linestyle=":")
+            axes.axhline(part.rotor_friction, **_OWN)
 
     tells = (
         "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends with the "
         "assumed rates, or where the motor could not turn faster even without friction."
     )
+    left = shown.whole.sizes["amplitude"] - len(places)
+    if left:
+        tells = f"{tells} Drawn are {len(places)} of {len(places) + left} amplitudes."
     return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
@@ -193,7 +225,7 @@ def _observed_rows(shown: Shown) -> list[Row]:
     def velocity(axes: Axes, part: Shown, x: Values) -> None:
         for model in part.models:
             y = part.values("forward_velocity_at_observed_rate", model=model, friction=reading)
-            _curve(axes, x, speed(y), look_of_model(model), joined=part.grid)
+            draw_curve(axes, x, speed(y), look_of_model(model), joined=part.grid)
         seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
         _bars(axes, x, speed(seen), speed(half))
 
@@ -201,7 +233,7 @@ def _observed_rows(shown: Shown) -> list[Row]:
         seen, half = part.observed_motor_rate()
         for model in part.models:
             y = part.values("motor_rotation_rate_at_observed_rate", model=model, friction=reading)
-            _curve(axes, x, np.where(np.isfinite(seen), np.nan, y) / Hz, look_of_model(model), joined=False)
+            draw_curve(axes, x, np.where(np.isfinite(seen), np.nan, y) / Hz, look_of_model(model), joined=False)
         _bars(axes, x, seen / Hz, half / Hz)
 
     rows = [
@@ -228,7 +260,7 @@ def _inferred_friction_row(shown: Shown, inferring: Sequence[str]) -> Row:
         for model in part.models:
             for number, reading in enumerate(inferring):
                 y = scale(part.values(name, model=model, friction=reading))
-                _curve(axes, x, y, look_of_model(model), ring=number > 0, joined=part.grid)
+                draw_curve(axes, x, y, look_of_model(model), ring=number > 0, joined=part.grid)
 
     words = ", rings: ".join(f"'{reading}'" for reading in inferring)
     tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction reading of filled marks: {words}."
@@ -242,7 +274,18 @@ def model_handles(shown: Shown, *, own_drive: bool) -> list[Line2D]:
         shown: the study.
         own_drive: whether filled and hollow marks tell the readings of free swimming apart.
     """
-    return [*_model_entries(shown), *(_reading_entries(shown) if own_drive else ()), *_observed_entries(shown)]
+    readings = _reading_entries(shown) if own_drive else ()
+    return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
+
+
+def band_handles(shown: Shown) -> list[Line2D]:
+    """Legend entries for the models that have a band."""
+    return [
+        Line2D(
+            [], [], color=look_of_model(name).colour, alpha=_SHADE, linewidth=7.0, label=f"{label_of_model(name)}: band"
+        )
+        for name in shown.banded
+    ]
 
 
 def _model_entries(shown: Shown) -> Iterator[Line2D]:
@@ -285,7 +328,7 @@ def amplitude_handles(shown: Shown) -> list[Line2D]:
         entries.append(Line2D([], [], color="#555555", linestyle=line, linewidth=1.1, label=label_of_model(model)))
     if shown.rotor_friction is not None:
         label = f"rotor friction $B_m$ = {_power_of_ten(shown.rotor_friction)}"
-        entries.append(Line2D([], [], color="#555555", linestyle=":", linewidth=0.9, label=label))
+        entries.append(Line2D([], [], **_OWN, label=label))
     return entries
 
 

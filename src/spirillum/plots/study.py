@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -14,11 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from spirillum.arrays import Values
+from spirillum.plots.drop import drop_picture
 from spirillum.plots.evidence import Shown, spread
+from spirillum.plots.picture import Picture, head_column, tail_axis
 from spirillum.plots.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
 from spirillum.plots.sheet import Sheet
-from spirillum.plots.style import Scale, plain, readable, styled
+from spirillum.plots.style import Scale, plain
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,28 +43,6 @@ _DASHED = (0, (4.0, 2.0))
 _PAPER_FIGURES = {"wide": ("fig5-wide", "Fig. 5"), "narrow": ("fig6-narrow", "Fig. 6")}
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure that is drawn when it is asked for."""
-
-    title: str
-    caption: str
-    """What it shows and what it does not, sentences."""
-    alternative: str
-    """What it shows for those who cannot see it."""
-    draw: Callable[[], Figure] = field(repr=False)
-
-    @classmethod
-    def of(cls, title: str, caption: str, alternative: str, draw: Callable[[], Figure]) -> Picture:
-        """A picture whose words may hold formulas, which are spelled out."""
-        return cls(readable(title), readable(caption), readable(alternative), draw)
-
-    def figure(self) -> Figure:
-        """Draw it."""
-        with styled():
-            return self.draw()
-
-
 def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
     """The figures of a study by file name (lower-case letters, digits and hyphens).
 
@@ -73,7 +51,8 @@ def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
 
     Returns:
         For the paper's study `fig5-wide` and `fig6-narrow`, for other channels `channel-<name>`, with
-        `-part1`, `-part2` where wavelengths need several figures; `bound` with the speeds at the upper bound.
+        `-part1`, `-part2` where wavelengths need several figures; `bound` with the speeds at the upper bound; for
+        the paper's study `drop` with the loss of speed in the narrow channel.
         For a list of robots `robots`.
     """
     shown = Shown.of(dataset)
@@ -90,7 +69,8 @@ def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
             left_out = _left_out(shown, sum(map(len, pages)), len(channels))
             found[name] = _channel_picture(shown, channel, wavelengths, part, left_out)
     found[_free_name("bound", found)] = _bound_picture(shown)
-    return found
+    drop = drop_picture(shown)
+    return found if drop is None else {**found, "drop": drop}
 
 
 def _pages(count: int, most: int) -> list[list[int]]:
@@ -186,33 +166,16 @@ def _draw_channel(
             x = scale(np.asarray(shown.whole["amplitude"].values, dtype=float)[amplitudes])
             row.draw(axes, part if row.across == "rates" else part.part(amplitude=amplitudes), x)
             if row.across == "tails":
-                _tail_axis(axes, x)
+                tail_axis(axes, x)
             labelled = number == len(rows) - 1 or number in sheet.labelled_rows
             axes.tick_params(labelbottom=labelled)
             if labelled:
                 rate = row.across == "rates"
                 axes.set_xlabel("assumed $\\omega_m$ (Hz)" if rate else f"wave amplitude $B_o$ ({scale.unit})")
             if number == 0:
-                _head_column(axes, shown, wavelength)
+                head_column(axes, shown, wavelength)
         _finish_row(panels[number], row)
     return figure
-
-
-def _head_column(axes: Axes, shown: Shown, wavelength: int) -> None:
-    values = np.asarray(shown.whole["wavelength"].values, dtype=float)
-    scale = Scale.of(values, "m")
-    axes.set_title(f"$\\lambda$ = {values[wavelength] / scale.factor:.4g} {scale.unit}", loc="center", pad=3)
-
-
-def _tail_axis(axes: Axes, x: Values) -> None:
-    """Ticks at the amplitudes themselves where they are few and apart."""
-    span = float(x.max() - x.min())
-    if 1 < x.size <= 6 and float(np.min(np.diff(np.sort(x)))) > 0.12 * span:
-        axes.set_xticks(x, [f"{value:.3g}" for value in x])
-    else:
-        axes.xaxis.set_major_locator(MaxNLocator(5))
-    margin = 0.08 * span if span > 0 else 0.5 * abs(float(x[0]))
-    axes.set_xlim(float(x.min()) - margin, float(x.max()) + margin)
 
 
 def _finish_row(panels: Sequence[Axes], row: Row) -> None:
@@ -260,7 +223,11 @@ def _bound_picture(shown: Shown) -> Picture:
             "(the paper does not say), $U = Re\\,\\mu/(\\rho D_b)$."
         )
     part = shown.part(channel=channels, wavelength=wavelengths)
-    notes += [note for note in (part.unanswered(), _left_out(shown, len(wavelengths), len(channels))) if note]
+    notes += [
+        note
+        for note in (shown.place_words, part.unanswered(), _left_out(shown, len(wavelengths), len(channels)))
+        if note
+    ]
     alternative = (
         f"{len(channels) * len(wavelengths)} panels, a row for each channel and a column for each wavelength: forward "
         f"velocity against wave amplitude{' as an upper bound' if bound else ''}. {shown.source_line}"
@@ -284,13 +251,13 @@ def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title
         name = plain(str(shown.whole["channel"].values[channel]), 24)
         for axes, wavelength in zip(panels[number], wavelengths, strict=True):
             row.draw(axes, shown.part(channel=channel, wavelength=wavelength, amplitude=amplitudes), x)
-            _tail_axis(axes, x)
+            tail_axis(axes, x)
             last = number == len(channels) - 1
             axes.tick_params(labelbottom=last)
             if last:
                 axes.set_xlabel(f"wave amplitude $B_o$ ({scale.unit})")
             if number == 0:
-                _head_column(axes, shown, wavelength)
+                head_column(axes, shown, wavelength)
             speed = shown.paper_speed(channel)
             if speed is not None:
                 axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.plots.picture import Picture
 from spirillum.plots.robot import robot_figure, robot_words
-from spirillum.plots.study import Picture
 from spirillum.robot.actuation import Drive, Motor
 from spirillum.robot.parts import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot

@@ -7,15 +7,18 @@ what was computed instead.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.hydrodynamics import SWIMMER_MODELS
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.studies.places import reference_place
 from spirillum.units import Hz
 
 if TYPE_CHECKING:
@@ -53,6 +56,14 @@ class Evidence:
         readings = [str(name) for name in dataset["friction"].values]
         self.bound = next((name for name in ("none", "rotor") if name in readings), readings[0])
         self.robot: Robot = load("biorob2012-wide")
+        settings = json.loads(str(dataset.attrs.get("settings", "{}")))
+        self._settings: dict[str, Any] = settings
+        computed = [name for name in self.models if SWIMMER_MODELS[name].placed]
+        fitted = {name for robot in settings.get("robots", []) for name in robot.get("calibration") or {}}
+        self.computed: tuple[str, ...] = tuple(computed)
+        """Models that compute the channel's walls."""
+        self.confined: tuple[str, ...] = tuple(name for name in self.models if name in computed or name in fitted)
+        """Models to which the channel makes a difference: those, and models with factors that stand for the walls."""
 
     def free(self, name: str, model: str, channel: str | None = None) -> Values:
         """A quantity of free swimming at the friction-free bound, (wavelength, amplitude) or both channels first."""
@@ -95,11 +106,29 @@ class Evidence:
         fluid = self.robot.fluid
         return reynolds * fluid.viscosity / (fluid.density * self.robot.body.diameter)
 
-    def drop_per_motor_turn(self, model: str) -> Values:
-        """Relative loss of speed from wide to narrow at equal motor rates, for every tail."""
-        per_turn = self.free("forward_velocity", model) / self.free("motor_rotation_rate", model)
+    def drop_per_motor_turn(self, model: str, ending: str = "") -> Values:
+        """Relative loss of speed from wide to narrow at equal motor rates, for every tail.
+
+        Args:
+            model: name of the model.
+            ending: `_at_place` for the loss at each place of a band, the last axis; "" for the reference place.
+        """
+        per_turn = self.free(f"forward_velocity{ending}", model) / self.free(f"motor_rotation_rate{ending}", model)
         loss: Values = 1.0 - per_turn[1] / per_turn[0]
         return loss
+
+    def drops_of_the_band(self, model: str) -> Values | None:
+        """The same at the reference place and, along the last axis, at the places of a band; None without a band."""
+        if model not in self.computed or "forward_velocity_at_place" not in self.dataset:
+            return None
+        return np.concatenate(
+            [self.drop_per_motor_turn(model)[..., None], self.drop_per_motor_turn(model, "_at_place")], axis=-1
+        )
+
+    @property
+    def place(self) -> str:
+        """Where robots lie for the models that compute the walls, in words."""
+        return reference_place(self._settings)
 
 
 def evaluated(dataset: xr.Dataset) -> list[Claim]:
@@ -125,6 +154,11 @@ def evaluated(dataset: xr.Dataset) -> list[Claim]:
         claims_geometry.method,
     )
     return [claim for source in sources for claim in source(evidence)]
+
+
+def label(model: str) -> str:
+    """A model's name as it stands in text: abbreviations in capitals."""
+    return model.upper() if len(model) <= 3 else model
 
 
 def fraction_between(values: Values) -> str:

@@ -13,6 +13,7 @@ from spirillum.answer import versions
 from spirillum.arrays import Values
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.places import PlaceTask, placed_at, with_band
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import QUANTITIES, REASONS, Part, Task
 
@@ -22,28 +23,47 @@ if TYPE_CHECKING:
 __all__ = ["assembled", "read_dataset"]
 
 _PAPER = "BioRob 2012"
+_PLACED = {
+    "gap_at_place": {"units": "m", "long_name": "smallest distance of body and glass", "source": "places of the band"},
+    "pitch_at_place": {
+        "units": "rad",
+        "long_name": "angle by which the nose is raised",
+        "source": "places of the band: level, half and all that gap and tail allow",
+    },
+}
+_BAND = {
+    "_at_place": ("at a place of the band", "places of the band"),
+    "_low": ("least of the band over gap and pitch", "least of all places, the reference place among them"),
+    "_high": ("largest of the band over gap and pitch", "largest of all places, the reference place among them"),
+}
 
 
 def assembled(
     loaded: LoadedStudy,
     answers: Iterable[tuple[Task, Part]],
+    band: Sequence[tuple[PlaceTask, Part]],
     observed: ObservedArrays | None,
     fingerprint: str,
     warnings: Sequence[str],
 ) -> xr.Dataset:
-    """Lay all answers into one Dataset."""
+    """Lay all answers into one Dataset, those at the reference place and those at the places of a band."""
     import xarray as xr
 
     study = loaded.study
     robots, shape = _robot_dimensions(loaded)
     count = int(np.prod(shape))
     flat = _gathered(loaded, answers, count)
-    dims = {2: (*robots, "model", "friction"), 3: (*robots, "model", "friction", "assumed_motor_rate")}
+    if band:
+        flat |= with_band(flat, band, study.models)
     data: dict[str, Any] = {}
     for name, values in flat.items():
-        axis_last = np.moveaxis(values, 0, 1)  # (robots, models, friction[, rates])
+        axis_last = np.moveaxis(values, 0, 1)  # (robots, models, friction[, rates or places])
         laid = axis_last.reshape(*shape, *axis_last.shape[1:])
-        data[name] = (dims[axis_last.ndim - 1], laid, _attributes(name))
+        more = ("place" if name.endswith("_at_place") else "assumed_motor_rate",)[: axis_last.ndim - 3]
+        data[name] = ((*robots, "model", "friction", *more), laid, _attributes(name))
+    if band:
+        for name, values in placed_at(band, count).items():
+            data[name] = ((*robots, "place"), values.reshape(*shape, -1), _PLACED[name])
     data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes("outside"))
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
@@ -129,6 +149,11 @@ def _attributes(name: str) -> dict[str, Any]:
             "long_name": "relative difference of the forward velocity from another resolution",
             "source": "models that solve for the flow; NaN for those in closed form",
         }
+    for ending, (words, source) in _BAND.items():
+        if name.endswith(ending):
+            field = next(f for f in QUANTITIES if f.name == name.removesuffix(ending))
+            meaning = f"{field.metadata['meaning']}, {words}"
+            return {"units": field.metadata["unit"], "long_name": meaning, "source": source}
     base, _, at = name.partition("_at_")
     field = next(f for f in QUANTITIES if f.name == base)
     source = field.metadata["source"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from spirillum.motion.comparison import uneven_models
 from spirillum.motion.prediction import calibration_warnings
 from spirillum.studies.dataset import assembled, read_dataset
 from spirillum.studies.observed import ObservedArrays, observed_arrays
+from spirillum.studies.places import PlaceTask, left_out, place_tasks
 from spirillum.studies.spec import LoadedStudy, load_study
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
 
@@ -36,6 +37,8 @@ def study(
     observations: str | Path | None = None,
     output: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
+    models: Sequence[str] | None = None,
+    band: bool | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Run a study of many robots.
@@ -46,6 +49,9 @@ def study(
         output: folder for `dataset.nc`, `figures/`, `report.html` and `claims.json`; a rerun resumes there.
             None: nothing is written.
         overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
+        models: hydrodynamic models instead of the study's; None: the study's.
+        band: compute models that compute the channel's walls over the places that the placement leaves open too
+            (many minutes), or not, instead of what the study says; None: what it says.
         progress: called as the work goes on.
 
     Returns:
@@ -54,7 +60,7 @@ def study(
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
-    loaded = load_study(source, overrides)
+    loaded = load_study(source, overrides, models=models, band=band)
     observed = observed_arrays(observations, loaded) if observations is not None else None
     fingerprint = _fingerprint(loaded, observed)
     tell = progress or (lambda _what, _done, _total: None)
@@ -110,8 +116,10 @@ def _claimed_folder(folder: Path, loaded: LoadedStudy, fingerprint: str) -> Path
 def _computed(
     loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, parts: Path | None, tell: Progress
 ) -> xr.Dataset:
-    todo = list(tasks(loaded))
+    todo: list[Task | PlaceTask] = list(tasks(loaded))
+    todo += place_tasks(loaded, len(todo))
     answers: list[tuple[Task, Part]] = []
+    band: list[tuple[PlaceTask, Part]] = []
     found: list[Caution] = []
     warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
@@ -123,20 +131,29 @@ def _computed(
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     warnings += uneven_models(loaded.robots, models, factors)
     for done, task in enumerate(todo):
-        tell(f"{task.model}, {task.batch.size} robots", done, len(todo))
+        tell(task.words, done, len(todo))
         part = kept(task, parts, len(loaded.study.friction))
         if part is None:
-            part = answer(task, loaded, observed)
+            part = _answered(task, loaded, observed)
             keep(task, part, parts)
-        answers.append((task, part))
-        found += cautions(task, part)
+        if isinstance(task, PlaceTask):
+            band.append((task, part))
+        else:
+            answers.append((task, part))
+            found += cautions(task, part)
     tell("dataset", len(todo), len(todo))
-    robots = sum(task.batch.size for task in todo) // len(loaded.study.models)
-    warnings += summed(found, robots)
+    warnings += summed(found, loaded.count)
+    warnings += left_out(band)
     for robot in loaded.robots:
         for name in loaded.study.models:
             warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]
-    return assembled(loaded, answers, observed, fingerprint, list(dict.fromkeys(warnings)))
+    return assembled(loaded, answers, band, observed, fingerprint, list(dict.fromkeys(warnings)))
+
+
+def _answered(task: Task | PlaceTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
+    if isinstance(task, PlaceTask):
+        return task.answer(loaded.study.friction)
+    return answer(task, loaded, observed)
 
 
 def _write_report(dataset: xr.Dataset, folder: Path, tell: Progress) -> None:

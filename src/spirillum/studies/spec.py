@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
 from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement
+from spirillum.motion.band import left_open
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.fields import Length, Rate, Section, Text
 from spirillum.robot.load import load
@@ -65,6 +66,8 @@ class Study(Section):
     """A list of robots (presets or files) instead of a grid."""
     placement: Placement = Placement()
     """Where in their channels the robots lie, for models that compute the walls."""
+    band: Annotated[bool, Field(strict=True)] = False
+    """Compute such models over the places that `placement` leaves open too, which takes many minutes."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -93,11 +96,22 @@ class Study(Section):
         ]
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
+        problems += self._problems_of_the_band()
         if self.size > LARGEST_STUDY:
             problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STUDY}")
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
+
+    def _problems_of_the_band(self) -> list[str]:
+        models = [SWIMMER_MODELS[name] for name in self.models if name in SWIMMER_MODELS]
+        if not self.band or any(left_open(self.placement, model) for model in models):
+            return []
+        if any(model.placed for model in models):
+            return ["band = true, but the placement leaves nothing open; allowed: a placement without gap or pitch"]
+        walled = ", ".join(name for name, model in SWIMMER_MODELS.items() if model.placed)
+        names = ", ".join(self.models)
+        return [f"band = true with models {names}; allowed: only with a model that computes the walls ({walled})"]
 
     @property
     def size(self) -> int:
@@ -126,6 +140,12 @@ class LoadedStudy:
         return hashlib.sha256(text.encode()).hexdigest()
 
     @property
+    def count(self) -> int:
+        """Number of robots."""
+        grid = self.study.grid
+        return len(self.robots) * (1 if grid is None else len(grid.wavelengths) * len(grid.amplitudes))
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the channels, or of the robots."""
         if self.study.grid is not None:
@@ -134,13 +154,19 @@ class LoadedStudy:
 
 
 def load_study(
-    source: str | Path | Mapping[str, Any] | None = None, overrides: Mapping[str, Any] | None = None
+    source: str | Path | Mapping[str, Any] | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    models: Sequence[str] | None = None,
+    band: bool | None = None,
 ) -> LoadedStudy:
     """Load a study and its robots.
 
     Args:
         source: study file or the same tables as a mapping; None: the paper's study, built in.
         overrides: dotted robot fields, applied to every robot.
+        models: hydrodynamic models instead of the study's; None: the study's.
+        band: whether to compute bands, instead of what the study says; None: what it says.
 
     Raises:
         InputError: if the study or one of its robots is wrong.
@@ -153,6 +179,8 @@ def load_study(
         table, name = dict(source), "the study"
     else:
         table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
+    instead = {"models": None if models is None else list(models), "band": band}
+    table |= {field: value for field, value in instead.items() if value is not None}
     study = problems_in(Study, table)
     if isinstance(study, list):
         more = f" (and {len(study) - 1} more)" if len(study) > 1 else ""

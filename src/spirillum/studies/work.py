@@ -6,13 +6,13 @@ import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
-from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.motion.prediction import accuracy_limits
 from spirillum.motion.swimming import Swimming, requirements, speed_difference, swim
 from spirillum.robot.batch import RobotBatch, batches
@@ -29,6 +29,7 @@ __all__ = [
     "Task",
     "answer",
     "cautions",
+    "groups",
     "keep",
     "kept",
     "summed",
@@ -66,12 +67,18 @@ REASONS = (
     "wire-too-thick-for-rft",
     "wire-touches-floor",
     "wire-too-close-to-floor",
+    "no-channel",
+    "no-channel-length",
+    "gap-too-wide",
+    "tail-in-wall",
+    "gap-too-thin",
     "other",
 )
 """Why a robot of a study has no answer; the place in this list is the value in the dataset."""
 
 _BLOCK = 100_000
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
+_PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
 
 Places = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
@@ -90,22 +97,49 @@ class Task:
     batch: RobotBatch
 
     @property
+    def size(self) -> int:
+        """Number of robots."""
+        return self.batch.size
+
+    @property
     def file_name(self) -> str:
         """Name of the file that keeps its answer."""
         return f"part-{self.number:05d}.npz"
+
+    @property
+    def words(self) -> str:
+        """What is computed, in a few words."""
+        return f"{self.model}, {self.size} robots"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays that every answer has."""
+        return {"outside", *(f.name for f in QUANTITIES)}
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+        endings = ("", "_at_observed_rate", "_at_assumed_rate")
+        return {"outside", "error_estimate", *(f.name + at for f in QUANTITIES for at in endings)}
 
 
 def tasks(loaded: LoadedStudy) -> Iterator[Task]:
     """All tasks of a study, always in the same order."""
     number = 0
-    for places, batch in _groups(loaded):
+    for places, batch in groups(loaded):
         for model in loaded.study.models:
-            for cut, block in batch.blocks(_BLOCK if find_swimmer_model(model).closed_form else _SMALL_BLOCK):
+            for cut, block in batch.blocks(_block_size(find_swimmer_model(model))):
                 yield Task(number, model, places[cut], block)
                 number += 1
 
 
-def _groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
+def _block_size(model: SwimmerModel) -> int:
+    if model.closed_form:
+        return _BLOCK
+    return _PLACED_BLOCK if model.placed else _SMALL_BLOCK
+
+
+def groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
     """Batches of robots with their places: one a channel of the grid, or one a kind of listed robots."""
     grid = loaded.study.grid
     if grid is None:
@@ -206,7 +240,27 @@ def summed(found: Iterable[Caution], robots: int) -> list[str]:
     ]
 
 
-def kept(task: Task, folder: Path | None, readings: int) -> Part | None:
+class Keepable(Protocol):
+    """A task as far as keeping its answer goes."""
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that keeps its answer."""
+
+    @property
+    def size(self) -> int:
+        """Number of robots."""
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays that every answer has."""
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+
+
+def kept(task: Keepable, folder: Path | None, readings: int) -> Part | None:
     """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
     if folder is None or not (folder / task.file_name).is_file():
         return None
@@ -215,17 +269,12 @@ def kept(task: Task, folder: Path | None, readings: int) -> Part | None:
             part = {name: stored[name] for name in stored.files}
     except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
         return None
-    whole = {"outside", *(f.name for f in QUANTITIES)} <= set(part)
-    known = {
-        "outside",
-        "error_estimate",
-        *(f.name + at for f in QUANTITIES for at in ("", "_at_observed_rate", "_at_assumed_rate")),
-    }
-    fits = all(array.dtype == np.float64 and array.shape[:2] == (task.batch.size, readings) for array in part.values())
-    return part if whole and fits and set(part) <= known else None
+    whole = task.needed <= set(part) <= task.allowed
+    fits = all(array.dtype == np.float64 and array.shape[:2] == (task.size, readings) for array in part.values())
+    return part if whole and fits else None
 
 
-def keep(task: Task, part: Part, folder: Path | None) -> None:
+def keep(task: Keepable, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
         with whole_file(folder / task.file_name) as path, path.open("wb") as stream:

@@ -1,0 +1,190 @@
+"""The band of a study: its robots at every place that the placement leaves open, each place kept as soon as it is done.
+
+Robots of one channel that share a place come one after the other: what is solved for body and wall there serves them
+all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
+from spirillum.hydrodynamics.tube_place import GAP_SHARE
+from spirillum.motion.band import at_place, band_places, joined
+from spirillum.motion.swimming import requirements, swim
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import all_hold, assembly_limits, broken
+from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.work import Part, Places, groups
+from spirillum.units import show
+
+__all__ = ["AT_PLACES", "PlaceTask", "left_out", "place_tasks", "placed_at", "reference_place", "with_band"]
+
+AT_PLACES = (
+    "forward_velocity",
+    "advance_per_radian",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "tail_torque",
+    "hydrodynamic_efficiency",
+    "plug_velocity",
+)
+"""Quantities that have a band, and a value at each of its places."""
+
+
+@dataclass(frozen=True)
+class PlaceTask:
+    """One model for the robots of one channel that share a place of their bands."""
+
+    number: int
+    model: str
+    places: Places
+    """Places of the robots in the flat order of the study."""
+    spot: int
+    """Number of the place in the band, the same for all robots of the study."""
+    robots: tuple[RobotBatch, ...]
+    """The robots at that place, one by one."""
+
+    @property
+    def size(self) -> int:
+        """Number of robots."""
+        return len(self.robots)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that keeps its answer."""
+        return f"part-{self.number:05d}.npz"
+
+    @property
+    def words(self) -> str:
+        """What is computed, in a few words."""
+        return f"{self.model}, band: {self.where}, {self.size} robots"
+
+    @property
+    def where(self) -> str:
+        """The place in words."""
+        placement = self.robots[0].placement
+        return f"gap {show(placement.gap or 0.0, 'mm')}, pitch {show(placement.pitch or 0.0, 'deg')}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return set(AT_PLACES)
+
+    @property
+    def allowed(self) -> set[str]:
+        """The same."""
+        return self.needed
+
+    def answer(self, readings: Iterable[str]) -> Part:
+        """Steady swimming at this place, (robots, friction readings); NaN where there is none."""
+        found = [joined([swim(robot, self.model, friction=reading) for robot in self.robots]) for reading in readings]
+        return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
+
+
+def place_tasks(loaded: LoadedStudy, first: int) -> Iterator[PlaceTask]:
+    """The tasks of the band, always in the same order, numbered from `first`; none where none is asked for."""
+    if not loaded.study.band:
+        return
+    number = first
+    for places, batch in groups(loaded):
+        singles = [block for _, block in batch.blocks(1)]
+        for name in loaded.study.models:
+            model = find_swimmer_model(name)
+            for spot, robots in _shared_places(singles, model):
+                there = tuple(robots.values())
+                yield PlaceTask(number, name, places[list(robots)], spot, there)
+                number += 1
+
+
+def _shared_places(singles: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
+    """Number of a place of the band, and those of the robots that share it, by their number, at that place."""
+    bands = {}
+    for index, single in enumerate(singles):
+        if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
+            bands[index] = band_places(single, model)
+    spots = max((len(band) for band in bands.values()), default=0)
+    for spot in range(spots):
+        sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
+        for index, band in bands.items():
+            key = (band[spot].gap, band[spot].pitch)
+            sharing.setdefault(key, {})[index] = at_place(singles[index], band[spot])
+        for robots in sharing.values():
+            yield spot, robots
+
+
+def reference_place(settings: Mapping[str, Any]) -> str:
+    """Where the robots of a study lie for the models that compute the walls, in words.
+
+    Args:
+        settings: the study's settings, as the attribute `settings` of its dataset holds them.
+    """
+    placement = settings.get("study", {}).get("placement") or {}
+    if placement.get("eccentricity") is not None:
+        return f"level, eccentricity {placement['eccentricity']:g}"
+    radii = [0.5 * robot["body"]["diameter"] for robot in settings.get("robots", [])]
+    gaps = sorted({show(placement.get("gap") or GAP_SHARE * radius, "mm") for radius in radii}, key=len)
+    pitch = placement.get("pitch") or 0.0
+    tilt = f"pitch {show(pitch, 'deg')}" if pitch else "level"
+    return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference place'}, {tilt}"
+
+
+def left_out(answers: Iterable[tuple[PlaceTask, Part]]) -> list[str]:
+    """A sentence for each place at which robots have no answer, though they have one at the reference place."""
+    found = []
+    for task, part in answers:
+        missing = np.flatnonzero(np.isnan(part["forward_velocity"]).all(axis=-1))
+        if missing.size:
+            first = task.robots[int(missing[0])]
+            outside = broken(requirements(first, find_swimmer_model(task.model)))
+            why = outside[0].sentence() if outside else "they find no steady motion there"
+            found.append(f"{task.model}: the band leaves out {missing.size} robots at {task.where}, the first: {why}")
+    return found
+
+
+def placed_at(answers: Iterable[tuple[PlaceTask, Part]], count: int) -> dict[str, Values]:
+    """`gap_at_place` and `pitch_at_place` of every robot, (robots, places), m and rad; NaN where it has no band."""
+    tasks = [task for task, _ in answers]
+    spots = max(task.spot for task in tasks) + 1
+    names = ("gap_at_place", "pitch_at_place")
+    found: dict[str, Values] = {name: np.full((count, spots), np.nan) for name in names}
+    for task in tasks:
+        found["gap_at_place"][task.places, task.spot] = task.robots[0].placement.gap
+        found["pitch_at_place"][task.places, task.spot] = task.robots[0].placement.pitch
+    return found
+
+
+def with_band(
+    flat: dict[str, Values], answers: Iterable[tuple[PlaceTask, Part]], models: tuple[str, ...]
+) -> dict[str, Values]:
+    """Quantities at all places, and the least and largest of all places and the reference place.
+
+    Args:
+        flat: the answers at the reference place, (models, robots, friction readings).
+        answers: those at the places of the band.
+        models: names of the models, in their order.
+
+    Returns:
+        `<quantity>_at_place`, (models, robots, friction readings, places), `<quantity>_low` and `<quantity>_high`,
+        (models, robots, friction readings); NaN for models without a band.
+    """
+    pairs = list(answers)
+    spots = max(task.spot for task, _ in pairs) + 1
+    banded = {models.index(task.model) for task, _ in pairs}
+    found: dict[str, Values] = {}
+    for name in AT_PLACES:
+        there = np.full((*flat[name].shape, spots), np.nan)
+        for task, part in pairs:
+            there[models.index(task.model), task.places, :, task.spot] = part[name]
+        everywhere = np.concatenate([there, flat[name][..., None]], axis=-1)
+        everywhere[[number for number in range(len(models)) if number not in banded]] = np.nan
+        found[f"{name}_at_place"] = there
+        found[f"{name}_low"] = np.fmin.reduce(everywhere, axis=-1)
+        found[f"{name}_high"] = np.fmax.reduce(everywhere, axis=-1)
+    return found
