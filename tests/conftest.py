@@ -1,6 +1,6 @@
 """Array shapes in annotations are checked while tests run; robots that many tests share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,14 @@ install_import_hook(["spirillum.hydrodynamics", "spirillum.motion", "spirillum.r
 phases = (Phase.explicit, Phase.generate, Phase.shrink)
 settings.register_profile("spirillum", deadline=None, derandomize=True, database=None, phases=phases)
 settings.load_profile("spirillum")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No answer comes from another run, nor stays behind."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SPIRILLUM_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,181 @@
+"""Waves in a tube against the equations of Stokes, closed forms, ring kernels and the plane wall."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.special import ive, k0e, k1e
+
+from spirillum.kernels.rings import ring_modes
+from spirillum.kernels.tube_waves import circle_waves, station_waves, wall_layers, wave_extensions
+
+WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
+"""k R and order p."""
+
+
+def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0) -> np.ndarray:
+    rho = np.asarray(rho, dtype=float)
+    scale = ive(0, k * rho) / ive(0, k * radius) * np.exp(k * (rho - radius))
+    return wave_extensions(k, radius, rho, scale, orders)
+
+
+def layers(z: float, orders: int) -> np.ndarray:
+    return wall_layers(z, float(k1e(z) / k0e(z)), orders)
+
+
+def wave(k: float, p: int, points: np.ndarray, turn: float = 1.0) -> np.ndarray:
+    """Complex velocities (x, y, z) at points of the waves with unit (X, u_rho, v) on the wall, (n, 3, 3).
+
+    With `turn` -1 those that turn the other way, exp(-i p theta), with v reversed.
+    """
+    x, y, z = points.T
+    rho, angle = np.hypot(y, z), np.arctan2(z, y)
+    along, radial, around = np.moveaxis(extensions(k, rho, p + 1)[:, p], 1, 0)
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    cartesian = np.stack([1j * along, radial * c - 1j * turn * around * s, radial * s + 1j * turn * around * c], axis=1)
+    return np.exp(1j * (k * x + turn * p * angle))[:, None, None] * cartesian
+
+
+@settings(max_examples=40)
+@given(
+    z=st.floats(-5, 2.5).map(lambda power: 10.0**power),
+    radius=st.floats(-3, 3).map(lambda power: 10.0**power),
+    orders=st.integers(1, 60),
+)
+def test_a_wave_is_its_own_velocity_on_the_wall(z: float, radius: float, orders: int) -> None:
+    found = extensions(z / radius, np.array([radius]), orders, radius)[0]
+    np.testing.assert_allclose(found, np.tile(np.eye(3), (orders, 1, 1)), atol=1e-10)
+
+
+@pytest.mark.parametrize(("k", "p"), WAVES)
+def test_the_equations_of_stokes(k: float, p: int) -> None:
+    """div u = 0 and curl of the Laplacian of u = 0: both by polynomials through a small cube of points."""
+    count, half = 10, 0.2
+    nodes = np.cos(np.pi * np.arange(count) / (count - 1))
+    weights = (-1.0) ** np.arange(count) * np.where(np.isin(np.arange(count), (0, count - 1)), 0.5, 1.0)
+    slopes = weights[None, :] / weights[:, None] / (nodes[:, None] - nodes[None, :] + np.eye(count))
+    np.fill_diagonal(slopes, 0.0)
+    np.fill_diagonal(slopes, -slopes.sum(axis=1))
+    slopes /= half
+    grid = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.array([0.7, 0.5, -0.3]) + half * grid
+    u = wave(k, p, points).reshape(count, count, count, 3, 3)
+
+    def along(axis: int, field: np.ndarray) -> np.ndarray:
+        return np.moveaxis(np.tensordot(slopes, field, axes=(1, axis)), 0, axis)
+
+    inner = (slice(3, -3),) * 3
+    first = [along(axis, u) for axis in range(3)]
+    divergence = sum(first[axis][..., axis, :] for axis in range(3))
+    size = np.max(np.abs(first[0]) + np.abs(first[1]) + np.abs(first[2]))
+    assert np.max(np.abs(divergence[inner])) < 1e-7 * size
+    laplacian = sum(along(axis, first[axis]) for axis in range(3))
+    curl = [along(a, laplacian)[..., b, :] - along(b, laplacian)[..., a, :] for a, b in ((1, 2), (2, 0), (0, 1))]
+    slope = max(float(np.max(np.abs(along(a, laplacian)[inner]))) for a in range(3))
+    assert slope > 1e-3 * size  # there is a pressure
+    assert max(float(np.max(np.abs(part[inner]))) for part in curl) < 1e-4 * slope
+
+
+@pytest.mark.parametrize("k", [1e-3, 0.1, 2.0, 40.0, 300.0])
+def test_flux_and_torsion_without_turning_waves(k: float) -> None:
+    """Order 0: what comes through the wall goes along the tube, and swirl is I_1(k rho)/I_1(k)."""
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    rho = 0.5 * (1.0 + nodes)
+    found = extensions(k, rho, 1)[:, 0]
+    flux = 0.5 * k * np.einsum("n,nj->j", weights * rho, found[:, 0])
+    np.testing.assert_allclose(flux, [0.0, 1.0, 0.0], atol=1e-10)
+    swirl = ive(1, k * rho) / ive(1, k) * np.exp(k * (rho - 1.0))
+    np.testing.assert_allclose(found[:, 2, 2], swirl, rtol=1e-11, atol=1e-300)
+    assert np.all(found[:, 2, :2] == 0)
+    assert np.all(found[:, :2, 2] == 0)
+
+
+def test_long_waves() -> None:
+    """k to 0: a sliding wall drags the fluid with no net flux, 2 rho^2 - 1, and a wall that is carried along carries
+    it whole; the difference falls off with k^2 log k."""
+    rho = np.array([0.0, 0.3, 0.8])
+    errors = []
+    for k in (1e-2, 1e-3):
+        found = extensions(k, rho, 2)
+        whole = found[:, 1] @ np.array([0.0, 1.0, 1.0])
+        errors.append([np.max(np.abs(found[:, 0, 0, 0] - 2 * rho**2 + 1)), np.max(np.abs(whole - [0, 1, 1]))])
+    assert np.all(np.array(errors[1]) < 3e-3)
+    assert np.all(np.array(errors[1]) < 0.15 * np.array(errors[0]))
+
+
+@pytest.mark.parametrize("p", [0, 1, 3])
+@pytest.mark.parametrize("k", [0.4, 2.5])
+def test_layers_against_rings_of_forces(k: float, p: int) -> None:
+    """S is the Fourier transform along the tube of the ring kernels on a cylinder of radius 1, over 4 pi."""
+    work, blocks = np.empty((2, p + 3)), np.empty((p + 2, 3, 3))
+
+    def entry(i: int, j: int, dx: float) -> float:
+        ring_modes(dx, 0.0, 1.0, 1.0, 0.0, p + 2, *work, blocks)
+        return float(blocks[p, i, j])
+
+    def transform(i: int, j: int) -> complex:
+        """Over all dx of the kernel times exp(-i k dx); entries between x and the others are odd."""
+        odd = (i == 0) != (j == 0)
+        turn = np.sin if odd else np.cos
+        near = [
+            quad(lambda dx: entry(i, j, dx) * turn(k * dx), low, high, limit=200)[0]
+            for low, high in ((1e-14, 1e-3), (1e-3, 1.0))
+        ]
+        far = quad(partial(entry, i, j), 1.0, np.inf, weight="sin" if odd else "cos", wvar=k, limit=500)[0]
+        return (-2j if odd else 2.0) * (sum(near) + far)
+
+    phase = np.array([1j, 1.0, 1.0])
+    whole = np.array([[transform(i, j) for j in range(3)] for i in range(3)])
+    wanted = whole * phase[None, :] / phase[:, None] / (4 * np.pi)
+    assert np.max(np.abs(wanted.imag)) < 1e-9
+    np.testing.assert_allclose(layers(k, p + 1)[p], wanted.real, atol=2e-8)
+
+
+@settings(max_examples=60)
+@given(z=st.floats(-3, 2.7).map(lambda power: 10.0**power), orders=st.integers(1, 60))
+def test_forces_on_the_wall_take_power(z: float, orders: int) -> None:
+    """S is symmetric and positive definite, scaled by its diagonal."""
+    found = layers(z, orders)
+    np.testing.assert_array_equal(found, found.swapaxes(1, 2))
+    diagonal = np.sqrt(np.diagonal(found, axis1=1, axis2=2))
+    assert np.all(diagonal > 0)
+    assert np.min(np.linalg.eigvalsh(found / (diagonal[:, :, None] * diagonal[:, None, :]))) > 0
+
+
+def test_short_waves_see_a_plane() -> None:
+    """The single layer of a plane, (1 - k k/2 q^2)/q along it and 1/2q across; curvature adds a part in q."""
+    errors = []
+    for z, p in ((60.0, 45), (120.0, 90), (240.0, 180)):
+        q = np.hypot(z, p)
+        wanted = np.diag([1 - 0.5 * (z / q) ** 2, 0.5, 1 - 0.5 * (p / q) ** 2])
+        wanted[0, 2] = wanted[2, 0] = -0.5 * z * p / q**2
+        errors.append(np.max(np.abs(q * layers(z, p + 1)[p] - wanted)))
+    assert errors[0] < 0.02
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.1)
+
+
+def test_waves_at_points_and_around_a_second_axis() -> None:
+    """Real parts of the complex waves; the same in the components about an axis that lies off the tube's."""
+    k, orders, rng = 1.3, 4, np.random.default_rng(2)
+    theta, rho, x = rng.uniform(-np.pi, np.pi, 6), rng.uniform(0.05, 0.5, 6), rng.uniform(-2, 2, 6)
+    y, z = rho * np.cos(theta) - 0.4, rho * np.sin(theta)
+    distance, angle = np.hypot(y, z), np.arctan2(z, y)
+    values = extensions(k, distance, orders)
+    found = np.empty((6, 3, 2, 2, orders, 3))
+    station_waves(values, angle, k * x, found)
+    even, odd = np.empty((2, 3, 6, orders, 3))
+    circle_waves(values, angle, angle - theta, even, odd)
+    points = np.stack([x, y, z], axis=1)
+    for p in range(orders):
+        there, back = wave(k, p, points), wave(k, p, points, turn=-1.0)
+        for parity, both in enumerate((0.5 * (there + back), 0.5j * (there - back))):  # cos(p theta), -sin(p theta)
+            np.testing.assert_allclose(found[:, :, 0, parity, p], both.real, atol=1e-13)
+            np.testing.assert_allclose(found[:, :, 1, parity, p], both.imag, atol=1e-13)
+            turn = both * np.exp(-1j * k * x)[:, None, None]
+            c, s = np.cos(theta)[:, None], np.sin(theta)[:, None]
+            about = np.stack([-1j * turn[:, 0], turn[:, 1] * c + turn[:, 2] * s, turn[:, 2] * c - turn[:, 1] * s])
+            np.testing.assert_allclose((even, odd)[parity][:, :, p], about.real, atol=1e-13)
+            np.testing.assert_allclose(about.imag, 0.0, atol=1e-13)
