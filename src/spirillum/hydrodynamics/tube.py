@@ -43,6 +43,8 @@ _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
 _COARSER = 10.0
 """The same of the resolution that gives the error estimate."""
+_COARSEST = 0.05
+"""Coarsest tolerance of Fourier modes."""
 _MOST_UNKNOWNS = 11_000
 """Of one parity: 2 GiB for the factors of both."""
 
@@ -150,7 +152,7 @@ class Tube(SwimmerModel):
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""
-        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, 0.01))
+        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST))
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel:
         """See `SwimmerModel.checked_by`."""

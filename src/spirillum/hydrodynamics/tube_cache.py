@@ -22,7 +22,7 @@ from spirillum.hydrodynamics.tube_solids import MOTIONS
 
 __all__ = ["cache_folder", "kept_or_computed"]
 
-_EDITION = "tube 2"
+_EDITION = "tube 4"
 """Changes with everything that changes an answer."""
 
 _Q = TypeVar("_Q", bound=tuple[object, ...])

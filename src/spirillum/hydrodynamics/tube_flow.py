@@ -9,10 +9,10 @@ Far from the robot only the mean flow and a uniform pressure on either side are 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,8 @@ _TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From body axes to those of the solution: x along the robot, y up, z to the right."""
 _FADE = 1.25
 """Steepest wave over that which matters: between them waves are faded out."""
+_CANCEL = 4.0
+"""How many times that range away forces are whose faded waves cancel."""
 _SHARES = 8
 """Waves that come one after the other go to as many cores: flat ones cost most."""
 
@@ -221,8 +223,9 @@ class _Reflection:
     """Of the tube, m."""
     waves: tuple[Samples, np.ndarray]
     """k, 1/m, and number of orders p of each."""
-    nearest: float
-    """Smallest distance of a force from the wall, m."""
+    classes: tuple[tuple[float, Any], ...]
+    """Smallest distance from the wall of some of the forces, m, twice that of those before, and a tree of their places.
+    """
     cut: float
     """Waves that are damped by exp(-cut) no longer matter."""
     middle: float
@@ -272,7 +275,7 @@ class _Reflection:
             amplitudes,
         )
         middle, reach = 0.5 * (low + high), 0.5 * (high - low) + beyond
-        return cls(seat.radius, (k, orders), nearest, cut, middle, reach, steps, amplitudes)
+        return cls(seat.radius, (k, orders), _classes(columns, seat.radius), cut, middle, reach, steps, amplitudes)
 
     def field(self, placed: Samples) -> Samples:
         """As `kernels.field` has it, at points about the tube's axis and in its axes, (n, 4)."""
@@ -280,9 +283,36 @@ class _Reflection:
 
         field = np.zeros((len(placed), 4))
         distance = np.maximum(self.radius - np.hypot(placed[:, 1], placed[:, 2]), 0.0)
-        steepest = _FADE * self.cut / (distance + self.nearest)
+        steepest = _FADE * self.cut / self._range(placed, distance)
         add_waves(placed, steepest, self.waves, self.radius, self.steps, self.amplitudes, field)
         return field
+
+    def _range(self, placed: Samples, distance: Samples) -> Samples:
+        """Distance by which waves are damped between forces, wall and points, (n,); those of far forces cancel.
+
+        Args:
+            placed: points, (n, 3).
+            distance: of the points from the wall, (n,).
+        """
+        found = np.full(len(placed), np.inf)
+        for least, tree in self.classes:
+            apart, _ = tree.query(placed)
+            found = np.minimum(found, np.maximum(distance + least, apart / _CANCEL))
+        return found
+
+
+def _classes(columns: Sequence[_Sources], radius: float) -> tuple[tuple[float, Any], ...]:
+    """Forces sorted by their distance from the wall."""
+    from scipy.spatial import cKDTree
+
+    rho = np.concatenate([np.repeat(part.rho, part.x.shape[1]) for part in columns])
+    angle = np.concatenate([np.repeat(part.angle, part.x.shape[1]) for part in columns])
+    x = np.concatenate([part.x.ravel() for part in columns])
+    places = np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
+    places = np.concatenate([places, places * [1.0, 1.0, -1.0]])  # half circles stand for whole ones
+    distance = radius - np.concatenate([rho, rho])
+    number = np.floor(np.log2(distance / distance.min())).astype(int)
+    return tuple((float(distance[number == n].min()), cKDTree(places[number == n])) for n in np.unique(number))
 
 
 def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: float) -> Iterator[_Sources]:

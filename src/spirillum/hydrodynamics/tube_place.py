@@ -144,7 +144,7 @@ def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
     thinnest = _THINNEST_GAP * batch.body_diameter
     return [
         Limit.of(
-            "channel.diameter",
+            "there is no [channel]: channel.diameter",
             batch.channel_diameter,
             "at most",
             _WIDEST,
@@ -153,7 +153,7 @@ def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
             "no-channel",
         ),
         Limit.of(
-            "channel.length",
+            "the [channel] has no length: channel.length",
             batch.channel_length if open_ended else np.zeros(1),
             "at most",
             _WIDEST,

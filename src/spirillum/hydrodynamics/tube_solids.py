@@ -45,8 +45,8 @@ class Fineness:
 
     @property
     def damping(self) -> float:
-        """At which waves are cut off: at a gap of 0.2 mm ten times the tolerance costs less than 1e-5."""
-        return 10.0 * self.tolerance
+        """At which waves are cut off: at a gap of 0.2 mm a hundredth costs less than 1e-5, a tenth several percent."""
+        return float(min(10.0 * self.tolerance, 0.2 * np.sqrt(self.tolerance)))
 
 
 class Solids:
