@@ -204,6 +204,7 @@ def test_tube_itself_has_a_band(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) 
     """One coarse level place: the band's answer is what a prediction there gives."""
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
     monkeypatch.setattr("spirillum.motion.band.GAP_BAND", (1.0 / 9.0, 1.0 / 9.0))
+    monkeypatch.setattr("spirillum.motion.band.TOLERANCE", 0.05)
     small = {"body.shape": "sphere", "body.diameter": "12 mm", "body.length": "12 mm", "coupling.length": "3 mm"}
     coarse = {
         "model.tube.tolerance": 0.05,

@@ -45,6 +45,8 @@ _COARSER = 10.0
 """The same of the resolution that gives the error estimate."""
 _COARSEST = 0.05
 """Coarsest tolerance of Fourier modes."""
+_MOST_WAVES = 1_000_000
+"""Orders and wave numbers together: minutes."""
 _MOST_UNKNOWNS = 11_000
 """Of one parity: 2 GiB for the factors of both."""
 
@@ -84,6 +86,13 @@ def _size(key: _SolidKey) -> int:
     return Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3)).size
 
 
+@lru_cache(maxsize=4096)
+def _waves(key: _SolidKey) -> int:
+    """Number of waves between solids and wall."""
+    solids = Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    return 0 if solids.none else sum(solids.waves(solids.gap).orders)
+
+
 def _turned(wire: Wire, phase: float) -> Wire:
     turn = axis_rotation(np.array([phase]))[0]
     return Wire(wire.points @ turn.T, wire.tangents @ turn.T, wire.lengths, wire.radius)
@@ -108,6 +117,10 @@ def _held(question: _Question) -> Held:
 def _computed(question: _Question) -> Samples:
     """R, load and drag for viscosity 1, as one (13, 13)."""
     held = _held(question)
+    if np.min(np.diag(held.matrix)) < 0:
+        raise InputError(
+            "the flow in the tube is not resolved at this placement.gap; allowed: a wider gap or a finer tolerance"
+        )
     found = np.empty((MOTIONS, MOTIONS))
     found[:-1, :-1], found[:-1, -1], found[-1, :-1], found[-1, -1] = held.matrix, held.load, held.load, held.drag
     return found
@@ -172,13 +185,21 @@ class Tube(SwimmerModel):
         """See `ResistanceModel.part_domain`."""
         limits = [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
         fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch) + limits), (batch.size,))
-        unknowns = np.zeros(batch.size)
+        unknowns, waves = np.zeros(batch.size), np.zeros(batch.size)
         for index in np.flatnonzero(fit).tolist():
             g = Geometry.of(batch, index)
             unknowns[index] = _size(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
-        why = "they would fill the memory: a wider placement.gap or a larger model.tube.tolerance"
-        name = "unknowns that gap and tolerance ask for"
-        return [*limits, Limit.of(name, unknowns, "at most", float(_MOST_UNKNOWNS), "1", why, "gap-too-thin")]
+            if unknowns[index] <= _MOST_UNKNOWNS:
+                waves[index] = _waves(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+        name, why = (
+            "that gap and tolerance ask for",
+            "a wider placement.gap, a larger model.tube.tolerance or a narrower",
+        )
+        asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES))
+        return limits + [
+            Limit.of(f"{what} {name}", count, "at most", float(most), "1", f"{why} channel needs fewer", "gap-too-thin")
+            for what, count, most in asked
+        ]
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`: the average over `model.tube.phases` phases, ends condensed."""

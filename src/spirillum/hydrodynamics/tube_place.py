@@ -38,6 +38,8 @@ WIRE_FILM = 0.75
 """Thinnest film between the wire's surface and the glass over the wire's radius: thinner ones are not resolved."""
 _THINNEST_GAP = 1e-3
 """Thinnest film between a solid and the glass over the body's diameter: thinner ones are not resolved."""
+_TIGHTEST = 1.05
+"""Diameter of the tightest tube over the body's."""
 _WIDEST = 1e3
 """Largest size of a channel, m: those without one are infinite."""
 
@@ -160,6 +162,15 @@ def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
             "mm",
             "open ends matter by the length of tube between them (placement.ends = 'closed' needs none)",
             "no-channel-length",
+        ),
+        Limit.of(
+            "channel.diameter",
+            batch.channel_diameter,
+            "at least",
+            _TIGHTEST * batch.body_diameter,
+            "mm",
+            "a film all round the body is resolved down to a twentieth of its radius",
+            "gap-too-thin",
         ),
         Limit.of(
             "placement.gap", films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"

@@ -24,8 +24,11 @@ __all__ = ["circle_waves", "station_waves", "wall_layers", "wave_extensions"]
 
 @compiled
 def _ratios(z: float, r: Samples) -> None:
-    """Fill r[n] = I_{n+1}(z)/I_n(z), by backward recurrence (DLMF 10.29, 10.74(v))."""
-    last = r.size + 30
+    """Fill r[n] = I_{n+1}(z)/I_n(z), by backward recurrence (DLMF 10.29, 10.74(v)).
+
+    It forgets where it starts in orders above z only.
+    """
+    last = max(r.size, int(z)) + 40
     ratio = z / (last + 1.0 + math.sqrt((last + 1.0) ** 2 + z * z))
     for n in range(last - 1, -1, -1):
         ratio = z / (2.0 * (n + 1.0) + z * ratio)

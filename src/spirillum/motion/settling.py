@@ -56,8 +56,8 @@ _PARTS = (
 )
 _KNOWN_ERROR = (
     "a coarsely resolved film resists normal and sideways motion too little: for the paper's robot at "
-    "model.tube.tolerance = 0.005 some 0.5 % at a gap of 0.2 mm and 1 % at 0.1 mm; the robot is held level, while a film "
-    "that drains also tilts it"
+    "model.tube.tolerance = 0.005 some 0.5 % at a gap of 0.2 mm and 1 % at 0.1 mm; the robot is held level, "
+    "while a film that drains also tilts it"
 )
 
 

@@ -111,4 +111,7 @@ def _with_unit(value: Any, unit: str | None) -> Any:
     """A number as a quantity in SI; anything else as it is."""
     if unit is None or isinstance(value, bool) or not isinstance(value, (int, float, np.floating)):
         return value
-    return f"{float(value)!r} {unit}"
+    try:
+        return f"{float(value)!r} {unit}"
+    except OverflowError:
+        return f"{str(value)[:20]}... {unit}"
