@@ -47,7 +47,8 @@ def factors(robot: str, gap: float) -> tuple[float, float, float]:
     raised = sp.predict(robot, **asked, placement={"gap": f"{gap} mm"})
     level_floor = {"gap": f"{gap} mm", "pitch": "0 deg", "tail_drop": f"{drop} mm"}
     along = sp.predict(robot, **asked, placement=level_floor, tolerance=0.05)
-    assert raised.band is not None
+    if raised.band is None:
+        raise RuntimeError("the pitch was left open")
     speeds = raised.forward_velocity, float(raised.band.swimming.forward_velocity[-1]), along.forward_velocity
     level, tip, floor = (inverted(robot, speed, raised.tail_rotation_rate) for speed in speeds)
     return level, tip, floor
