@@ -301,7 +301,8 @@ def draw(rows: list[Row], target: Path) -> None:
 
     shown = {"drag": ("black", "o"), "plug": ("blue", "s"), "torque": ("green", "^"), "normal": ("vermillion", "v")}
     with styled():
-        figure = new_figure(6.4, 2.9)
+        figure = new_figure(7.2, 3.0)
+        figure.set_layout_engine("constrained")
         axes = figure.subplots(1, 2, sharey=True)
         for axis, gap in zip(axes, (0.5, 0.2), strict=True):
             for name, (colour, marker) in shown.items():
@@ -310,10 +311,11 @@ def draw(rows: list[Row], target: Path) -> None:
                     x, y = [row["tolerance"] for row in some], [abs(row[f"{name}_error"]) for row in some]
                     label = name if radius == 20.0 else None
                     axis.loglog(x, y, line, color=COLOURS[colour], marker=marker, markersize=4, label=label)
-            axis.set_xlabel("tolerance of modes")
+            axis.set_xlabel("tolerance of modes and waves")
             axis.set_title(f"gap {gap:g} mm")
+            axis.set_xlim(7e-5, 1.4e-2)
         axes[0].set_ylabel("relative error")
-        axes[0].legend(title="wide; dashed: narrow", title_fontsize=8)
+        axes[1].legend(title="solid: wide\ndashed: narrow", loc="center left", bbox_to_anchor=(1.02, 0.5))
         figure.savefig(target, dpi=130, metadata={"Software": None})
 
 
