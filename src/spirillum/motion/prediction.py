@@ -14,8 +14,9 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.band import Band, band_of
+from spirillum.motion.freedom import Motion, motion_of
+from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import (
-    Swimming,
     calibrated_balance,
     friction_reading,
     requirements,
@@ -60,6 +61,8 @@ class Prediction:
     """What to be careful about, a sentence each."""
     band: Band | None = field(default=None, repr=False)
     """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
+    motion: Motion = "held"
+    """Lateral motion and tilt held, or released."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -90,6 +93,7 @@ class Prediction:
             "model": self.model.name,
             "friction": self.friction,
             "calibrated": self.calibrated,
+            "motion": self.motion,
             **quantities,
             "placement": self.placement,
             **({"band": band.to_dict()} if band else {}),
@@ -121,6 +125,7 @@ def predict(
     tolerance: float | None = None,
     phases: int | None = None,
     band: bool = True,
+    motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
@@ -145,6 +150,8 @@ def predict(
         phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
         band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
             place alone.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`: released, without weight
+            and walls; the forward velocity is then that along the axis of the screw on which the robot moves.
         progress: told what is being computed, how many places are done, and of how many.
 
     Raises:
@@ -158,7 +165,7 @@ def predict(
 
     def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
         rates = None if rate is None else np.array([rate])
-        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated)
+        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated, motion=motion)
 
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
@@ -172,12 +179,15 @@ def predict(
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
         *_drive_warnings(ready, chosen, reading, result, rate),
     ]
+    warnings += _free_warnings(ready, motion)
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
     error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
-    return Prediction(ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), over)
+    return Prediction(
+        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), over, motion_of(motion)
+    )
 
 
 def prepared(
@@ -316,6 +326,12 @@ def _drive_warnings(
     robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
 ) -> list[str]:
     motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
+    step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
+    if np.isfinite(step_out) and not follows:
+        return [
+            f"the field turns faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips behind it again "
+            "and again, and rates and speed are averages"
+        ]
     factors = robot.calibration.get(model.name)
     found = []
     if reading == "paper" and factors is not None and factors.body_rotation < 1:
@@ -328,6 +344,13 @@ def _drive_warnings(
     if rate is None:
         return found + _unset_friction_warning(robot, reading)
     return found + _prescribed_rate_warnings(robot, reading, result)
+
+
+def _free_warnings(robot: Robot, motion: str) -> list[str]:
+    """What a free motion leaves out."""
+    if motion == "held" or robot.channel is None:
+        return []
+    return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]
 
 
 def _against_the_drive(robot: Robot, result: Swimming) -> bool:

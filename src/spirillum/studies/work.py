@@ -14,7 +14,8 @@ from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.motion.prediction import accuracy_limits
-from spirillum.motion.swimming import Swimming, requirements, speed_difference, swim
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import requirements, speed_difference, swim
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
