@@ -23,4 +23,4 @@ print(f"the axis circles at {np.degrees(free.wobble_angle):.2f} deg on a helix o
 
 spent = lying["friction_energy"] + lying["dissipated_energy"]
 fallen = lying["potential_energy"][0] - lying["potential_energy"]
-assert np.allclose(lying["shaft_energy"] + fallen, spent, rtol=1e-6, atol=1e-9)
+assert np.allclose(lying["drive_energy"] + fallen, spent, rtol=1e-6, atol=1e-9)

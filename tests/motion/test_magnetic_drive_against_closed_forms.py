@@ -94,8 +94,8 @@ def test_held_robot_follows_until_its_load_is_too_large() -> None:
 def test_energy_of_a_magnetic_run_is_balanced() -> None:
     run = sp.simulate(sp.load("magnetic-helix", **{"magnetic.rotation_rate": "3 Hz"}), turns=20.0)
     spent = run["dissipated_energy"] + run["potential_energy"] - run["potential_energy"][0]
-    scale = float(run["shaft_energy"][-1])
-    np.testing.assert_allclose(run["shaft_energy"] / scale, spent / scale, atol=1e-7)
+    scale = float(run["drive_energy"][-1])
+    np.testing.assert_allclose(run["drive_energy"] / scale, spent / scale, atol=1e-7)
     assert float(run["phase_lag"][-1]) > 4 * np.pi  # beyond step-out it slips
 
 
@@ -135,3 +135,11 @@ def test_ecoli_swims_as_measured() -> None:
     assert -found.tail_rotation_rate / (2 * np.pi) == pytest.approx(131, abs=31)
     assert found.body_rotation_rate / (2 * np.pi) == pytest.approx(23, abs=8)
     assert 15e-6 < found.forward_velocity < 35e-6
+
+
+@pytest.mark.parametrize("model", ["rft", "slender"])
+def test_ecolis_bundle_is_of_the_size_measured(model: str) -> None:
+    """Chattopadhyay et al. (2006): A = 1.48e-8 N s/m, B = 7.9e-16 N s, D = 7e-22 N m s, of other cells."""
+    b = sp.resistance("ecoli", part="tail", model=model).matrix
+    for found, measured in ((b[0, 0], 1.48e-8), (abs(b[0, 3]), 7.9e-16), (b[3, 3], 7e-22)):
+        assert 0.5 < found / measured < 2.0

@@ -21,13 +21,13 @@ def events(run: Any) -> dict[str, float]:
 def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
     robot = sp.load("biorob2012-narrow", **{"drive.duty": 0.7})
     run = sp.simulate(robot, friction=reading, turns=12.0, on=[(0.0, 0.5), (0.7, 5.0)], placement={"pitch": "1 deg"})
-    chemical = run["resistive_energy"] + run["magnetic_energy"] + run["conversion_energy"] + run["shaft_energy"]
+    chemical = run["resistive_energy"] + run["magnetic_energy"] + run["conversion_energy"] + run["drive_energy"]
     scale = float(run["electrical_energy"][-1])
     np.testing.assert_allclose(run["electrical_energy"] / scale, chemical / scale, atol=1e-8)
     lifted = run["potential_energy"] - run["potential_energy"][0]
     spent = run["friction_energy"] + run["dissipated_energy"] + lifted
-    scale = float(run["shaft_energy"][-1])
-    np.testing.assert_allclose(run["shaft_energy"] / scale, spent / scale, atol=1e-7)
+    scale = float(run["drive_energy"][-1])
+    np.testing.assert_allclose(run["drive_energy"] / scale, spent / scale, atol=1e-7)
 
 
 def test_lying_robot_swims_between_held_and_free() -> None:
@@ -39,6 +39,14 @@ def test_lying_robot_swims_between_held_and_free() -> None:
     assert float(run["mean_tail_rotation_rate"]) == pytest.approx(held.tail_rotation_rate, rel=5e-3)
     assert float(run["mean_body_rotation_rate"]) == pytest.approx(held.body_rotation_rate, rel=1e-2)
     assert "first form" in run.attrs["warnings"]
+
+
+def test_series_are_named_as_in_a_prediction() -> None:
+    """Over the last turn torque and powers are those of the held robot, up to what lateral freedom changes."""
+    robot = sp.load("biorob2012-wide", **QUIET)
+    run, held = sp.simulate(robot, turns=4.0), sp.predict(robot, model="rft")
+    for name in ("drive_torque", "shaft_power", "friction_power", "electrical_power", "motor_current"):
+        assert float(run[name][-100:].mean()) == pytest.approx(getattr(held, name), rel=1e-2), name
 
 
 def test_sphere_sinks_at_its_weight_over_its_drag() -> None:

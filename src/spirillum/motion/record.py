@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["dataset_of"]
 
+_MAGNETIC = 3.0  # kind of drive, see the kernel
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
@@ -48,7 +49,7 @@ def dataset_of(
     import xarray as xr
 
     rotation = _rotations(run.states)
-    series = {**_motion(run, rotation), **_powers(run)}
+    series = {**_motion(run, rotation), **_powers(links, run, rotation)}
     if prediction.batch.drive == "dc-motor":
         series |= _electrics(prediction, run)
     if prediction.batch.drive == "magnetic":
@@ -142,19 +143,36 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, _Series]:
     }
 
 
-def _powers(run: Trajectory) -> dict[str, _Series]:
+def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, _Series]:
     rates, states = run.observed, run.states
+    drive = rates[:, 7]
+    if links.drive[1]:  # one piece, driven from outside
+        torque = drive + _field_torque(links, run, rotation)
+        shaft = rates[:, 11]
+    else:  # what is left of the motor's torque after friction in the joint
+        torque = drive - links.friction[6, 3] * rates[:, 3] - links.friction[6, 6] * rates[:, 6]
+        shaft = torque * rates[:, 6]
     return {
         "drive_torque": _Series(
-            rates[:, 7], "N m", "torque of the drive: in the joint, or from outside on a fixed one"
+            torque, "N m", "torque that turns the rotor (one piece: the robot) against the fluid", "(18)"
         ),
-        "shaft_power": _Series(rates[:, 11], "W", "power of the drive's torque, joint friction included"),
+        "drive_power": _Series(rates[:, 11], "W", "power of the drive's torque, before friction", "(18)"),
+        "shaft_power": _Series(shaft, "W", "drive torque times motor rate (one piece: power from outside)", "(18)"),
         "friction_power": _Series(rates[:, 9], "W", "power lost to friction", "(18), (19)"),
         "dissipated_power": _Series(rates[:, 10], "W", "viscous dissipation, films at the wall included", "(9)"),
-        "shaft_energy": _Series(states[:, kernel.DRIVEN], "J", "work of the drive's torque"),
+        "drive_energy": _Series(states[:, kernel.DRIVEN], "J", "work of the drive's torque, before friction"),
         "friction_energy": _Series(states[:, kernel.FRICTION], "J", "energy lost to friction"),
         "dissipated_energy": _Series(states[:, kernel.DISSIPATED], "J", "energy dissipated in the fluid"),
     }
+
+
+def _field_torque(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
+    """Torque of the field about its own axis, N m; zero without one."""
+    moment, angle = rotation @ links.drive[3:6], links.drive[7] * run.time
+    if links.drive[0] != _MAGNETIC:
+        return np.zeros_like(angle)
+    field = links.drive[6] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
 def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, _Series]:
@@ -165,6 +183,7 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, _Series]:
     current = states[:, kernel.CURRENT]
     voltage = battery_voltage(motor, current)
     return {
+        "motor_torque": _Series(run.observed[:, 7], "N m", "motor torque K_m I, before friction", "(18)"),
         "motor_current": _Series(sign * current, "A", "motor current I", "(17)"),
         "motor_resistance": _Series(
             winding_resistance(motor, current), "ohm", "equivalent resistance R(I)", "Table II"
@@ -225,7 +244,7 @@ def _averages(dataset: xr.Dataset) -> dict[str, Any]:
         "mean_forward_velocity": (mean_slope(along), "m/s"),
         "mean_tail_rotation_rate": (mean_slope(dataset["tail_angle"].values), "rad/s"),
         "mean_body_rotation_rate": (mean_slope(dataset["body_angle"].values), "rad/s"),
-        "mean_shaft_power": (mean_slope(dataset["shaft_energy"].values), "W"),
+        "mean_drive_power": (mean_slope(dataset["drive_energy"].values), "W"),
     }
     if "electrical_energy" in dataset:
         averages["mean_electrical_power"] = (mean_slope(dataset["electrical_energy"].values), "W")
