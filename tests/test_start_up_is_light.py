@@ -5,7 +5,22 @@ import sys
 
 import pytest
 
-HEAVY = ("scipy", "xarray", "matplotlib", "pint", "h5py", "jinja2", "pandas", "numba", "llvmlite")
+HEAVY = (
+    "scipy",
+    "xarray",
+    "matplotlib",
+    "pint",
+    "h5py",
+    "jinja2",
+    "pandas",
+    "numba",
+    "llvmlite",
+    "pyvista",
+    "vtkmodules",
+    "av",
+    "PIL",
+    "trimesh",
+)
 
 
 def loaded_after(code: str) -> set[str]:

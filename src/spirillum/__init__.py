@@ -11,22 +11,30 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from spirillum.citations import citation
     from spirillum.errors import InputError
+    from spirillum.exports.write import Export, export
     from spirillum.hydrodynamics.resistance import Resistance, resistance
     from spirillum.motion.comparison import ModelComparison, compare_models
     from spirillum.motion.flow import Flow, flow
+    from spirillum.motion.magnetic_sweep import magnetic_sweep
     from spirillum.motion.prediction import Prediction, predict
+    from spirillum.motion.quantities import Swimming
     from spirillum.motion.settling import Settling, settle
-    from spirillum.motion.swimming import Swimming, swim
-    from spirillum.motion.transient import simulate
+    from spirillum.motion.simulation import simulate
+    from spirillum.motion.swimming import swim
+    from spirillum.render.film import Film, film
+    from spirillum.render.show import Picture3D, show
     from spirillum.robot import Robot, RobotBatch, load
     from spirillum.studies import study
 
     __version__: str
 
 __all__ = [
+    "Export",
+    "Film",
     "Flow",
     "InputError",
     "ModelComparison",
+    "Picture3D",
     "Prediction",
     "Resistance",
     "Robot",
@@ -35,34 +43,45 @@ __all__ = [
     "Swimming",
     "citation",
     "compare_models",
+    "export",
+    "film",
     "flow",
     "load",
+    "magnetic_sweep",
     "predict",
     "resistance",
     "settle",
+    "show",
     "simulate",
     "study",
     "swim",
 ]
 
 _HOME = {
+    "Export": "spirillum.exports.write",
+    "Film": "spirillum.render.film",
     "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
     "ModelComparison": "spirillum.motion.comparison",
+    "Picture3D": "spirillum.render.show",
     "Prediction": "spirillum.motion.prediction",
     "Resistance": "spirillum.hydrodynamics.resistance",
     "Robot": "spirillum.robot",
     "RobotBatch": "spirillum.robot",
     "Settling": "spirillum.motion.settling",
-    "Swimming": "spirillum.motion.swimming",
+    "Swimming": "spirillum.motion.quantities",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
+    "export": "spirillum.exports.write",
+    "film": "spirillum.render.film",
     "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
+    "magnetic_sweep": "spirillum.motion.magnetic_sweep",
     "predict": "spirillum.motion.prediction",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
-    "simulate": "spirillum.motion.transient",
+    "show": "spirillum.render.show",
+    "simulate": "spirillum.motion.simulation",
     "study": "spirillum.studies",
     "swim": "spirillum.motion.swimming",
 }
