@@ -239,13 +239,13 @@ def _make_room(axes: Axes) -> None:
 
 
 def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
-    """Times within the run, and what happened then."""
+    """Times within the run, and what happened then; what it begins with is no event in it."""
     try:
         listed = json.loads(str(dataset.attrs.get("events", "[]")))
         found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
     except (ValueError, TypeError, KeyError):
         return []  # they are notes on a picture; a run without them can still be drawn
-    return sorted(event for event in found if time[0] <= event[0] <= time[-1])
+    return sorted(event for event in found if time[0] < event[0] <= time[-1])
 
 
 def _event_words(events: list[tuple[float, str]]) -> list[str]:
