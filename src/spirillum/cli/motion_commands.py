@@ -49,7 +49,11 @@ def simulate(
         Path | None, typer.Option(metavar="FILE", help="Duty over time instead: CSV with the columns time_s, duty.")
     ] = None,
     gap: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Free: smallest distance of body and wall at the start.")
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Free: smallest distance of body and wall at the start; else 1/18 of the body's radius.",
+        ),
     ] = None,
     eccentricity: Annotated[
         float | None, typer.Option(help="Free, instead of --gap: the body's offset towards the floor over R - a.")

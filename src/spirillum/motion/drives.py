@@ -35,7 +35,9 @@ class DriveState:
     step_out: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
     """Magnetic drive: fastest rotation of the field that the robot follows, rad/s."""
     lag: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
-    """Magnetic drive: angle of the moment behind the field, rad; NaN where the robot does not follow."""
+    """Magnetic drive: angle of the moment behind the turning field, rad; NaN where the robot does not follow."""
+    driving_rate: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: rate of the field, against which its torque works, rad/s."""
 
 
 def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
@@ -147,7 +149,7 @@ def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> Drive
     frictionless = FrictionTorques(zero, zero, zero, zero, zero)
     if batch.drive == "magnetic" and np.all(np.isnan(tail_rate)):
         step_out, lag, rate = _in_rotating_field(batch, load, flow)
-        return DriveState(rate, rate, none, none, frictionless, none, step_out, lag)
+        return DriveState(rate, rate, none, none, frictionless, none, step_out, lag, batch.field_rate)
     own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + flow) / load
     rate = np.where(np.isnan(tail_rate), own, tail_rate)
     return DriveState(rate, rate, none, none, frictionless, none)
@@ -164,6 +166,6 @@ def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tup
     wanted = batch.field_rate - flow / load  # what the field has to drive beyond the flow's own turning
     step_out = strength / load
     follows = np.abs(wanted) <= step_out
-    lag = np.where(follows, np.arcsin(np.where(follows, wanted / step_out, 0.0)), np.nan)
+    lag = np.where(follows, np.arcsin(np.where(follows, np.abs(wanted) / step_out, 0.0)), np.nan)
     slipping = wanted - np.sign(wanted) * np.sqrt(np.where(follows, 0.0, wanted**2 - step_out**2))
     return step_out, lag, np.where(follows, wanted, slipping) + flow / load

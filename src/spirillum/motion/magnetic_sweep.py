@@ -28,7 +28,7 @@ from spirillum.motion.swimming import swim
 from spirillum.motion.trajectory import INTEGRATOR, Reach, integrate
 from spirillum.motion.two_links import TwoLinks, two_links
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,11 +40,15 @@ _TILT = 0.1
 _SAMPLES = 64
 _OPEN = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _SETTLED = 1e-3
+"""Largest relative change of the velocity from one stretch to the next."""
+_STILL = 1e-4
+"""Largest change of the wobble from one stretch to the next, rad."""
+_MOST_STRETCHES = 25
 _MOST_RATES = 2000
 
 
 class _Mean(NamedTuple):
-    """Averages over the second half of a run at one rate."""
+    """Averages over one stretch of a run at one rate."""
 
     velocity: float
     rate: float
@@ -52,10 +56,19 @@ class _Mean(NamedTuple):
     least_wobble: float
     most_wobble: float
     lag: float
-    drift: float
-    """Difference of the velocity between both halves of that, over the fastest the robot could swim."""
-    attitude: Samples
-    """Quaternion at the end, seen from the field."""
+    """NaN where the robot slips."""
+    state: Samples
+    """At the end."""
+
+    @property
+    def follows(self) -> bool:
+        """Whether the robot follows the field."""
+        return bool(np.isfinite(self.lag))
+
+    def agrees(self, other: _Mean) -> bool:
+        """Whether nothing has changed any more."""
+        same = abs(self.velocity - other.velocity) <= _SETTLED * max(abs(self.velocity), abs(other.velocity))
+        return same and abs(self.wobble - other.wobble) <= _STILL and self.follows == other.follows
 
 
 def magnetic_sweep(
@@ -63,7 +76,7 @@ def magnetic_sweep(
     rates: Sequence[str | float] | Samples | None = None,
     *,
     model: str = "rft",
-    turns: float = 60.0,
+    turns: float = 30.0,
     accuracy: str | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> xr.Dataset:
@@ -74,14 +87,15 @@ def magnetic_sweep(
         rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
             None: 40 rates up to one and a half times the step-out rate of the held robot.
         model: `rft` or `slender`.
-        turns: turns of the field at each rate; the second half of them is averaged.
+        turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
+            at most 25, and the last is averaged, over whole slips where the robot slips.
         accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
         progress: told what is being computed, how many rates are done, and of how many.
 
     Returns:
         Dataset over `field_rate` (rad/s): `forward_velocity` along the field's axis, `tail_rotation_rate` about it,
-        `wobble_angle` with its least and largest, `phase_lag` (NaN where the robot slips), `settled`, and the same of
-        the held robot in closed form; `step_out_rate` of the held robot as a scalar.
+        `wobble_angle` with its least and largest, `phase_lag` (NaN where the robot slips), `settled` (0 where they
+        still change), and the same of the held robot in closed form; `step_out_rate` of the held robot as a scalar.
 
     Raises:
         InputError: for another drive, wrong rates, or a model without all entries.
@@ -103,15 +117,17 @@ def magnetic_sweep(
         weight=False,
         roughness=None,
     )
-    attitude = _pushed(np.array([1.0, 0.0, 0.0, 0.0]))
-    found = []
+    level: Samples = np.array([1.0, 0.0, 0.0, 0.0])
+    attitude: Samples = level
+    found, settled = [], []
     for done, rate in enumerate(asked):
         if progress is not None:
             progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, asked.size)
-        mean = _at_rate(links, float(rate), attitude, turns)
-        attitude = _pushed(mean.attitude)
+        mean, still = _settled(links, float(rate), _pushed(attitude), turns)
+        attitude = mean.state[kernel.ATTITUDE : kernel.ATTITUDE + 4] if mean.follows else level
         found.append(mean)
-    return _dataset(held, asked, found, turns)
+        settled.append(still)
+    return _dataset(held, asked, found, np.array(settled, dtype=float), turns)
 
 
 def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
@@ -130,17 +146,47 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
     return asked
 
 
-def _at_rate(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> _Mean:
-    """The robot in a field that turns at one rate, from an attitude at time 0."""
+def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
+    """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
     drive = links.drive.copy()
     drive[7] = rate
     here = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
-    start = np.zeros(kernel.STATES)
+    start: Samples = np.zeros(kernel.STATES)
     start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = attitude
-    end = turns * 2.0 * np.pi / abs(rate)
-    time = np.linspace(0.0, end, int(turns * _SAMPLES) + 1)
-    run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
-    return _averaged(here, rate, run.time, run.states)
+    whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up
+    time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
+    before = None
+    for _ in range(_MOST_STRETCHES):
+        run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
+        mean = _averaged(here, rate, run.time, run.states)
+        if before is not None and mean.agrees(before):
+            return mean, True
+        before, start = mean, mean.state
+    return mean, False
+
+
+def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
+    from scipy.spatial.transform import Rotation
+
+    attitudes = Rotation.from_quat(states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4], scalar_first=True)
+    rotation = np.asarray(attitudes.as_matrix())
+    moment = rotation @ links.drive[3:6]
+    behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
+    slipped = behind - behind[0]
+    follows = abs(float(slipped[-1])) < 0.5 * np.pi
+    slips = int(slipped[-1] // (2.0 * np.pi))
+    last = time.size - 1 if slips < 1 else int(np.searchsorted(slipped, 2.0 * np.pi * slips))
+    wobble = np.arccos(np.clip(np.abs(rotation[: last + 1, 0, 0]), 0.0, 1.0))
+    span = float(time[last])
+    return _Mean(
+        velocity=float(states[last, 0] - states[0, 0]) / span,
+        rate=rate - float(np.sign(rate) * slipped[last]) / span,
+        wobble=float(np.mean(wobble)),
+        least_wobble=float(np.min(wobble)),
+        most_wobble=float(np.max(wobble)),
+        lag=float(np.angle(np.mean(np.exp(1j * behind)))) if follows else np.nan,
+        state=states[-1],
+    )
 
 
 def _pushed(attitude: Samples) -> Samples:
@@ -151,40 +197,22 @@ def _pushed(attitude: Samples) -> Samples:
     return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
 
 
-def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
-    from scipy.spatial.transform import Rotation
-
-    attitudes = Rotation.from_quat(states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4], scalar_first=True)
-    rotation = np.asarray(attitudes.as_matrix())
-    moment = rotation @ links.drive[3:6]
-    behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
-    half, last = time.size // 2, 3 * time.size // 4
-    wobble = np.arccos(np.clip(np.abs(rotation[half:, 0, 0]), 0.0, 1.0))
-
-    def speed(first: int, final: int) -> float:
-        return float((states[final, 0] - states[first, 0]) / (time[final] - time[first]))
-
-    slipped = float(behind[-1] - behind[half])
-    final = -1
-    follows = abs(slipped) < np.pi / 2
-    back = Rotation.from_rotvec([-rate * time[final], 0.0, 0.0])
-    fastest = max(abs(speed(half, last)), abs(speed(last, final)), 1e-300)
-    return _Mean(
-        velocity=speed(half, final),
-        rate=rate - np.sign(rate) * slipped / float(time[final] - time[half]),
-        wobble=float(np.mean(wobble)),
-        least_wobble=float(np.min(wobble)),
-        most_wobble=float(np.max(wobble)),
-        lag=float(np.angle(np.mean(np.exp(1j * behind[half:])))) if follows else np.nan,
-        drift=abs(speed(last, final) - speed(half, last)) / fastest if follows else np.nan,
-        attitude=np.asarray((back * attitudes[final]).as_quat(scalar_first=True)),
-    )
+def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[str]:
+    """A sentence on the rates at which the motion still changes."""
+    if np.all(settled):
+        return []
+    open_ = np.abs(rates[settled == 0])
+    return [
+        f"at {open_.size} of {rates.size} rates, {show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}, "
+        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns: those numbers depend on "
+        "how long the field is given"
+    ]
 
 
-def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], turns: float) -> xr.Dataset:
+def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: Samples, turns: float) -> xr.Dataset:
     import xarray as xr
 
-    table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "attitude"}
+    table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
     batch = held.batch.with_values({"magnetic.rotation_rate": rates})
     closed = swim(batch, held.model, calibrated=False)
     series = {
@@ -194,11 +222,7 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], turns: fl
         "least_wobble_angle": (table["least_wobble"], "rad", "smallest such angle"),
         "largest_wobble_angle": (table["most_wobble"], "rad", "largest such angle"),
         "phase_lag": (table["lag"], "rad", "mean angle of the moment behind the field; NaN where it slips"),
-        "settled": (
-            np.where(np.isnan(table["drift"]), np.nan, table["drift"] < _SETTLED),
-            "1",
-            "1 where the velocity no longer changes by 0.1 %; NaN where the robot slips",
-        ),
+        "settled": (settled, "1", "1 where speed and wobble no longer change, 0 where they still do"),
         "held_forward_velocity": (closed.forward_velocity, "m/s", "velocity of the held robot, closed form"),
         "held_tail_rotation_rate": (closed.tail_rotation_rate, "rad/s", "rate of the held robot, closed form"),
         "held_phase_lag": (closed.phase_lag, "rad", "phase lag of the held robot, closed form"),
@@ -229,7 +253,7 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], turns: fl
             "known_error": held.model.stated_error(held.robot.model),
             "integrator": INTEGRATOR,
             "references": " ".join(held.references),
-            "warnings": "\n".join(held.robot.warnings),
+            "warnings": "\n".join([*held.robot.warnings, *_unsettled(rates, settled, turns)]),
             "versions": versions(),
         },
     )

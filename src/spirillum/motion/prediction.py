@@ -303,8 +303,11 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
         return []
     entry = robot.calibration.get(model)
     if entry is None:
-        walls = "" if robot.channel is None else ", and nothing stands for the channel's walls"
-        return [f"no calibration for model '{model}': body drag factors are 1{walls}"]
+        if robot.channel is None:  # nothing to stand for
+            return []
+        return [
+            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
+        ]
     fitted = entry.fitted_to
     channel = robot.channel.diameter if robot.channel else None
     pairs = (

@@ -209,8 +209,11 @@ def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str,
     field = 0.5 * np.pi + links.drive[7] * run.time
     behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(links.drive[7])
     behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
+    behind = np.where(run.duty > 0, behind, np.nan)
     return {
-        "phase_lag": _Series(behind, "rad", "angle of the moment behind the field about x, turns counted", "m x B"),
+        "phase_lag": _Series(
+            behind, "rad", "angle of the moment behind the turning field, slips counted; NaN while it is off", "m x B"
+        ),
         "wobble_angle": _Series(
             np.arccos(np.clip(np.abs(rotation[:, 0, 0]), 0.0, 1.0)),
             "rad",

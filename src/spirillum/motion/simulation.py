@@ -68,7 +68,8 @@ def simulate(
         duty: duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next.
         samples_per_turn: samples of the output per steady turn of the tail.
         accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
-        placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`.
+        placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
+            starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
         weight: let weight and buoyancy act on the free robot, if its masses are known.
         roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
         progress: told what is being computed, how much is done, and of how much.
@@ -121,7 +122,10 @@ def simulate(
     reach = reach_of(steady.robot)
     run = integrate(links, start, time, switches, reach, progress)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
-    return dataset_of(steady, links, run, reach, title, (*steady.warnings, *_first_form(steady, links, weight=weight)))
+    said = [*steady.warnings, *_first_form(steady, links, weight=weight)]
+    if all(switch.duty == 0 for switch in switches):
+        said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
+    return dataset_of(steady, links, run, reach, title, tuple(said))
 
 
 def _check_held(placement: Placement, roughness: str | float | None, *, weight: bool) -> None:

@@ -192,7 +192,10 @@ def _answer(
     dissipated = load * tail_rate + s.body_load(body_rate, tail_rate) * body_rate
     if batch.joint == "fixed":
         drive = load + s.body_load(body_rate, tail_rate)
-        shaft = drive * tail_rate
+        # The mean power of a slipping robot is its mean torque times the rate of the field, not times its own.
+        from_field = ~np.isnan(state.driving_rate)
+        shaft = drive * np.where(from_field, state.driving_rate, tail_rate)
+        dissipated = np.where(from_field, shaft, dissipated)
     else:
         drive, shaft = load, load * slip
     towing = body_axial(batch)[0] * speed**2

@@ -44,11 +44,13 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         )
         panels = figure.subplots(2, 2, sharex=True).ravel()
         figure.subplots_adjust(left=0.085, right=0.985, bottom=0.085, top=0.88, wspace=0.24, hspace=0.2)
-        panels[0].plot(rate, speeds(dataset["held_forward_velocity"].values), **_HELD)
+        fine, turning, lag = _held(dataset)
+        advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
+        panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
         _points(panels[0], rate, speeds(speed), "blue")
         panels[0].set_ylabel(f"forward velocity ({speeds.unit})")
         panels[0].legend(loc="best")
-        panels[1].plot(rate, dataset["held_tail_rotation_rate"].values / Hz, **_HELD)
+        panels[1].plot(fine, turning, **_HELD)
         _points(panels[1], rate, dataset["tail_rotation_rate"].values / Hz, "vermillion")
         panels[1].set_ylabel("rate of the robot (Hz)")
         low, high = (np.rad2deg(dataset[f"{name}_wobble_angle"].values) for name in ("least", "largest"))
@@ -58,7 +60,8 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         _points(panels[2], rate, np.rad2deg(dataset["wobble_angle"].values), "green")
         panels[2].set_ylabel("wobble: robot's axis to field's (deg)")
         panels[2].set_ylim(0.0, max(1.0, 1.05 * float(high.max())))
-        panels[3].plot(rate, np.rad2deg(dataset["held_phase_lag"].values), **_HELD)
+        panels[2].legend(loc="best")
+        panels[3].plot(fine, np.rad2deg(lag), **_HELD)
         _points(panels[3], rate, np.rad2deg(dataset["phase_lag"].values), "purple")
         panels[3].set_ylabel("moment behind field (deg)")
         panels[3].set_ylim(0.0, 95.0)
@@ -68,6 +71,17 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         for axes in panels[2:]:
             axes.set_xlabel("rotation rate of the field (Hz)")
         return figure
+
+
+def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
+    """Rates of the field and of the held robot, Hz, and its phase lag, rad: the closed form between the given rates."""
+    rates, step_out = dataset["field_rate"].values / Hz, float(dataset["step_out_rate"]) / Hz
+    sense = float(np.sign(rates[0]))
+    size = np.unique(np.append(np.linspace(0.0, np.abs(rates).max(), 801), min(step_out, np.abs(rates).max())))
+    follows = size <= step_out
+    slipping = size - np.sqrt(np.where(follows, 0.0, size**2 - step_out**2))
+    turning = np.where(follows, size, slipping)
+    return sense * size, sense * turning, np.where(follows, np.arcsin(np.minimum(size / step_out, 1.0)), np.nan)
 
 
 def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
