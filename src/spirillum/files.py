@@ -158,7 +158,10 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str) -> P
     if path.suffix not in kinds:
         endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
         raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
-    folder = _regular(path).parent
+    real = _regular(path)
+    if real.exists() and not os.access(real, os.W_OK):
+        raise InputError(f"{path} is there and closed to writing (permission denied); allowed: a file you may replace")
+    folder = real.parent
     if not folder.is_dir():
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
     if not os.access(folder, os.W_OK):

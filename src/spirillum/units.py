@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
@@ -206,8 +207,12 @@ def parse_option(name: str, value: str | float, kind: Kind) -> float:
     Raises:
         InputError: as `parse_quantity`; the sentence starts with the option's name.
     """
-    if isinstance(value, (int, float)) and not isinstance(value, bool):
-        value = f"{float(value)!r} {kind.unit}"
+    given: Any = value  # numbers of other libraries are real numbers too
+    if not isinstance(given, bool) and isinstance(given, Real):
+        try:
+            value = f"{float(given)!r} {kind.unit}"
+        except OverflowError:
+            value = f"inf {kind.unit}"
     try:
         return parse_quantity(value, kind)
     except InputError as error:

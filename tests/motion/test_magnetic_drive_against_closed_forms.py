@@ -20,7 +20,7 @@ def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
     drive[0], drive[1], drive[2] = 3.0, 1.0, 1.0
     drive[3], drive[5], drive[6] = MOMENT * np.cos(angle), MOMENT * np.sin(angle), FIELD
     drag = np.diag([1.0, 1.0, 1.0, along, across, across, 1.0])
-    return TwoLinks(drag, np.zeros((7, 7)), np.zeros(8), np.array([np.inf, 1e-9, np.inf]), np.zeros((0, 7)), drive)
+    return TwoLinks(drag, np.zeros((7, 7)), np.zeros(8), np.array([np.inf, 1e-9, np.inf, 1.0]), np.zeros((0, 6)), drive)
 
 
 def run_at(links: TwoLinks, rate: float, turns: float) -> np.ndarray:
@@ -149,6 +149,9 @@ def test_wrong_sweeps_are_refused(rates: object, options: dict[str, object], wor
     with pytest.raises(sp.InputError, match="allowed") as caught:
         sp.magnetic_sweep("magnetic-helix", rates, **options)
     assert words in str(caught.value)
+    along = sp.load("magnetic-helix", **{"magnetic.moment_angle": "0 deg"})
+    with pytest.raises(sp.InputError, match=r"magnetic\.moment_angle = 0 deg"):
+        sp.magnetic_sweep(along)
     with pytest.raises(sp.InputError, match="magnetic"):
         sp.magnetic_sweep("biorob2012-wide")
 

@@ -87,7 +87,7 @@ def test_films_against_reynolds_equation() -> None:
         "biorob2012-wide",
         body={"shape": "sphere", "diameter": "18 mm", "length": "18 mm", "front": "none", "rear": "none"},
     )
-    spot = films_of(robot, None, 1.0).spots[0]
+    spot = films_of(robot, None, 1.0, 1.0).spots[0]
     along, across, viscosity = 0.009, 0.009 * 0.02 / 0.011, 3.5
     for film in (1e-4, 4e-4):
 
@@ -132,6 +132,69 @@ def test_start_is_where_the_placement_says() -> None:
     assert float(run["wall_gap"][0]) == pytest.approx(1.3e-3, rel=2e-2)  # a ring's farthest point, to the tilt squared
     run = sp.simulate("biorob2012-wide", turns=0.1, placement={"eccentricity": 0.0})
     assert float(run["wall_gap"][0]) == pytest.approx(0.011, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("channel", "angle", "field"), [("6 mm", "40 deg", "1 mT"), ("8 mm", "10 deg", "5 mT")], ids=["weak", "strong"]
+)
+def test_pressed_robot_stays_off_the_wall_and_its_energy_balanced(channel: str, angle: str, field: str) -> None:
+    """Roughness carries what films only slow down; its pressure is the gradient of the energy that it stores."""
+    robot = sp.load(
+        "magnetic-helix",
+        **{"channel": {"diameter": channel}, "magnetic.moment_angle": angle, "magnetic.field": field},
+    )
+    run = sp.simulate(robot, turns=4.0)
+    assert "film as thin as the roughness" in events(run)
+    assert float(run["wall_gap"].min()) > 1e-4 * 1.5e-3  # the roughness
+    spent = run["dissipated_energy"] + run["potential_energy"] - run["potential_energy"][0]
+    scale = float(run["drive_energy"][-1])
+    np.testing.assert_allclose(run["drive_energy"] / scale, spent / scale, atol=1e-6)
+
+
+def test_film_is_lost_as_its_gradient_says() -> None:
+    """By finite differences of place and attitude, for a tilted sphere-ended, an edged and an ellipsoidal ring."""
+    from scipy.spatial.transform import Rotation
+
+    from spirillum.kernels import two_links as kernel
+
+    wall = np.array([0.02, 1e-6, np.inf, 1.0])
+    place, attitude = np.array([0.0, 2.1e-3, -8.5e-3]), Rotation.from_euler("xyz", [0.3, 0.1, -0.07])
+
+    def film(step: np.ndarray, spot: np.ndarray, gradient: np.ndarray) -> float:
+        state = np.zeros(kernel.STATES)
+        state[:3] = place + attitude.apply(step[:3])
+        turned = attitude * Rotation.from_rotvec(step[3:])
+        state[3:7] = turned.as_quat(scalar_first=True)
+        return float(kernel.film_of(state, np.ascontiguousarray(turned.as_matrix()), wall, spot, gradient))
+
+    for reach in (0.0, 0.009, 0.014):
+        spot = np.array([0.008, 0.009, reach, 1.0, 1.0, 1.0])
+        gradient, other = np.zeros(6), np.zeros(6)
+        film(np.zeros(6), spot, gradient)
+        for i in range(6):
+            step = np.zeros(6)
+            step[i] = 1e-6
+            change = (film(step, spot, other) - film(-step, spot, other)) / 2e-6
+            assert -change == pytest.approx(gradient[i], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("placement", "roughness", "words"),
+    [
+        ({"gap": "1 nm"}, None, "roughness = 0.9 um with a gap of 0.001 um"),
+        ({"gap": "0.1 mm"}, "5 mm", "roughness = 5000 um"),
+        ({"eccentricity": 1.0}, None, "a smaller placement.eccentricity"),
+    ],
+)
+def test_start_at_the_wall_names_what_puts_it_there(placement: Any, roughness: Any, words: str) -> None:
+    with pytest.raises(sp.InputError, match="allowed") as caught:
+        sp.simulate("biorob2012-wide", placement=placement, roughness=roughness)
+    assert words in str(caught.value)
+
+
+def test_battery_spent_before_the_first_sample_is_found() -> None:
+    run = sp.simulate(sp.load("biorob2012-wide", **{"battery.capacity": "1e-9 C"}), turns=1.0)
+    assert 0 < events(run)["battery empty"] < 1e-3
 
 
 def test_run_ends_where_the_tube_ends() -> None:
@@ -196,6 +259,8 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
         ({"motion": "held", "weight": False}, "weight"),
         ({"motion": "held", "placement": {"gap": "1 mm"}}, "placement"),
         ({"on": [(0.0, 1.0)], "duty": "duty.csv"}, "together"),
+        ({"turns": 5e-324}, "turns = 5e-324"),
+        ({"duration": 1e-12}, "duration = 1e-12"),
         ({"turns": float("nan")}, "turns = nan"),
     ],
 )
@@ -203,6 +268,26 @@ def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(sp.InputError, match="allowed") as caught:
         sp.simulate("biorob2012-wide", **options)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"on": "0s:1s"}, "on = 0s:1s"),
+        ({"on": [1]}, "on = [1]"),
+        ({"duty": 0.5}, "duty = 0.5"),
+        ({"samples_per_turn": "x"}, "samples-per-turn = x"),
+    ],
+)
+def test_wrong_types_get_a_sentence_too(options: dict[str, Any], words: str) -> None:
+    """In a process of its own, where annotations are not checked."""
+    import subprocess
+    import sys
+
+    call = f"sp.simulate('biorob2012-wide', **{options!r})"
+    script = f"import spirillum as sp\ntry: {call}\nexcept sp.InputError as e: print(e)"
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert words in found.stdout
 
 
 def test_powers_are_what_their_definitions_say() -> None:

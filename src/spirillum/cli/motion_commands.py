@@ -134,9 +134,13 @@ def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progre
         save_as(trajectory_figure(dataset), picture)
         files["plot"] = str(picture)
     if movie is not None:
+        from spirillum.errors import InputError
         from spirillum.render.film import film
 
-        files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)
+        try:
+            files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)
+        except InputError as error:
+            raise InputError(f"the run is written, the film is not: {error}") from error
         files["movie"] = str(movie)
     return files
 

@@ -301,7 +301,7 @@ def time_window(text: str) -> tuple[float, float]:
         InputError: if it is none.
     """
     start, colon, stop = text.partition(":")
-    if not colon:
+    if not colon or ":" in stop:
         raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
     return parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])
 

@@ -50,10 +50,10 @@ DRIVEN, FRICTION, DISSIPATED = 14, 15, 16  # work of the drive's torque on both 
 STATES = 17
 
 JOINT = 6  # the joint's place among the rates
-OBSERVED = (
-    12  # columns: seven rates, torque of the drive, thinnest film, powers of friction, of the fluid, and of the drive
-)
-_WORK = 160
+OBSERVED = 13
+"""Columns: seven rates, torque of the drive, thinnest film, powers of friction, fluid and drive, energy of pressed
+roughness."""
+_WORK = 161
 
 # Kinds of drive, drive[0].
 _MOTOR, _TORQUE, _RATE, _MAGNETIC = 0.0, 1.0, 2.0, 3.0
@@ -66,9 +66,9 @@ def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spo
         drag: A(0), 7x7, SI.
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
         weight: submerged weight of body and rotor, N, and its first moments, N m (8).
-        wall: radius of the channel (infinite: none), roughness, m; largest resistance of a film, N s/m.
-        spots: rings that may near the wall (n, 7): x, a, b, coefficient c, power p, reach H, 1 for the rotor or 0.
-            A film of thickness h resists with c ((H/h)^p - 1).
+        wall: radius of the channel (infinite: none), roughness, m; largest resistance of a film, N s/m; load, N.
+        spots: rings that may near the wall (n, 6): x, a, b, coefficient c, power p, reach H. A film of thickness h
+            resists with c ((H/h)^p - 1).
         drive: kind, fixed joint, duty, then: torque or rate; or moment (3), field, its rate; motor from place 8 on:
             polarity, K_m, K_b, L, R(I) (6), voltage, internal resistance.
     """
@@ -157,60 +157,72 @@ def _field(time: float, rotation: Samples, drive: Samples, force: Samples) -> No
 
 
 @compiled
-def film_of(y: Samples, rotation: Samples, wall: Samples, spot: Samples, arm: Samples, normal: Samples) -> float:
-    """Film between the wall and the surface about one ring of the robot, m; its arm and normal in body axes.
+def film_of(y: Samples, rotation: Samples, wall: Samples, spot: Samples, j: Samples) -> float:
+    """Film between the wall and the surface about one ring of the robot, m; its loss per rate goes into `j`.
 
-    `wall` is radius, roughness, and the largest resistance; `spot` the ring's place x, its radius a, its half-length b
-    along the axis (0 for an edge), and what its film's resistance follows from. The farthest point from the channel's
-    axis of a spheroid with semi-axes b and a is x e_1 + (b^2 n_1 e_1 + a^2 n_t)/s with s^2 = b^2 n_1^2 + a^2 n_t^2.
+    `wall` begins with radius R and roughness, `spot` with the ring's place x, its radius a, and its half-length b along
+    the axis (0 for an edge). With the ring's middle c off the channel's axis, n = c/|c| across it and n_1 = n.e_1, the
+    film is R - |c| - s less the roughness, where s^2 = b^2 n_1^2 + a^2 (1 - n_1^2) is how far a spheroid with semi-axes
+    b, a reaches along n. `j` is its gradient: with t across n in the channel's section and s' = ds/dn_1,
+
+        j_U = n + s' (t.e_1)/|c| t,   j_Omega = s' e_1 x n + x e_1 x j_U
     """
     side = y[1] + rotation[1, 0] * spot[0]
     height = y[2] + rotation[2, 0] * spot[0]
     distance = math.hypot(side, height)
-    if distance < 1e-12 * wall[0]:
-        side, height, distance = 0.0, -1.0, 1.0
-        centre = 0.0
+    near = distance < 1e-12 * wall[0]
+    if near:
+        side, height = 0.0, -1.0
     else:
-        centre = distance
-    side, height = side / distance, height / distance
+        side, height = side / distance, height / distance
+    n_1 = rotation[1, 0] * side + rotation[2, 0] * height
+    reach = max(math.sqrt((spot[2] * n_1) ** 2 + spot[1] ** 2 * max(1.0 - n_1 * n_1, 0.0)), 1e-12 * spot[1])
+    slope = (spot[2] ** 2 - spot[1] ** 2) * n_1 / reach
+    turning = 0.0 if near else slope * (-rotation[1, 0] * height + rotation[2, 0] * side) / distance
     for i in range(3):
-        normal[i] = rotation[1, i] * side + rotation[2, i] * height
-    across = math.sqrt(normal[1] ** 2 + normal[2] ** 2)
-    reach = max(math.hypot(spot[2] * normal[0], spot[1] * across), 1e-12 * spot[1])
-    arm[0] = spot[0] + spot[2] ** 2 * normal[0] / reach
-    arm[1] = spot[1] ** 2 * normal[1] / reach
-    arm[2] = spot[1] ** 2 * normal[2] / reach
-    return float(wall[0] - centre - reach - wall[1])
+        normal = rotation[1, i] * side + rotation[2, i] * height
+        across = -rotation[1, i] * height + rotation[2, i] * side
+        j[i] = normal + turning * across
+        j[3 + i] = normal
+    n_y, n_z = j[4], j[5]
+    j[3] = 0.0
+    j[4] = -slope * n_z - spot[0] * j[2]
+    j[5] = slope * n_y + spot[0] * j[1]
+    return float(wall[0] - (0.0 if near else distance) - reach - wall[1])
 
 
 @compiled
-def _films(y: Samples, rotation: Samples, wall: Samples, spots: Samples, a: Samples, work: Samples) -> float:
-    """Add the resistance of the films to `a`; give the thinnest, m."""
-    thinnest = math.inf
-    arm, normal, j = work[0:3], work[3:6], work[6:13]
+def _films(
+    y: Samples, rotation: Samples, wall: Samples, spots: Samples, a: Samples, force: Samples, work: Samples
+) -> tuple[float, float]:
+    """Add the films' resistance to `a` and the roughness's pressure to `force`; thinnest film, m, and its energy, J.
+
+    Films are counted from the tips of the roughness s. Thinner than s, these are pressed together, with the force
+    N (s/h - 1) and the energy N (s log(s/h) - s + h) for a load N of the robot's order.
+    """
+    thinnest, energy = math.inf, 0.0
+    rough, load = wall[1], wall[3]
+    j = work[0:6]
     for c in range(spots.shape[0]):
         spot = spots[c]
-        film = film_of(y, rotation, wall, spot, arm, normal)
+        film = film_of(y, rotation, wall, spot, j)
         thinnest = min(thinnest, film)
         if film >= spot[5]:
             continue
-        if film <= 0.0:
-            k = wall[2]
-        else:
-            share = film / spot[5]
-            thinner = 1.0 / (share * math.sqrt(share)) if spot[4] == 1.5 else 1.0 / share
-            k = min(spot[3] * (thinner - 1.0), wall[2])
-        for i in range(3):
-            j[i] = normal[i]
-        j[3] = arm[1] * normal[2] - arm[2] * normal[1]
-        j[4] = arm[2] * normal[0] - arm[0] * normal[2]
-        j[5] = arm[0] * normal[1] - arm[1] * normal[0]
-        j[6] = spot[6] * j[3]
-        for i in range(7):
+        film = max(film, 1e-9 * rough)
+        share = film / spot[5]
+        thinner = 1.0 / (share * math.sqrt(share)) if spot[4] == 1.5 else 1.0 / share
+        k = min(spot[3] * (thinner - 1.0), wall[2])
+        pressed = 0.0
+        if film < rough:
+            pressed = load * (rough / film - 1.0)
+            energy += load * (rough * math.log(rough / film) - rough + film)
+        for i in range(6):  # a ring about the motor axis is pushed without a torque about it
+            force[i] -= pressed * j[i]
             pushed = k * j[i]
-            for m in range(7):
+            for m in range(6):
                 a[i, m] += pushed * j[m]
-    return thinnest
+    return thinnest, energy
 
 
 @compiled
@@ -278,9 +290,9 @@ def _motion(
     along = 3 if fixed else JOINT
     _axes(y, rotation)
     _turned(drag, y[7], fluid)
-    out[8] = _films(y, rotation, wall, spots, fluid, work[126:139])
-    _assembled(fluid, friction, fixed, a)
     _loads(y[7], rotation, weight, force)
+    out[8], out[12] = _films(y, rotation, wall, spots, fluid, force, work[126:132])
+    _assembled(fluid, friction, fixed, a)
     field[:] = 0.0
     if drive[0] == _MAGNETIC and drive[2] > 0.0:
         _field(time, rotation, drive, field)
@@ -309,9 +321,9 @@ def rates(dy: Samples, time: float, y: Samples, data: Samples) -> None:
     """
     work = data[:_WORK]
     drag, friction = data[_WORK : _WORK + 49].reshape(7, 7), data[_WORK + 49 : _WORK + 98].reshape(7, 7)
-    weight, wall = data[_WORK + 98 : _WORK + 106], data[_WORK + 106 : _WORK + 109]
-    drive, spots = data[_WORK + 109 : _WORK + 129], data[_WORK + 129 :].reshape(-1, 7)
-    out, rotation = work[139:151], work[151:160].reshape(3, 3)
+    weight, wall = data[_WORK + 98 : _WORK + 106], data[_WORK + 106 : _WORK + 110]
+    drive, spots = data[_WORK + 110 : _WORK + 130], data[_WORK + 130 :].reshape(-1, 6)
+    out, rotation = work[139:152], work[152:161].reshape(3, 3)
     _motion(time, y, drag, friction, weight, wall, spots, drive, rotation, out, work)
     for i in range(3):
         dy[i] = rotation[i, 0] * out[0] + rotation[i, 1] * out[1] + rotation[i, 2] * out[2]
@@ -344,15 +356,15 @@ def observe(time: Samples, states: Samples, data: Samples, out: Samples) -> None
     work, dy = data[:_WORK], np.empty(STATES)
     for row in range(time.size):
         rates(dy, time[row], states[row], data)
-        out[row] = work[139:151]
+        out[row] = work[139:152]
 
 
 @compiled
 def thinnest_film(y: Samples, wall: Samples, spots: Samples) -> float:
     """Thinnest film between the wall and the robot in a state, m; infinite without a wall."""
-    rotation, arm, normal = np.empty((3, 3)), np.empty(3), np.empty(3)
+    rotation, j = np.empty((3, 3)), np.empty(6)
     _axes(y, rotation)
     thinnest = math.inf
     for c in range(spots.shape[0]):
-        thinnest = min(thinnest, film_of(y, rotation, wall, spots[c], arm, normal))
+        thinnest = min(thinnest, film_of(y, rotation, wall, spots[c], j))
     return thinnest

@@ -9,7 +9,8 @@ film resists with
 
 In a tube of radius R a body of radius a has R_2 = a R/(R - a). (O. Reynolds, Phil. Trans. R. Soc. 177:157, 1886; the
 line against a plane: D. J. Jeffrey and Y. Onishi, Q. J. Mech. Appl. Math. 34:129, 1981.) Sliding along the wall is not
-resisted by a film: what the walls add to it are the calibration factors, or the model `tube`.
+resisted by a film: what the walls add to it are the calibration factors, or the model `tube`. Films are counted from
+the tips of the roughness; where one is thinner than the roughness is high, its tips are pressed together and carry.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ ROUGHNESS_SHARE = 1e-4
 """Roughness over the body's radius where none is given: 0.9 micrometres for the paper's robot. Assumed."""
 _SIDE = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
 """Rings along a straight side and their shares of it: both ends, and points between them (Gauss-Lobatto)."""
-_STIFFEST = 1e8
-"""Largest resistance of a film over that of the robot: numbers stay numbers, and what still creeps is 1e-8 of it."""
+_STIFFEST = 1e10
+"""Largest resistance of a film over that of the robot, so that numbers stay numbers."""
 
 
 @dataclass(frozen=True)
@@ -37,32 +38,33 @@ class Films:
     """Rings of a robot that may near the wall, as `kernels.two_links` reads them."""
 
     wall: Samples
-    """Radius of the channel (infinite without one), roughness, m; largest resistance of a film, N s/m (3,)."""
+    """Radius of the channel (infinite: none), roughness, m; largest resistance of a film, N s/m; load, N (4,)."""
     spots: Samples
-    """Place x, radius, half-length along the axis, resistance, power, reach, 1 for the rotor (n, 7).
+    """Place x, radius, half-length along the axis, resistance, power, reach (n, 6).
 
     A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not at all
     beyond its reach, where the resistance in open fluid is all there is.
     """
 
 
-def films_of(robot: Robot, roughness: float | None, drag: float) -> Films:
+def films_of(robot: Robot, roughness: float | None, drag: float, load: float) -> Films:
     """The films between a robot and its channel.
 
     Args:
         robot: the robot; without a channel it has none.
         roughness: height of what keeps the surfaces apart, m; None: `ROUGHNESS_SHARE` of the body's radius.
         drag: resistance of the robot to sideways motion, N s/m.
+        load: force of the order that presses the robot to the wall, N: it halves a film as thick as the roughness.
     """
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
-        return Films(np.array([np.inf, height, np.inf]), np.zeros((0, 7)))
+        return Films(np.array([np.inf, height, np.inf, load]), np.zeros((0, 6)))
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)
     spots[:, 3] /= spots[:, 5] ** spots[:, 4]
-    return Films(np.array([channel, height, _STIFFEST * drag]), spots)
+    return Films(np.array([channel, height, _STIFFEST * drag, load]), spots)
 
 
 def _across(radius: float, channel: float) -> float:
@@ -81,18 +83,18 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
     across = _across(radius, channel)
     round_ = {"hemisphere": radius, "fillet": body.fillet or 0.0}
     if body.shape in ("sphere", "spheroid"):
-        return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius, 0.0]]
+        return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius]]
     front, rear = half - round_.get(body.front_end or "", 0.0), -half + round_.get(body.rear_end or "", 0.0)
     length = front - rear
     if length < 1e-6 * radius:
-        return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius, 0.0]]
+        return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius]]
     line = 3.0 * np.sqrt(2.0) * np.pi * viscosity * across**1.5 * length
     rings = []
     for place, share in _SIDE:
         end = body.front_end if place == 1.0 else body.rear_end if place == -1.0 else None
         reach = radius if end == "hemisphere" else 0.0
         x = 0.5 * (front + rear) + 0.5 * length * place
-        rings.append([x, radius, reach, line * share, 1.5, radius, 0.0])
+        rings.append([x, radius, reach, line * share, 1.5, radius])
     return rings
 
 
@@ -106,4 +108,4 @@ def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
     radius = tail.amplitude + wire
     coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
     settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
-    return [[x, radius, 0.0, coefficient, 1.0, radius, 1.0] for x in (-root - settled, -root - tail.length)]
+    return [[x, radius, 0.0, coefficient, 1.0, radius] for x in (-root - settled, -root - tail.length)]

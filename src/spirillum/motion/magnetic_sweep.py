@@ -132,9 +132,18 @@ def magnetic_sweep(
 
 def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
     if rates is None:
+        angle = float(held.batch.moment_angle[0])
+        if np.sin(angle) < 1e-6:
+            raise InputError(
+                f"magnetic.moment_angle = {show(angle, 'deg')}: a moment along the motor axis has no step-out rate; "
+                "allowed: a moment across it, or rates (--rate)"
+            )
         return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
+    given: Any = [rates] if isinstance(rates, str) else rates
+    if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:
+        raise InputError(f"rates = {str(rates)[:40]}; allowed: a list of rates")
     asked = np.array(
-        [parse_option("rates", float(r) if isinstance(r, np.floating) else r, KINDS["rate"]) for r in rates]
+        [parse_option("rates", float(r) if isinstance(r, np.floating) else r, KINDS["rate"]) for r in given]
     )
     if not 1 <= asked.size <= _MOST_RATES:
         raise InputError(f"rates has {asked.size} values; allowed: 1 to {_MOST_RATES}")

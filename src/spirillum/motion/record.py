@@ -57,7 +57,8 @@ def dataset_of(
     if np.isfinite(links.wall[0]):
         gap = run.observed[:, 8] + links.wall[1]
         series["wall_gap"] = _Series(gap, "m", "smallest distance of body and tail to the channel's wall")
-    series["potential_energy"] = _Series(_potential(links, run, rotation), "J", "energy of weight and buoyancy")
+    stored = _potential(links, run, rotation) + run.observed[:, 12]
+    series["potential_energy"] = _Series(stored, "J", "energy of weight and buoyancy, and of roughness that is pressed")
     attitude = run.states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
     velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, :3])

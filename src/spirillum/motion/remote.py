@@ -7,7 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
 from spirillum.files import read_text
@@ -41,7 +41,13 @@ def windows_of(on: Sequence[tuple[str | float, str | float]] | None) -> list[Win
     """
     if on is None:
         return None
-    return [(parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in on]
+    given: Any = on
+    pairs = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else []
+    if not pairs or any(isinstance(pair, str) or not isinstance(pair, Sequence) or len(pair) != 2 for pair in pairs):
+        raise InputError(f'on = {str(on)[:60]}; allowed: pairs of start and stop, such as [("0 s", "2 s")]')
+    return [
+        (parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in pairs
+    ]
 
 
 def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float, end: float) -> list[Switch]:
@@ -57,6 +63,8 @@ def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float,
         InputError: for times that go back, both ways at once, or a wrong file.
     """
     if table is not None:
+        if not isinstance(table, (str, Path)):
+            raise InputError(f"duty = {str(table)[:40]}; allowed: a duty file; one number is drive.duty of the robot")
         if on is not None:
             raise InputError(f"on and duty = {str(table)[:80]} are given together; allowed: one of them")
         return [step for step in read_duty(table) if step.time < end]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from spirillum.units import KINDS, parse_option
 __all__ = ["duration_of", "sample_times"]
 
 _LARGEST_SAMPLES = 1_000_000
+_SHORTEST = 1e-6
+"""Shortest run, in turns."""
 
 
 def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
@@ -27,12 +31,12 @@ def duration_of(turns: float, turn: float, duration: str | float | None) -> floa
         InputError: for a length that is none.
     """
     if duration is None:
-        if not 0 < turns <= 1e5:
-            raise InputError(f"turns = {turns}; allowed: more than 0, at most 1e5")
+        if not _SHORTEST <= turns <= 1e5:
+            raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
         return turns * turn
     end = parse_option("duration", duration, KINDS["time"])
-    if end <= 0:
-        raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
+    if end < _SHORTEST * turn:
+        raise InputError(f"duration = {end:g} s; allowed: at least {_SHORTEST * turn:.3g} s, a millionth of a turn")
     return end
 
 
@@ -47,7 +51,10 @@ def sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
     Raises:
         InputError: for no samples, or too many.
     """
-    count = math.ceil(end / turn * samples_per_turn)
+    given: Any = samples_per_turn
+    if isinstance(given, bool) or not isinstance(given, Integral):
+        raise InputError(f"samples-per-turn = {str(given)[:40]}; allowed: a whole number from 1 to 10000")
+    count = math.ceil(end / turn * min(max(samples_per_turn, 1), 10_000))
     if not 1 <= samples_per_turn <= 10_000 or count > _LARGEST_SAMPLES:
         raise InputError(
             f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: 1 to 10000 a turn and "

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.kernels.two_links import thinnest_film
@@ -114,11 +115,7 @@ def simulate(
     switches = schedule(windows_of(on), duty, own, end)
     links = _links(steady, roughness, weight=weight)
     start = start_state(steady.robot, placed, lying=float(links.weight[:2].sum()) > 0)
-    if links.spots.size and thinnest_film(start, links.wall, links.spots) <= 0:
-        raise InputError(
-            f"placement.pitch = {show(placed.pitch or 0.0, 'deg')}: body or tail would cut into the wall; allowed: a "
-            "smaller pitch, or a larger gap than the roughness"
-        )
+    _check_clear(links, start, placed)
     reach = reach_of(steady.robot)
     run = integrate(links, start, time, switches, reach, progress)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
@@ -126,6 +123,34 @@ def simulate(
     if all(switch.duty == 0 for switch in switches):
         said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
     return dataset_of(steady, links, run, reach, title, tuple(said))
+
+
+def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
+    """Refuse a start at which body or tail touch the wall.
+
+    Raises:
+        InputError: if they do, naming what puts them there.
+    """
+    if not links.spots.size:
+        return
+    film, rough = thinnest_film(start, links.wall, links.spots), float(links.wall[1])
+    if film > 0:
+        return
+    gap = film + rough
+    if gap > 0:
+        raise InputError(
+            f"roughness = {show(rough, 'um')} with a gap of {show(gap, 'um')} at the start; allowed: a roughness below "
+            "the gap, or a larger placement.gap"
+        )
+    if placement.pitch:
+        raise InputError(
+            f"placement.pitch = {show(placement.pitch, 'deg')}: body or tail would cut into the wall; allowed: a "
+            "smaller pitch, or a larger placement.gap"
+        )
+    raise InputError(
+        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[0], 'mm')}; allowed: a larger "
+        "placement.gap or a smaller placement.eccentricity"
+    )
 
 
 def _check_held(placement: Placement, roughness: str | float | None, *, weight: bool) -> None:

@@ -23,7 +23,8 @@ __all__ = ["INTEGRATOR", "TOLERANCE", "Event", "Reach", "Trajectory", "integrate
 TOLERANCE = 1e-8
 """Relative tolerance of a step."""
 INTEGRATOR = f"CyRK Tsit5, relative tolerance {TOLERANCE:g}"
-_MOST_STEPS = 5_000_000
+_STEPS_PER_SAMPLE, _STEPS_AT_LEAST = 400, 100_000
+_BREATH = 512  # steps between two signs of life
 
 Progress = Callable[[str, int, int], None]
 
@@ -63,7 +64,7 @@ class Trajectory:
     states: Samples
     """States, see `spirillum.kernels.two_links` (n, 17)."""
     observed: Samples
-    """Seven rates in body axes, torque of the drive, thinnest film, powers of friction, fluid and drive (n, 12)."""
+    """What `spirillum.kernels.two_links` observes (n, 13)."""
     events: tuple[Event, ...]
     """What happened, in the order of time."""
 
@@ -110,6 +111,11 @@ def integrate(
     state, pending, end = start, list(switches), float(time[-1])
     spent = False
     now = 0.0
+
+    def tell(moment: float) -> None:
+        if progress is not None:
+            progress("motion", int(1000 * moment / end), 1000)
+
     while now < end:
         if len(pending) > 1 and pending[1].time <= now:
             pending.pop(0)
@@ -118,7 +124,7 @@ def integrate(
         stop = min(pending[1].time, end) if len(pending) > 1 else end
         here = links.at_duty(duty)
         inside = time[(time > now) & (time <= stop)]
-        stretch = _stretch(here, state, now, stop, inside, _limits(here, reach, spent=spent))
+        stretch = _stretch(here, state, now, stop, inside, _limits(here, reach, spent=spent), tell)
         events += stretch.events
         kept = inside[: len(stretch.states)]
         times.append(kept)
@@ -126,8 +132,7 @@ def integrate(
         duties.append(np.full(kept.size, duty))
         blocks.append(_observed(here, kept, stretch.states))
         now, state = stretch.end, stretch.last
-        if progress is not None:
-            progress("motion", int(1000 * now / end), 1000)
+        tell(now)
         if stretch.ended:
             events.append(Event(now, stretch.ended))
         if stretch.ended == _SPENT:
@@ -185,18 +190,42 @@ def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
     return found
 
 
-def _film(links: TwoLinks) -> _Watch:
-    """Where the robot comes as near to the wall as its roughness, or leaves it."""
-    wall, spots = links.wall, links.spots
-    return _Watch(_FILM, lambda y: kernel.thinnest_film(y, wall, spots) - wall[1], last=False)
+class _Film(_Watch):
+    """Where the robot comes as near to the wall as its roughness, or leaves it.
+
+    Without a wall it never happens, but the integrator comes by at every step: a sign of life for who waits, and a
+    chance for Python to see that somebody interrupts.
+    """
+
+    def __init__(self, links: TwoLinks, tell: Callable[[float], None]) -> None:
+        super().__init__(_FILM, self._film if links.spots.size else self._far, last=False)
+        self._wall, self._spots, self._tell, self._calls = links.wall, links.spots, tell, 0
+
+    def _film(self, y: Samples) -> float:
+        return float(kernel.thinnest_film(y, self._wall, self._spots) - self._wall[1])
+
+    def _far(self, _y: Samples) -> float:
+        return 1.0
+
+    def __call__(self, time: float, y: Samples, data: Samples) -> float:
+        self._calls += 1
+        if self._calls % _BREATH == 0:
+            self._tell(time)
+        return super().__call__(time, y, data)
 
 
 def _stretch(
-    links: TwoLinks, state: Samples, start: float, stop: float, samples: Samples, limits: Sequence[_Watch]
+    links: TwoLinks,
+    state: Samples,
+    start: float,
+    stop: float,
+    samples: Samples,
+    limits: Sequence[_Watch],
+    tell: Callable[[float], None],
 ) -> _Stretch:
     """Integrate between two switchings; limits are watched only where they are passed, for watching costs time."""
     at = samples if samples.size and samples[-1] == stop else np.append(samples, stop)
-    watches = [_film(links)] if links.spots.size else []
+    watches: list[_Watch] = [_Film(links, tell)]
     solved = _solved(links, state, at, start, watches)
     y = _states(solved)
     passed = [limit for limit in limits if np.any(limit.value(y.T) < 0)]
@@ -212,7 +241,7 @@ def _stretch(
     end, what, last = min(
         ((t, watch.what, row) for t, watch, row in found if watch.terminal),
         key=lambda event: event[0],
-        default=(stop, "", y[-1]),
+        default=(stop, "", state if y.shape[0] == 0 else y[-1]),
     )
     events = [Event(t, watch.what) for t, watch, _ in found if not watch.terminal and t <= end]
     return _Stretch(y[: np.count_nonzero(samples <= end)], end, last, what, events)
@@ -231,29 +260,34 @@ def _solved(links: TwoLinks, state: Samples, at: Samples, start: float, watches:
         np.ascontiguousarray(state),
         method="Tsit5",
         t_eval=at,
-        events=tuple(watches) or None,
+        events=tuple(watches),
         args=(links.data,),
-        rtol=TOLERANCE,
+        rtol=_tolerances(links),
         atol=1e-3 * TOLERANCE * _scales(links),
-        max_num_steps=_MOST_STEPS,
+        max_num_steps=_STEPS_AT_LEAST + _STEPS_PER_SAMPLE * at.size,
         pass_dy_as_arg=True,
     )
     if not solved.success:
+        reached = float(solved.t[-1]) if solved.t.size else start
         raise InputError(
-            f"the motion cannot be integrated beyond t = {float(solved.t[-1]) if solved.t.size else start:.4g} s "
-            f"({solved.message}); allowed: a shorter run, or a slower drive"
+            f"the motion cannot be followed beyond t = {reached:.4g} s in {_STEPS_AT_LEAST} steps and "
+            f"{_STEPS_PER_SAMPLE} a sample: weight, field or motor move it far faster than the tail turns; allowed: "
+            "body.mass, magnetic.moment, magnetic.field, motor.inductance and fluid.viscosity nearer to each other"
         )
     return solved
 
 
+def _tolerances(links: TwoLinks) -> Samples:
+    """Relative tolerances of the state's components, (17,): finer for place and attitude where a film hangs on them."""
+    found = np.full(kernel.STATES, TOLERANCE)
+    if links.spots.size:
+        found[: kernel.PHASE] *= 1e-3
+    return found
+
+
 def _scales(links: TwoLinks) -> Samples:
     """Sizes of the state's components below which nothing matters, (17,)."""
-    drag, drive = links.drag, links.drive
-    length = float(np.sqrt(drag[4, 4] / drag[1, 1]))
-    field = float(np.linalg.norm(drive[3:6])) * drive[6]
-    stall = drive[9] * drive[18] / drive[12] if drive[12] > 0 else 0.0
-    weight = float(np.abs(links.weight[:2]).sum()) * length
-    torque = max(stall, field, abs(drive[3]) * (float(drag[6, 6]) if drive[0] == 2.0 else 1.0), weight, 1e-300)
+    drive, length, torque = links.drive, links.length, links.torque
     current = drive[18] / drive[12] if drive[12] > 0 else 1.0
     electrical = max(drive[18] * current, torque)
     scales = np.ones(kernel.STATES)

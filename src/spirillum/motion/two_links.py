@@ -53,9 +53,9 @@ class TwoLinks:
     weight: Samples
     """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
     wall: Samples
-    """Radius of the channel, roughness, m; largest resistance of a film, N s/m (3,)."""
+    """Radius of the channel, roughness, m; largest resistance of a film, N s/m; load, N (4,)."""
     spots: Samples
-    """Rings that may near the wall (n, 7), see `spirillum.motion.films`."""
+    """Rings that may near the wall (n, 6), see `spirillum.motion.films`."""
     drive: Samples
     """Drive and motor (20,)."""
 
@@ -63,6 +63,16 @@ class TwoLinks:
     def data(self) -> Samples:
         """All of them in one array, for `kernels.two_links.rates`."""
         return packed(self.drag, self.friction, self.weight, self.wall, self.spots, self.drive)
+
+    @property
+    def length(self) -> float:
+        """A length of the robot's order, m."""
+        return _length(self.drag)
+
+    @property
+    def torque(self) -> float:
+        """A torque of the order of those that act, N m."""
+        return _torque(self.drag, self.weight, self.drive)
 
     def at_duty(self, duty: float) -> TwoLinks:
         """The same while the remote asks for another duty; a field or a prescribed rate is on at any duty but 0."""
@@ -96,15 +106,29 @@ def two_links(
     """
     resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
-    films = films_of(robot, roughness, float(drag[1, 1]))
+    heavy, drive = _weight(robot) if weight else np.zeros(8), _drive(batch)
+    films = films_of(robot, roughness, float(drag[1, 1]), _torque(drag, heavy, drive) / _length(drag))
     return TwoLinks(
         drag=drag,
         friction=_friction(batch, friction, effective),
-        weight=_weight(robot) if weight else np.zeros(8),
+        weight=heavy,
         wall=films.wall,
         spots=films.spots,
-        drive=_drive(batch),
+        drive=drive,
     )
+
+
+def _length(drag: Samples) -> float:
+    return float(np.sqrt(drag[4, 4] / drag[1, 1]))
+
+
+def _torque(drag: Samples, weight: Samples, drive: Samples) -> float:
+    """Largest of the motor's stall torque, m B, a prescribed torque or that of a prescribed rate, and weight's."""
+    stall = drive[9] * drive[18] / drive[12] if drive[12] > 0 else 0.0
+    field = float(np.linalg.norm(drive[3:6])) * drive[6]
+    given = abs(drive[3]) * (float(drag[6, 6]) if drive[0] == _KINDS["rate"] else 1.0)
+    heavy = float(np.abs(weight[:2]).sum()) * _length(drag)
+    return float(max(stall, field, given if drive[0] in (1.0, 2.0) else 0.0, heavy, 1e-300))
 
 
 def _friction(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:

@@ -17,7 +17,7 @@ from spirillum.files import output_target, whole_file
 from spirillum.render.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.render.encode import FILMS, film_writer
 from spirillum.render.poses import Pose, Poses, poses_of
-from spirillum.render.run_file import robot_of
+from spirillum.render.run_file import open_run, robot_of
 from spirillum.render.show import checked_size, glass_around, shown_points
 from spirillum.robot.robot import Robot
 
@@ -78,7 +78,7 @@ class Film:
 
 
 def film(
-    dataset: xr.Dataset,
+    dataset: xr.Dataset | str | Path,
     path: str | Path,
     *,
     view: str = "perspective",
@@ -91,7 +91,7 @@ def film(
     """Film a run.
 
     Args:
-        dataset: what `spirillum.simulate` returns.
+        dataset: what `spirillum.simulate` returns, or the file with it.
         path: file to write, `.mp4` or `.gif`.
         view: `perspective`, or to scale `side`, `top`, `front`, `rear`.
         size: width and height in pixels, even numbers, or ``"1280x720"``.
@@ -112,6 +112,8 @@ def film(
     _check_pace(fps, 1.0 if speed is None else speed, target.suffix)
     if camera not in CAMERAS:
         raise InputError(f"camera = {str(camera)[:40]!r}; allowed: {', '.join(CAMERAS)}")
+    if isinstance(dataset, (str, Path)):
+        dataset = open_run(dataset)
     robot = robot_of(dataset)
     from spirillum.render.scene import DrawnRobot, level_height
 

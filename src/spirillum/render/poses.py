@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Pose", "Poses", "poses_of", "rolled", "rotation_matrix"]
 
+_LARGEST = 1e9
+"""Largest number of a run that a film takes: m, s or rad."""
+
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -154,6 +157,8 @@ def _numbers(dataset: xr.Dataset, name: str, more: tuple[str, ...], shape: tuple
     if not np.all(np.isfinite(values)):
         bad = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
         raise InputError(f"the run's variable {name!r} is not finite at sample {bad}; allowed: finite numbers")
+    if np.abs(values).max(initial=0.0) > _LARGEST:
+        raise InputError(f"the run's variable {name!r} holds {np.abs(values).max():.3g}; allowed: at most {_LARGEST:g}")
     return values
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -48,7 +49,9 @@ def open_run(path: str | Path) -> xr.Dataset:
     import xarray as xr
 
     try:
-        return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a foreign file; what matters of it is checked
+            return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
     except Exception as error:  # a damaged file raises whatever the library meets first
         raise InputError(f"{path} cannot be read ({_first_line(error)}); allowed: {_WHAT}") from error
 
