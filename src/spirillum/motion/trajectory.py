@@ -198,20 +198,15 @@ class _Film(_Watch):
     """
 
     def __init__(self, links: TwoLinks, tell: Callable[[float], None]) -> None:
-        super().__init__(_FILM, self._film if links.spots.size else self._far, last=False)
-        self._wall, self._spots, self._tell, self._calls = links.wall, links.spots, tell, 0
+        super().__init__(_FILM, float, last=False)
+        self._wall, self._spots, self._rough = links.wall, links.spots, float(links.wall[1])
+        self._tell, self._calls, self._walled = tell, 0, links.spots.size > 0
 
-    def _film(self, y: Samples) -> float:
-        return float(kernel.thinnest_film(y, self._wall, self._spots) - self._wall[1])
-
-    def _far(self, _y: Samples) -> float:
-        return 1.0
-
-    def __call__(self, time: float, y: Samples, data: Samples) -> float:
+    def __call__(self, time: float, y: Samples, _data: Samples) -> float:
         self._calls += 1
         if self._calls % _BREATH == 0:
             self._tell(time)
-        return super().__call__(time, y, data)
+        return kernel.thinnest_film(y, self._wall, self._spots) - self._rough if self._walled else 1.0
 
 
 def _stretch(
