@@ -28,12 +28,16 @@ __all__ = [
     "ELECTRICAL",
     "FRICTION",
     "JOINT",
+    "MAGNETIC",
+    "MOTOR",
     "OBSERVED",
     "PHASE",
     "POSITION",
+    "RATE",
     "RESISTIVE",
     "ROLL",
     "STATES",
+    "TORQUE",
     "film_of",
     "observe",
     "packed",
@@ -56,7 +60,7 @@ roughness."""
 _WORK = 161
 
 # Kinds of drive, drive[0].
-_MOTOR, _TORQUE, _RATE, _MAGNETIC = 0.0, 1.0, 2.0, 3.0
+MOTOR, TORQUE, RATE, MAGNETIC = 0.0, 1.0, 2.0, 3.0
 
 
 def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spots: Samples, drive: Samples) -> Samples:
@@ -245,11 +249,11 @@ def _torque(y: Samples, drive: Samples, spin: float, spin_per_torque: float) -> 
     `spin` is the tail's rate about the motor axis without that torque, and what the torque adds to it.
     """
     kind, on = drive[0], drive[2]
-    if kind == _MOTOR:
+    if kind == MOTOR:
         return float(drive[8] * drive[9] * y[9])
-    if kind == _TORQUE:
+    if kind == TORQUE:
         return float(on * drive[3])
-    if kind == _RATE and on > 0.0:
+    if kind == RATE and on > 0.0:
         return float((drive[3] - spin) / spin_per_torque)
     return 0.0
 
@@ -294,7 +298,7 @@ def _motion(
     out[8], out[12] = _films(y, rotation, wall, spots, fluid, force, work[126:132])
     _assembled(fluid, friction, fixed, a)
     field[:] = 0.0
-    if drive[0] == _MAGNETIC and drive[2] > 0.0:
+    if drive[0] == MAGNETIC and drive[2] > 0.0:
         _field(time, rotation, drive, field)
     if fixed:
         force[JOINT] = 0.0
@@ -334,7 +338,7 @@ def rates(dy: Samples, time: float, y: Samples, data: Samples) -> None:
     dy[6] = 0.5 * (w * out[5] + i * out[4] - j * out[3])
     dy[7], dy[8] = out[6], out[3]
     dy[14], dy[15], dy[16] = out[11], out[9], out[10]
-    if drive[0] != _MOTOR:
+    if drive[0] != MOTOR:
         dy[9] = dy[10] = dy[11] = dy[12] = dy[13] = 0.0
         return
     current, slip = y[9], drive[8] * out[6]

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -159,7 +160,7 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
     """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
     drive = links.drive.copy()
     drive[7] = rate
-    here = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
+    here = replace(links, drive=drive)
     start: Samples = np.zeros(kernel.STATES)
     start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = attitude
     whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up

@@ -12,6 +12,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels import two_links as kernel
 from spirillum.motion.motor import battery_voltage, winding_resistance
 from spirillum.motion.prediction import Prediction
+from spirillum.motion.sampling import late_averages
 from spirillum.motion.trajectory import INTEGRATOR, Reach, Trajectory
 from spirillum.motion.two_links import TwoLinks
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
 __all__ = ["dataset_of"]
 
-_MAGNETIC = 3.0  # kind of drive, see the kernel
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
@@ -170,7 +170,7 @@ def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, _S
 def _field_torque(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
     moment, angle = rotation @ links.drive[3:6], links.drive[7] * run.time
-    if links.drive[0] != _MAGNETIC:
+    if links.drive[0] != kernel.MAGNETIC:
         return np.zeros_like(angle)
     field = links.drive[6] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
@@ -235,25 +235,13 @@ def _potential(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
 
 
 def _averages(dataset: xr.Dataset) -> dict[str, Any]:
-    """Averages over the last two thirds of the run: the final two of the paper's three periods."""
-    time = dataset["time"].values
-    first = time[-1] / 3.0
-    span = time[-1] - first
-
-    def mean_slope(values: Samples) -> float:
-        return float((values[-1] - np.interp(first, time, values)) / span) if span > 0 else np.nan
-
-    along = dataset["position"].values[:, 0]
-    averages = {
-        "mean_forward_velocity": (mean_slope(along), "m/s"),
-        "mean_tail_rotation_rate": (mean_slope(dataset["tail_angle"].values), "rad/s"),
-        "mean_body_rotation_rate": (mean_slope(dataset["body_angle"].values), "rad/s"),
-        "mean_drive_power": (mean_slope(dataset["drive_energy"].values), "W"),
+    """Averages over the last two thirds of the run."""
+    integrals = {
+        "mean_forward_velocity": (dataset["position"].values[:, 0], "m/s"),
+        "mean_tail_rotation_rate": (dataset["tail_angle"].values, "rad/s"),
+        "mean_body_rotation_rate": (dataset["body_angle"].values, "rad/s"),
+        "mean_drive_power": (dataset["drive_energy"].values, "W"),
     }
     if "electrical_energy" in dataset:
-        averages["mean_electrical_power"] = (mean_slope(dataset["electrical_energy"].values), "W")
-    note = "average over the last two thirds of the run"
-    return {
-        name: ((), value, {"units": unit, "long_name": f"{name.replace('_', ' ')}, {note}", "source": "Section III"})
-        for name, (value, unit) in averages.items()
-    }
+        integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
+    return late_averages(dataset["time"].values, integrals)

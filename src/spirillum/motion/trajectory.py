@@ -185,7 +185,7 @@ def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
             return np.asarray(reach.channel - np.maximum(place + reach.nose * along, -place - reach.tip * along))
 
         found.append(_Watch(_END, room, last=True))
-    if np.isfinite(reach.charge) and links.drive[0] == 0.0 and not spent:
+    if np.isfinite(reach.charge) and links.drive[0] == kernel.MOTOR and not spent:
         found.append(_Watch(_SPENT, lambda y: reach.charge - y[kernel.CHARGE], last=True))
     return found
 

@@ -22,7 +22,7 @@ from spirillum.motion.balance import friction_torques, rates_per_torque
 from spirillum.motion.motor import battery_voltage, winding_resistance
 from spirillum.motion.prediction import Prediction, predict
 from spirillum.motion.remote import schedule, windows_of
-from spirillum.motion.sampling import duration_of, sample_times
+from spirillum.motion.sampling import duration_of, late_averages, sample_times
 from spirillum.motion.swimming import calibrated_balance
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
@@ -315,30 +315,16 @@ def _dataset(
 
 
 def _averages(dataset: xr.Dataset, prediction: Prediction) -> dict[str, Any]:
-    """Averages over the last two thirds of the run: the final two of the paper's three periods."""
-    time = dataset["time"].values
-    first = time[-1] / 3.0
-    span = time[-1] - first
-
-    def mean_slope(name: str) -> float:
-        values = dataset[name].values
-        return float((values[-1] - np.interp(first, time, values)) / span)
-
-    averages = {
-        "mean_forward_velocity": (mean_slope("position"), "m/s"),
-        "mean_tail_rotation_rate": (mean_slope("tail_angle"), "rad/s"),
-        "mean_body_rotation_rate": (mean_slope("body_angle"), "rad/s"),
-        "mean_electrical_power": (mean_slope("electrical_energy"), "W"),
+    """Averages over the last two thirds of the run, and its efficiency."""
+    integrals = {
+        "mean_forward_velocity": ("position", "m/s"),
+        "mean_tail_rotation_rate": ("tail_angle", "rad/s"),
+        "mean_body_rotation_rate": ("body_angle", "rad/s"),
+        "mean_electrical_power": ("electrical_energy", "W"),
     }
-    note = "average over the last two thirds of the run"
-    found = {
-        name: (
-            (),
-            value,
-            {"units": unit, "long_name": f"{name.replace('_', ' ')}, {note}", "source": "Section III of BioRob 2012"},
-        )
-        for name, (value, unit) in averages.items()
-    }
+    found = late_averages(
+        dataset["time"].values, {name: (dataset[of].values, unit) for name, (of, unit) in integrals.items()}
+    )
     found["hydrodynamic_efficiency"] = (
         (),
         prediction.hydrodynamic_efficiency,

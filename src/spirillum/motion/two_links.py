@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.hydrodynamics import SwimmerModel
-from spirillum.kernels.two_links import packed
+from spirillum.kernels.two_links import MAGNETIC, MOTOR, RATE, TORQUE, packed
 from spirillum.motion.balance import friction_torques
 from spirillum.motion.films import films_of
 from spirillum.motion.freedom import LINKS
@@ -24,7 +24,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 
 __all__ = ["TwoLinks", "two_links"]
 
-_KINDS = {"dc-motor": 0.0, "torque": 1.0, "rate": 2.0, "magnetic": 3.0}
+_KINDS = {"dc-motor": MOTOR, "torque": TORQUE, "rate": RATE, "magnetic": MAGNETIC}
 _MOTOR = (
     "polarity",
     "torque_constant",
@@ -126,9 +126,9 @@ def _torque(drag: Samples, weight: Samples, drive: Samples) -> float:
     """Largest of the motor's stall torque, m B, a prescribed torque or that of a prescribed rate, and weight's."""
     stall = drive[9] * drive[18] / drive[12] if drive[12] > 0 else 0.0
     field = float(np.linalg.norm(drive[3:6])) * drive[6]
-    given = abs(drive[3]) * (float(drag[6, 6]) if drive[0] == _KINDS["rate"] else 1.0)
+    given = abs(drive[3]) * (float(drag[6, 6]) if drive[0] == RATE else 1.0)
     heavy = float(np.abs(weight[:2]).sum()) * _length(drag)
-    return float(max(stall, field, given if drive[0] in (1.0, 2.0) else 0.0, heavy, 1e-300))
+    return float(max(stall, field, given if drive[0] in (TORQUE, RATE) else 0.0, heavy, 1e-300))
 
 
 def _friction(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:
