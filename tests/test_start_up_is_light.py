@@ -5,7 +5,20 @@ import sys
 
 import pytest
 
-HEAVY = ("scipy", "xarray", "matplotlib", "pint", "h5py", "jinja2", "pandas", "numba", "llvmlite")
+HEAVY = (
+    "scipy",
+    "xarray",
+    "matplotlib",
+    "pint",
+    "h5py",
+    "jinja2",
+    "pandas",
+    "numba",
+    "llvmlite",
+    "emcee",
+    "arviz_base",
+    "arviz_stats",
+)
 
 
 def loaded_after(code: str) -> set[str]:

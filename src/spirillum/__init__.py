@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from spirillum.calibration.fit import Calibrated, calibrate
     from spirillum.citations import citation
     from spirillum.errors import InputError
     from spirillum.hydrodynamics.resistance import Resistance, resistance
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Calibrated",
     "Flow",
     "InputError",
     "ModelComparison",
@@ -33,6 +35,7 @@ __all__ = [
     "RobotBatch",
     "Settling",
     "Swimming",
+    "calibrate",
     "citation",
     "compare_models",
     "flow",
@@ -46,6 +49,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "Calibrated": "spirillum.calibration.fit",
     "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
     "ModelComparison": "spirillum.motion.comparison",
@@ -55,6 +59,7 @@ _HOME = {
     "RobotBatch": "spirillum.robot",
     "Settling": "spirillum.motion.settling",
     "Swimming": "spirillum.motion.swimming",
+    "calibrate": "spirillum.calibration.fit",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
     "flow": "spirillum.motion.flow",

@@ -7,8 +7,10 @@ from typing import Annotated
 
 import typer
 
+from spirillum.cli.calibrate_commands import calibrate
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
+from spirillum.cli.observation_commands import observations_app
 from spirillum.cli.options import (
     Accuracy,
     Calibration,
@@ -48,7 +50,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(robot_app, name="robot")
+app.add_typer(observations_app, name="observations")
 app.command()(settle)
+app.command()(calibrate)
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library

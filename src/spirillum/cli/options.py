@@ -33,6 +33,7 @@ __all__ = [
     "complete_planes",
     "complete_presets",
     "complete_resistance_models",
+    "complete_robots",
     "complete_schemas",
 ]
 
@@ -47,7 +48,8 @@ def complete_presets(incomplete: str) -> list[str]:
     return _starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
 
 
-def _complete_robots(incomplete: str) -> list[str]:
+def complete_robots(incomplete: str) -> list[str]:
+    """Presets and robot files."""
     folder = Path(incomplete).parent
     files = sorted(str(path) for path in folder.glob("*.toml")) if folder.is_dir() else []
     return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
@@ -95,7 +97,7 @@ def _complete_friction(incomplete: str) -> list[str]:
     return _starting(("body", "none", "paper", "rotor"), incomplete)
 
 
-RobotArgument = Annotated[str, typer.Argument(autocompletion=_complete_robots, help="A preset's name or a TOML file.")]
+RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
 Model = Annotated[
     str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft, slender or tube.")
 ]
