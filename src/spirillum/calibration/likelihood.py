@@ -29,6 +29,8 @@ ERROR_SCALE = 0.1
 """Scale of the half-normal prior of a trial's relative error."""
 _ROUNDING = 1e-4
 """Relative error below which no mean is taken for known: observations are written with a few digits."""
+_NOTHING = -1e30
+"""Log density where there is none: finite, for the sampler takes differences."""
 _LARGEST = 8.0
 """Coordinates beyond this many standard deviations of the prior have no density."""
 
@@ -82,7 +84,7 @@ class Density:
         kept = np.where(inside[:, None], z, 0.0)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             found = self.by_robot(kept).sum(axis=1) - 0.5 * np.sum(kept**2, axis=1)
-        return np.where(inside & np.isfinite(found), found, -np.inf)
+        return np.where(inside & np.isfinite(found), found, _NOTHING)
 
     def by_robot(self, z: Samples) -> Samples:
         """Log likelihood of each robot's observations, (draws, robots)."""

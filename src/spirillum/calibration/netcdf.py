@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import json
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.answer import versions
+from spirillum.arrays import Samples
 from spirillum.files import whole_file
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from spirillum.calibration.experiment import Quantity
     from spirillum.calibration.fit import Calibrated
+    from spirillum.calibration.posterior import Posterior
 
 __all__ = ["SCHEMA", "posterior_tree", "write_posterior"]
 
 SCHEMA = "spirillum.posterior/1"
-_UNITS = {"discrepancy": "1", "error": "1"}
 
 
 def posterior_tree(found: Calibrated) -> xr.DataTree:
@@ -28,26 +32,16 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
     Args:
         found: a calibration by method `posterior`.
     """
-    from arviz_base import from_dict
-
     posterior = found.posterior
     assert posterior is not None  # noqa: S101 - the caller has asked
     density, problem, experiment = posterior.density, found.problem, found.experiment
-    chains, draws, _ = posterior.z.shape
     values = posterior.values()
     units = {item.label: item.parameter.unit or "1" for item in problem.coordinates}
     logs = np.concatenate([density.by_robot(block) for block in np.array_split(posterior.flat, 64)])
     observed = {name: problem.ratio(name).mean for name in problem.quantities}
-    tree = from_dict(
-        {
-            "posterior": values,
-            "log_likelihood": {"robot": logs.reshape(chains, draws, experiment.size)},
-            "sample_stats": {"lp": density(posterior.flat).reshape(chains, draws)},
-            "observed_data": observed,
-        },
-        dims={"robot": ["tail"], **{name: ["tail"] for name in observed}},
-        coords={"tail": np.array(experiment.labels(), dtype=str)},
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # many walkers with few draws each are meant
+        tree = _tree(posterior, logs, observed, experiment.labels())
     for name in values:
         tree["posterior"][name].attrs = {"units": units.get(name, "1"), "long_name": name.replace("_", " ")}
     tree.attrs = {
@@ -71,6 +65,23 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
         "versions": versions(),
         "warnings": "\n".join(found.warnings),
     }
+    return tree
+
+
+def _tree(posterior: Posterior, logs: Samples, observed: Mapping[Quantity, Samples], tails: list[str]) -> xr.DataTree:
+    from arviz_base import from_dict
+
+    chains, draws, _ = posterior.z.shape
+    tree: xr.DataTree = from_dict(
+        {
+            "posterior": posterior.values(),
+            "log_likelihood": {"robot": logs.reshape(chains, draws, len(tails))},
+            "sample_stats": {"lp": posterior.density(posterior.flat).reshape(chains, draws)},
+            "observed_data": dict(observed),
+        },
+        dims={"robot": ["tail"], **{str(name): ["tail"] for name in observed}},
+        coords={"tail": np.array(tails, dtype=str)},
+    )
     return tree
 
 

@@ -133,7 +133,7 @@ def _starts(density: Density, fit: LeastSquares, walkers: int, rng: np.random.Ge
             size = value if np.isfinite(value) and value > 0 else 0.02
             share = _half_normal_share(max(size, 0.003) / scale)
             centre[count + offset + n] = float(np.clip(ndtri(share), -3.0, 3.0))
-    found: Samples = centre + width * rng.normal(size=(walkers, density.size))
+    found: Samples = np.clip(centre + width * rng.normal(size=(walkers, density.size)), -6.0, 6.0)
     return found
 
 
