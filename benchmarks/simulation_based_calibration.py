@@ -3,8 +3,8 @@
     python benchmarks/simulation_based_calibration.py [--experiments 300] [--model sbt]
 
 Truths from the prior, synthetic observations (16 tails x 2 channels x 5 trials) from the model, ranks of the truths in
-the posterior. Prints, as JSON, for each number the p-value of uniform ranks (Kolmogorov and Smirnov) and how often the 95 %
-interval holds the truth; the limits are p > 0.01 for all of them together (Bonferroni) and 90 to 99 %.
+the posterior. Prints, as JSON, for each number the p-value of uniform ranks (Kolmogorov and Smirnov) and how often its
+95 % interval holds the truth; the limits are p > 0.01 for all of them together (Bonferroni) and 90 to 99 %.
 """
 
 from __future__ import annotations

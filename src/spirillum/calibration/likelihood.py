@@ -25,8 +25,8 @@ __all__ = ["DISCREPANCY_SCALE", "ERROR_SCALE", "Density", "half_normal"]
 
 DISCREPANCY_SCALE = 0.3
 """Scale of the half-normal prior of a discrepancy: models of this kind miss by up to some tens of per cent."""
-ERROR_SCALE = 0.1
-"""Scale of the half-normal prior of a trial's relative error."""
+ERROR_SCALE = 0.05
+"""Scale of the half-normal prior of a trial's relative error: more than a tenth would be a poor measurement."""
 _ROUNDING = 1e-4
 """Relative error below which no mean is taken for known: observations are written with a few digits."""
 _NOTHING = -1e30

@@ -25,7 +25,8 @@ __all__ = ["PAPER_TAILS", "Ranks", "simulated_ranks", "synthetic_experiment"]
 
 PAPER_TAILS = tuple((w, a) for w in (10.0, 15.0, 20.0, 25.0) for a in (1.5, 2.0, 2.5, 3.5))
 """Wavelength and amplitude, mm, of the paper's sixteen tails (the grid is assumed, see `docs/study`)."""
-_SAMPLING = Sampling(ensembles=1, walkers=24, warm_up=300, steps=240, kept=24, doublings=0)
+_SAMPLING = Sampling(ensembles=1, walkers=64, warm_up=260, steps=120, kept=30, doublings=0)
+"""Many walkers and few steps: walkers are nearly independent, and a step costs little more with more of them."""
 
 
 @dataclass(frozen=True)

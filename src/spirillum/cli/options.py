@@ -22,6 +22,7 @@ __all__ = [
     "Phases",
     "Picture",
     "Pitch",
+    "Posterior",
     "RobotArgument",
     "Settings",
     "TailDrop",
@@ -118,6 +119,10 @@ Friction = Annotated[
 NoCalibration = Annotated[bool, typer.Option("--no-calibration", help="Leave the calibration factors out.")]
 Calibration = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Calibration file whose factors replace the robot's.")
+]
+Posterior = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Posterior of a calibration: its middle replaces the robot's values; intervals."),
 ]
 Settings = Annotated[
     list[str] | None,

@@ -14,6 +14,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.band import Band, band_of
+from spirillum.motion.intervals import Intervals, intervals_of, read_posterior
 from spirillum.motion.swimming import (
     Swimming,
     calibrated_balance,
@@ -58,6 +59,8 @@ class Prediction:
     """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
+    intervals: Intervals | None = field(default=None, repr=False)
+    """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
     """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
 
@@ -81,8 +84,9 @@ class Prediction:
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum predict --json`."""
         band = self.band
+        over = band or self.intervals
         quantities = {
-            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(band.of(name) if band else {}))
+            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
             for name, (unit, _) in _QUANTITIES.items()
         }
         content = {
@@ -116,6 +120,7 @@ def predict(
     friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
     accuracy: str | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     tolerance: float | None = None,
@@ -138,6 +143,8 @@ def predict(
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
+        posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
+            95 % interval, the model's discrepancy included.
         accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
@@ -150,6 +157,12 @@ def predict(
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
     """
+    drawn = None
+    if posterior is not None:
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        drawn = read_posterior(posterior, model)
+        robot = drawn.central(load(robot))
     ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
     reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate, batch.placement)
@@ -177,7 +190,12 @@ def predict(
     error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
-    return Prediction(ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), over)
+    known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
+    if drawn is not None and drawn.synthetic:
+        warnings.append(
+            f"{drawn.observations} says that its numbers are synthetic: the intervals rest on nothing measured"
+        )
+    return Prediction(ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over)
 
 
 def prepared(
