@@ -251,6 +251,8 @@ def study(
             show_default=False,
         ),
     ] = None,
+    calibration: Calibration = None,
+    posterior: Posterior = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -270,6 +272,8 @@ def study(
             overrides=overrides_from(settings),
             models=model,
             band=band,
+            calibration=calibration,
+            posterior=posterior,
             progress=progress,
         )
     text.show(text.study_answer(dataset, output), text.study, json=json)

@@ -76,15 +76,20 @@ class PosteriorFile:
             for name in self.draws
             if names.get(name, name) in FittedValues.model_fields
         }
-        tails: list[dict[str, Any]] = [
-            {**{key: item[key] for key in _TAIL}, "effective": max(item["value"], 0.0)} for item in self.friction
-        ]
         file = CalibrationFile.model_construct(
             calibration={self.model: tuple(entries)} if entries else {},
             fitted=FittedValues.model_construct(**values),
-            friction=tuple(FittedFriction.model_construct(**tail) for tail in tails),
+            friction=self.frictions,
         )
         return calibrated_robot(robot, file)
+
+    @property
+    def frictions(self) -> tuple[FittedFriction, ...]:
+        """The middle of B_eff, tail by tail."""
+        tails: list[dict[str, Any]] = [
+            {**{key: item[key] for key in _TAIL}, "effective": max(item["value"], 0.0)} for item in self.friction
+        ]
+        return tuple(FittedFriction.model_construct(**tail) for tail in tails)
 
     def _column(self, name: str, channel: int) -> Samples:
         columns = self.draws[name]
@@ -119,12 +124,12 @@ class Intervals:
         return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
 
 
-def read_posterior(path: str | Path, model: str) -> PosteriorFile:
+def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     """Read a posterior that a calibration has written.
 
     Args:
         path: the file.
-        model: model that is to answer.
+        models: models that are asked, of which it has to be one.
 
     Raises:
         InputError: if it is no such file, is damaged, has not converged, or is of another model.
@@ -151,8 +156,9 @@ def read_posterior(path: str | Path, model: str) -> PosteriorFile:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
         )
-    if found.model != model:
-        raise InputError(f"{path} is of model '{found.model}', not '{model}'; allowed: --model {found.model}")
+    if found.model not in models:
+        asked = ", ".join(f"'{name}'" for name in models)
+        raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")
     return found
 
 
