@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from spirillum.calibration.fit import Calibrated, calibrate
+    from spirillum.calibration.ranking import Ranking, rank_models
+    from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
     from spirillum.errors import InputError
     from spirillum.hydrodynamics.resistance import Resistance, resistance
@@ -30,10 +32,12 @@ __all__ = [
     "InputError",
     "ModelComparison",
     "Prediction",
+    "Ranking",
     "Resistance",
     "Robot",
     "RobotBatch",
     "Settling",
+    "Suggestion",
     "Swimming",
     "calibrate",
     "citation",
@@ -41,10 +45,12 @@ __all__ = [
     "flow",
     "load",
     "predict",
+    "rank_models",
     "resistance",
     "settle",
     "simulate",
     "study",
+    "suggest",
     "swim",
 ]
 
@@ -54,10 +60,12 @@ _HOME = {
     "InputError": "spirillum.errors",
     "ModelComparison": "spirillum.motion.comparison",
     "Prediction": "spirillum.motion.prediction",
+    "Ranking": "spirillum.calibration.ranking",
     "Resistance": "spirillum.hydrodynamics.resistance",
     "Robot": "spirillum.robot",
     "RobotBatch": "spirillum.robot",
     "Settling": "spirillum.motion.settling",
+    "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.motion.swimming",
     "calibrate": "spirillum.calibration.fit",
     "citation": "spirillum.citations",
@@ -65,10 +73,12 @@ _HOME = {
     "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
     "predict": "spirillum.motion.prediction",
+    "rank_models": "spirillum.calibration.ranking",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
     "simulate": "spirillum.motion.transient",
     "study": "spirillum.studies",
+    "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.motion.swimming",
 }
 

@@ -34,9 +34,9 @@ class Sampling:
     ensembles: int = ENSEMBLES
     walkers: int = 0
     """Walkers of each ensemble; 0: four times the number of coordinates, at least 24."""
-    warm_up: int = 600
+    warm_up: int = 400
     """Steps that are thrown away."""
-    steps: int = 1500
+    steps: int = 800
     """Steps that are kept, at first."""
     kept: int = 250
     """Draws of each walker that stay in the answer."""

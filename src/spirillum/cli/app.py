@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.calibrate_commands import calibrate
+from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
 from spirillum.cli.observation_commands import observations_app
@@ -54,6 +54,8 @@ app.add_typer(robot_app, name="robot")
 app.add_typer(observations_app, name="observations")
 app.command()(settle)
 app.command()(calibrate)
+app.command("rank-models")(rank_models)
+app.command()(suggest)
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library

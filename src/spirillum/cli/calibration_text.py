@@ -13,7 +13,7 @@ from spirillum.cli.text import friendly_unit, grid, in_unit
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["calibration", "calibration_content"]
+__all__ = ["calibration", "calibration_content", "ranking", "suggestion"]
 
 Answer = Mapping[str, Any]
 
@@ -81,3 +81,40 @@ def _show_friction(answer: Answer, console: Console) -> None:
             highlight=False,
             soft_wrap=True,
         )
+
+
+def ranking(answer: Answer, console: Console) -> None:
+    """Table of `rank-models`."""
+    synthetic = " (synthetic)" if answer["synthetic"] else ""
+    title = f"{answer['observations']}{synthetic}: {len(answer['models'])} models, {answer['robots']} robots"
+    console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
+    table = grid("", "model", "log density", "difference", "misses speed by", "misses body rate by")
+    for item in answer["models"]:
+        difference = item["difference"]
+        apart = "-" if difference["value"] == 0 else f"{difference['value']:.1f} +- {difference['standard_error']:.1f}"
+        misses = [item["discrepancy"].get(name) for name in ("advance", "turning")]
+        shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
+        table.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
+    console.print(table)
+    console.print(f"{escape(answer['verdict'])}", highlight=False, soft_wrap=True)
+    for item in answer["models"]:
+        places = [
+            f"{row['tail']} ({row['quantity']}: observed {100 * (row['observed_over_predicted']['value'] - 1):+.0f} %)"
+            for row in item["fails_most_at"]
+        ]
+        console.print(escape(f"{item['model']} fails most at {'; '.join(places)}"), highlight=False, soft_wrap=True)
+
+
+def suggestion(answer: Answer, console: Console, rows: int = 10) -> None:
+    """Table of `suggest`."""
+    title = (
+        f"{answer['posterior']}, model {answer['model']}: what {answer['trials']} trials of one more tail would tell"
+    )
+    console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
+    table = grid("", "channel (mm)", "wavelength (mm)", "amplitude (mm)", "information (bit)", "narrows most")
+    for item in answer["candidates"][: max(rows, 1)]:
+        sizes = [f"{1e3 * item[name]['value']:g}" for name in ("channel_diameter", "wavelength", "amplitude")]
+        name, share = min(item["narrowing"].items(), key=lambda pair: pair[1]["value"])
+        told = f"{name} to {100 * share['value']:.0f} %"
+        table.add_row(*sizes, f"{item['expected_information']['value']:.3f}", escape(told))
+    console.print(table)

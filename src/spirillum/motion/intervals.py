@@ -25,7 +25,7 @@ from spirillum.robot.calibration_file import CalibrationFile, FittedFriction, Fi
 from spirillum.robot.options import Calibration, FittedTo
 from spirillum.robot.robot import Robot
 
-__all__ = ["LEVEL", "Intervals", "PosteriorFile", "intervals_of", "read_posterior"]
+__all__ = ["LEVEL", "Intervals", "PosteriorFile", "drawn_kinematics", "intervals_of", "read_posterior"]
 
 LEVEL = 0.95
 """Level of the intervals."""
@@ -55,6 +55,8 @@ class PosteriorFile:
     """Parameter to (draws, channels), or (draws, 1)."""
     discrepancy: Mapping[str, Samples]
     """Quantity to (draws,)."""
+    error: Mapping[str, Samples]
+    """Relative error of a trial, quantity to (draws,)."""
     friction: tuple[Mapping[str, float], ...]
     """B_eff tail by tail, with `low` and `high`."""
 
@@ -129,7 +131,7 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
 
     Args:
         path: the file.
-        models: models that are asked, of which it has to be one.
+        models: models that are asked, of which it has to be one; none: any.
 
     Raises:
         InputError: if it is no such file, is damaged, has not converged, or is of another model.
@@ -156,7 +158,7 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
         )
-    if found.model not in models:
+    if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)
         raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")
     return found
@@ -186,6 +188,7 @@ def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Sample
         body=(float(body["diameter"]), float(body["length"])),
         draws=draws,
         discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in quantities},
+        error={name: flat[f"error_{name}"][kept] for name in quantities},
         friction=tuple(json.loads(attributes["friction"])),
     )
 
@@ -222,6 +225,22 @@ def intervals_of(
         {name: float(limits[name][0]) if name in limits else nan for name in values},
         {name: float(limits[name][1]) if name in limits else nan for name in values},
     )
+
+
+def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
+    """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,).
+
+    Args:
+        robot: the robot, as `PosteriorFile.central` gives it.
+        model: the hydrodynamic model of the posterior.
+        posterior: its draws.
+    """
+    draws = posterior.of(robot, np.random.default_rng(1))
+    size = next(iter(draws.values())).size
+    batch = _drawn_batch(robot, posterior.model, draws, size)
+    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    swum = swim(batch, drawn, tail_rate=np.full(size, robot.hand), friction="none")
+    return {"advance": swum.advance_per_radian, "turning": swum.body_rotation_rate / swum.tail_rotation_rate}
 
 
 def _known(column: Samples) -> bool:
