@@ -60,7 +60,6 @@ def test_wrong_observations_name_row_and_column(
     ("settings", "words"),
     [
         ({"model": "cfd"}, "model = 'cfd'"),
-        ({"model": "tube"}, "model = 'tube' cannot be calibrated yet"),
         ({"method": "guess"}, "method = 'guess'"),
         ({"friction": "body"}, "friction = 'body'; allowed: rotor, paper"),
         ({"free": "drag"}, "free = 'drag'"),

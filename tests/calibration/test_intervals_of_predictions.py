@@ -92,14 +92,15 @@ def test_every_parameter_reaches_the_prediction(
 ) -> None:
     monkeypatch.setattr("spirillum.calibration.posterior.LARGEST_RHAT", 10.0)
     monkeypatch.setattr("spirillum.calibration.posterior.FEWEST_EFFECTIVE", 1.0)
-    few = Sampling(ensembles=2, walkers=28, warm_up=50, steps=50, doublings=0)
-    found = sp.calibrate(made(presets=(WIDE,), seed=4), WIDE, model=model, free=free, sampling=few)
+    few = Sampling(ensembles=2, walkers=28, warm_up=50, steps=51, kept=17, doublings=0)
+    small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}
+    found = sp.calibrate(made(**small, seed=4), WIDE, model=model, free=free, sampling=few)
     found.write(tmp_path, figures=False)
-    robot = found.experiment.robots[9]
+    robot = found.experiment.robots[3]
     answer = sp.predict(robot, model=model, posterior=tmp_path / "posterior.nc")
     assert answer.intervals is not None
     middle = np.median(found.posterior.flat, axis=0)[None, : len(found.problem.coordinates)]  # type: ignore[union-attr]
-    advance = found.problem.predicted(middle)["advance"][0, 9]
+    advance = found.problem.predicted(middle)["advance"][0, 3]
     assert answer.advance_per_radian == pytest.approx(advance, rel=5e-3)
     assert answer.intervals.low["advance_per_radian"] < advance < answer.intervals.high["advance_per_radian"]
     again = sp.predict(robot, model=model, calibration=tmp_path / "calibration.toml")

@@ -126,7 +126,7 @@ def test_ranks_of_the_truth_are_uniform_and_intervals_hold_it() -> None:
 
     from spirillum.calibration.simulation_based import simulated_ranks
 
-    found = simulated_ranks(experiments=20, tails=((10.0, 1.5), (15.0, 2.5), (20.0, 3.5), (25.0, 2.0)), seed=11)
+    found = simulated_ranks(experiments=16, tails=((10.0, 1.5), (15.0, 2.5), (20.0, 3.5), (25.0, 2.0)), seed=11)
     for name, ranks in found.ranks.items():
         assert kstest(ranks, "uniform").pvalue > 0.01 / len(found.ranks), name
     every = np.concatenate(list(found.inside.values()))

@@ -223,6 +223,8 @@ def _placement_tables(found: Calibrated) -> list[str]:
         if own:
             lines += ["", "[[placement]]", f'channel_diameter = "{_number(diameter)} m"', "", "[placement.placement]"]
             lines += [f'{parameter.name} = "{_number(value)} {parameter.unit}"' for parameter, value in own.items()]
+            if all(parameter.name != "pitch" for parameter in own):
+                lines.append('pitch = "0 rad"')  # it was fitted level
     return lines
 
 

@@ -7,7 +7,7 @@ polynomials through Chebyshev points, whose error is measured at points in betwe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -100,7 +100,7 @@ def _along(name: str, values: Samples) -> Samples:
 
 
 def tabulated(
-    batches: Sequence[RobotBatch],
+    batches: Iterable[RobotBatch],
     model: SwimmerModel,
     names: Sequence[str] = (),
     nodes: Sequence[Samples] = (),
@@ -117,9 +117,13 @@ def tabulated(
         coefficients: whether RFT's coefficients are free.
     """
     shape = tuple(axis.size for axis in nodes)
-    found = [_parts(batch, model, coefficients=coefficients) for batch in batches]
-    size = batches[0].size
-    drag, rotation = body_axial(batches[0])
+    found, first = [], None
+    for batch in batches:
+        first = first or batch
+        found.append(_parts(batch, model, coefficients=coefficients))
+    assert first is not None  # noqa: S101 - a table has a point
+    size = first.size
+    drag, rotation = body_axial(first)
     return Table(
         names=tuple(names),
         nodes=tuple(nodes),

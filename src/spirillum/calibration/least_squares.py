@@ -23,6 +23,8 @@ _STEP = 1e-4
 _BLIND = 1e-8
 _LARGEST = 12.0
 _BREATH = 1e-4
+_LEAST_ERROR = 1e-3
+"""Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ def standard_errors(
     for name, values in predicted.items():
         ratio = problem.ratio(name)
         trial = np.nan_to_num(error[name]) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
-        found[name] = np.sqrt(trial**2 + (discrepancy[name] * values) ** 2)
+        floor = max(_LEAST_ERROR, problem.interpolation_error) * ratio.scale
+        found[name] = np.sqrt(trial**2 + (discrepancy[name] * values) ** 2 + floor**2)
     return found
 
 

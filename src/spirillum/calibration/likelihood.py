@@ -99,7 +99,8 @@ class Density:
             s, t = sigma[name][:, None], tau[name][:, None]
             residual[name] = np.where(ratio.seen, ratio.mean - values, 0.0)
             noise[name] = s * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
-            variance[name] = noise[name] ** 2 + (t * values) ** 2 + (_ROUNDING * ratio.scale) ** 2
+            floor = max(_ROUNDING, self.problem.interpolation_error)
+            variance[name] = noise[name] ** 2 + (t * values) ** 2 + (floor * ratio.scale) ** 2
             trial = s**2 + _ROUNDING**2
             total += -0.5 * (ratio.freedom * np.log(trial) + ratio.squares / trial)
         for name in predicted:

@@ -195,11 +195,9 @@ def _forward(
         table = tabulated([batch], model, coefficients=coefficients)
         return Forward(table, batch.electrics, viscosity, factors), {}, 0.0
     if model.placed:
-        raise InputError(
-            f"model = '{model.name}' cannot be calibrated yet, for it takes seconds for each tail and place; "
-            "allowed: sbt, "
-            "rft, slender"
-        )
+        from spirillum.calibration.tube_table import tube_forward
+
+        return tube_forward(model, batch, names, tell)
     own = float(batch.wire_diameter[0])
     reach = np.exp(_WIRE_RANGE * _TOLERANCE_SPREAD)
     points, values = axis_points("wire_diameter", _WIRE_POINTS, own / reach, own * reach)

@@ -158,6 +158,11 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
         )
+    if "gap" in found.draws or "pitch" in found.draws:
+        raise InputError(
+            f"{path} is of a model that computes the walls, which cannot solve a thousand places; allowed: its "
+            "calibration.toml as --calibration, or a posterior of sbt, rft or slender"
+        )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)
         raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")

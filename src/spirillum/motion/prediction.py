@@ -25,6 +25,7 @@ from spirillum.motion.swimming import (
 )
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.calibration_file import calibrated_placement
 from spirillum.robot.limits import Limit, broken
 from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
@@ -215,6 +216,8 @@ def prepared(
     ready = load(robot)
     if calibration is not None:
         ready = with_calibration(ready, calibration)
+        if not placement and find_swimmer_model(model).placed:
+            placement = calibrated_placement(ready, calibration)
     if accuracy is not None:
         ready = with_accuracy(ready, accuracy, model)
     if tolerance is not None:

@@ -33,6 +33,7 @@ __all__ = [
     "FittedPlace",
     "FittedValues",
     "Provenance",
+    "calibrated_placement",
     "calibrated_robot",
     "read_calibration",
     "with_calibration",
@@ -187,6 +188,21 @@ def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     return changed.model_copy(update={"calibration": factors or robot.calibration, "friction": friction})
 
 
+def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
+    """Where a calibration file places a robot in its channel; None where it says nothing of that channel.
+
+    Raises:
+        InputError: as `read_calibration`.
+    """
+    diameter = robot.channel.diameter if robot.channel else float("inf")
+    own = [place.placement for place in read_calibration(path).placement if _alike(diameter, place.channel_diameter)]
+    return own[0] if own else None
+
+
+def _alike(value: float, fitted: float) -> bool:
+    return abs(value - fitted) <= _SAME * fitted
+
+
 def _distance(robot: Robot, entry: Calibration) -> float:
     """How far a robot is from the geometry that factors were fitted to; an open robot is far from every channel."""
     fitted = entry.fitted_to
@@ -207,7 +223,7 @@ def _is_of(robot: Robot, entry: FittedFriction) -> bool:
         (robot.tail.wavelength, entry.wavelength),
         (robot.tail.amplitude, entry.amplitude),
     )
-    return all(abs(value - fit) <= _SAME * fit for value, fit in pairs)
+    return all(_alike(value, fit) for value, fit in pairs)
 
 
 _FIELDS = {
