@@ -24,12 +24,14 @@ _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
 _MARK = "# Written by `spirillum calibrate`"
 
 
-def check_folder(folder: Path) -> Path:
-    """The folder for results, created, before any work is done.
+def check_folder(folder: Path) -> None:
+    """Refuse a folder for results before any work is done.
 
     Raises:
-        InputError: if it cannot be written to, or holds a calibration of unknown origin.
+        InputError: if it is a file, or holds a calibration of unknown origin.
     """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; allowed: a folder for the results (-o DIR)")
     target = folder / "calibration.toml"
     if target.is_file():
         try:
@@ -38,7 +40,6 @@ def check_folder(folder: Path) -> Path:
             ours = False
         if not ours:
             raise InputError(f"{folder} holds calibration.toml of unknown origin; allowed: a new folder (-o DIR)")
-    return output_folder(folder)
 
 
 def write_calibration(
@@ -50,6 +51,7 @@ def write_calibration(
         InputError: if the folder cannot be written to.
     """
     check_folder(folder)
+    output_folder(folder)
     written = [folder / "predictions.csv"]
     write_text(written[0], predictions_text(found))
     if found.posterior is not None:

@@ -153,7 +153,7 @@ class Forward:
     table: Table
     electrics: Electrics | None
     """Motor and battery of the robots."""
-    viscosity: float
+    viscosity: Samples
     """The robots' own, to which the table belongs, Pa s."""
     factors: Mapping[str, Samples] = field(default_factory=dict)
     """The robots' own factors, where they are not free; 1 where they have none."""

@@ -104,5 +104,11 @@ def write_posterior(found: Calibrated, path: Path) -> Path:
     """Write the posterior as NetCDF-4, whole or not at all."""
     tree = posterior_tree(found)
     with whole_file(path) as temporary:
-        tree.to_netcdf(temporary, engine="h5netcdf")
+        squeezed = {"zlib": True, "complevel": 4}
+        encoding = {
+            f"/{name}": {str(item): squeezed for item in group.data_vars}
+            for name, group in tree.children.items()
+            if name in ("posterior", "log_likelihood")
+        }
+        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
     return path

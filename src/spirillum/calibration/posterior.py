@@ -38,7 +38,7 @@ class Sampling:
     """Steps that are thrown away."""
     steps: int = 800
     """Steps that are kept, at first."""
-    kept: int = 250
+    kept: int = 100
     """Draws of each walker that stay in the answer."""
     seed: int = 1
     doublings: int = _DOUBLINGS

@@ -185,7 +185,7 @@ def _forward(
     """Resistances, over a table where the geometry is free; the table's ranges, and its error."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
     names = [item.name for item in parameters if item.tabulated]
-    viscosity = float(batch.viscosity[0])
+    viscosity = batch.viscosity
     own_factors = batch.calibration.get(model.name)
     factors = {name: getattr(own_factors, name) for name in _FACTOR_SPREADS} if own_factors else {}
     factors |= {name: np.full(1, getattr(batch.options.rft, name)) for name in ("normal_factor", "tangential_factor")}

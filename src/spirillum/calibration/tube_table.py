@@ -63,7 +63,7 @@ def tube_forward(
     Raises:
         InputError: if the robots share no place.
     """
-    viscosity = float(batch.viscosity[0])
+    viscosity = batch.viscosity
     if not names:
         tell(f"{model.name}, {batch.size} robots", 0, 1)
         return Forward(tabulated([_at(batch, {})], model), batch.electrics, viscosity), {}, 0.0

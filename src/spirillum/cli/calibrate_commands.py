@@ -58,6 +58,7 @@ def calibrate(
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import calibration_text, text
 
+    check_folder(output)
     robots = [loaded_robot(name, settings) for name in robot]
     with text.progress_bar(quiet=json) as progress:
         found = answer(
@@ -70,7 +71,6 @@ def calibrate(
             sampling=Sampling(seed=seed),
             progress=progress,
         )
-        check_folder(output)
         written = found.write(output, figures=not no_figures, progress=progress)
     content = calibration_text.calibration_content(found.to_dict(), output, written)
     text.show(content, calibration_text.calibration, json=json)
