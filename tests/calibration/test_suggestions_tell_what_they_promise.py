@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -50,20 +49,46 @@ def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.Mo
     assert found.candidates[0].gain == pytest.approx(0.0, abs=1e-9)
 
 
-def test_the_promised_narrowing_comes_true(made: Callable[..., Path], fitted: Path, tmp_path: Path) -> None:
-    """Doubling the tails narrows the factors by about what one candidate after another promises."""
-    promised = sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, "40,20,2.5"), trials=5)
-    before = sp.calibrate(made(presets=(WIDE,), **FEW), WIDE, free="body_drag,body_rotation", sampling=SHORT)
-    more = {**FEW, "wavelengths": (15.0, 20.0, 25.0)}
-    after = sp.calibrate(made(presets=(WIDE,), **more), WIDE, free="body_drag,body_rotation", sampling=SHORT)
+def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
+    fitted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Narrow normal draws: information and posterior covariance in closed form, with sensitivities of `swim`."""
+    from spirillum.motion import intervals
+    from spirillum.robot import RobotBatch, load
 
-    def width(found: Any) -> float:
-        value = found.values["body_rotation"]
-        return float(np.log(value.high / value.low) / found.discrepancy["turning"].value)
+    rng = np.random.default_rng(4)
+    spread, tau, sigma, trials = np.array([0.03, 0.02]), 0.01, 0.02, 5
+    middle = np.array([2.5, 0.8])
+    drawn = middle * np.exp(spread * rng.normal(size=(40_000, 2)))
+    draws = {"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]}
+    one = np.ones(40_000)
+    known = replace(
+        intervals.read_posterior(fitted / "posterior.nc"),
+        draws=draws,
+        discrepancy={"advance": tau * one, "turning": tau * one},
+        error={"advance": sigma * one, "turning": sigma * one},
+    )
+    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: known)
+    found = sp.suggest("any", WIDE, candidates=candidates(fitted, "40,20,2.5"), trials=trials).candidates[0]
 
-    # Two tails more than four: 1/sqrt(1.5) in units of the discrepancy; one tells 1/sqrt(1.25).
-    assert width(after) / width(before) == pytest.approx(np.sqrt(4 / 6), rel=0.25)
-    assert promised.candidates[0].narrowing["body_rotation"] == pytest.approx(np.sqrt(4 / 5), rel=0.1)
+    robot = load(WIDE, **{"tail.wavelength": "20 mm", "tail.amplitude": "2.5 mm"})
+
+    def seen(factors: np.ndarray) -> np.ndarray:
+        entry = robot.calibration["sbt"].model_copy(
+            update={"body_drag": float(factors[0]), "body_rotation": float(factors[1])}
+        )
+        swum = sp.swim(RobotBatch.of(robot.model_copy(update={"calibration": {"sbt": entry}})))
+        return np.log([swum.advance_per_radian[0], -swum.body_rotation_rate[0] / swum.tail_rotation_rate[0]])
+
+    steps = 1e-4 * np.eye(2)
+    jacobian = np.stack([(seen(middle * np.exp(s)) - seen(middle * np.exp(-s))) / 2e-4 for s in steps], axis=1)
+    noise = (tau**2 + sigma**2 / trials) * np.eye(2)
+    before = np.diag(spread**2)
+    after = np.linalg.inv(np.linalg.inv(before) + jacobian.T @ np.linalg.inv(noise) @ jacobian)
+    gain = 0.5 * np.log2(np.linalg.det(before) / np.linalg.det(after))
+    assert found.gain == pytest.approx(gain, rel=0.02)
+    for place, name in enumerate(("body_drag", "body_rotation")):
+        assert found.narrowing[name] == pytest.approx(np.sqrt(after[place, place]) / spread[place], rel=0.02)
 
 
 def test_a_grid_is_ranked_and_what_cannot_be_built_is_said(fitted: Path) -> None:

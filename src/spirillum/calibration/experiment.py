@@ -194,17 +194,12 @@ def _check_row(path: Path, item: Observation, robot: Robot) -> None:
 
 def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
     """Speeds that are all equal were not measured."""
-    for name, column, factor in (
-        ("forward_velocity", "forward_velocity_mm_s", 1e-3),
-        ("tail_rate", "tail_rate_Hz", 2 * np.pi),
-    ):
-        rows = [item for item in observations if np.isfinite(getattr(item, name))]
-        values = {getattr(item, name) for item in rows}
-        if name == "forward_velocity" and len(rows) >= 3 and len(values) == 1:
-            raise InputError(
-                f"{path}, rows {rows[0].row} to {rows[-1].row}, column {column}: all are {values.pop() / factor:g}; "
-                "allowed: measured values, which differ"
-            )
+    rows = [item for item in observations if np.isfinite(item.forward_velocity)]
+    if len(rows) >= 3 and len({item.forward_velocity for item in rows}) == 1:
+        raise InputError(
+            f"{path}, rows {rows[0].row} to {rows[-1].row}, column forward_velocity_mm_s: all are "
+            f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
+        )
 
 
 @dataclass(frozen=True)

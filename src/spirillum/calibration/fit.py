@@ -189,7 +189,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
 def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
     """Intervals from draws of the normal distribution around the best fit, in coordinates."""
     rng = np.random.default_rng(1)
-    root = _root(fit.covariance)
+    root = np.linalg.cholesky(fit.covariance)
     z = fit.z + rng.normal(size=(_FRICTION_DRAWS, fit.z.size)) @ root.T
     best = problem.values(fit.z[None])
     draws = problem.values(z)
@@ -254,12 +254,6 @@ def _by_posterior(
         identifiability=report,
         warnings=tuple(warnings),
     )
-
-
-def _root(covariance: Samples) -> Samples:
-    values, vectors = np.linalg.eigh(covariance)
-    found: Samples = vectors * np.sqrt(np.maximum(values, 0.0))
-    return found
 
 
 def limits(draws: Samples) -> tuple[Samples, Samples]:

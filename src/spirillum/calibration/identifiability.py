@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.least_squares import LeastSquares, sensitivities, standard_errors
+from spirillum.calibration.least_squares import LeastSquares, sensitivities, standard_errors, weighted_residuals
 from spirillum.calibration.problem import Problem
 
 __all__ = ["Identifiability", "Profile", "identified", "profiles"]
@@ -144,7 +144,10 @@ def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[Profi
         fit: its least squares.
         count: number of held values.
     """
-    residuals = _weighed(problem, fit)
+
+    def residuals(z: Samples) -> Samples:
+        return weighted_residuals(problem, z, fit.error, fit.discrepancy)
+
     spread = np.clip(np.sqrt(np.diag(fit.covariance)), 1e-6, 2.0)
     least = float(np.sum(residuals(fit.z) ** 2))
     found = []
@@ -178,24 +181,3 @@ def _others_fitted(
     first = np.clip(start[others], -11.9, 11.9)
     solved = least_squares(lambda rest: residuals(whole(rest)), first, bounds=(-12.0, 12.0), max_nfev=60)
     return whole(solved.x), 2.0 * float(solved.cost)
-
-
-def _weighed(problem: Problem, fit: LeastSquares) -> Callable[[Samples], Samples]:
-    """Residuals of all means over standard errors that are held, with the fit's discrepancy in them."""
-    errors = _fixed_errors(problem, fit)
-
-    def residuals(z: Samples) -> Samples:
-        parts = []
-        for name, values in problem.predicted(z[None]).items():
-            ratio = problem.ratio(name)
-            parts.append(((ratio.mean - values[0]) / errors[name])[ratio.seen])
-        found: Samples = np.nan_to_num(np.concatenate(parts), nan=1e6, posinf=1e6, neginf=-1e6)
-        return found
-
-    return residuals
-
-
-def _fixed_errors(problem: Problem, fit: LeastSquares) -> dict[str, Samples]:
-    predicted = {name: values[0] for name, values in problem.predicted(fit.z[None]).items()}
-    error = {name: max(np.nan_to_num(value), _LEAST_ERROR) for name, value in fit.error.items()}
-    return {str(name): value for name, value in standard_errors(problem, predicted, error, fit.discrepancy).items()}

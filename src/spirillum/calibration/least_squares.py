@@ -16,13 +16,13 @@ from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 
-__all__ = ["LeastSquares", "least_squares_fit", "sensitivities", "standard_errors"]
+__all__ = ["LeastSquares", "least_squares_fit", "sensitivities", "standard_errors", "weighted_residuals"]
 
 _STARTS = 6
 _STEP = 1e-4
 _BLIND = 1e-8
 _LARGEST = 12.0
-_BREATH = 1e-4
+_BREATH = 1e-2
 _LEAST_ERROR = 1e-3
 """Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
 
@@ -102,15 +102,14 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
     _check_blind(problem, z)
     chi2 = float("nan")
     if all(scattered.values()):
-        chi2 = float(np.sum(_residuals(problem, z, error, discrepancy) ** 2))
+        chi2 = float(np.sum(weighted_residuals(problem, z, error, discrepancy) ** 2))
     for _ in range(8):
         found = _discrepancy(problem, z, error)
         change = max(abs(found[name] - discrepancy[name]) for name in found)
         discrepancy = found
         if change < 1e-4:
             break
-        if any(value > 0 for value in discrepancy.values()):
-            z = _best(problem, z, error, discrepancy, starts=1)
+        z = _best(problem, z, error, discrepancy, starts=1)
     predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
     return LeastSquares(
         z=z,
@@ -157,9 +156,17 @@ def _check_blind(problem: Problem, z: Samples) -> None:
             )
 
 
-def _residuals(
+def weighted_residuals(
     problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> Samples:
+    """What least squares make small: means less predictions over their standard errors, and a breath of the prior.
+
+    Args:
+        problem: the fit.
+        z: coordinates, (free numbers,).
+        error: relative error of one trial, by quantity.
+        discrepancy: relative misfit from robot to robot, by quantity.
+    """
     predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
     # A discrepancy is relative to the size of the mean here: else a large prediction would excuse itself.
     sized = {name: problem.ratio(name).scale for name in predicted}
@@ -188,7 +195,7 @@ def _best(
     best, cost = start, np.inf
     for first in (start, *spread):
         found = least_squares(
-            lambda z: _residuals(problem, z, error, discrepancy),
+            lambda z: weighted_residuals(problem, z, error, discrepancy),
             np.clip(first, -3.0, 3.0) if first is not start else first,
             bounds=(-_LARGEST, _LARGEST),
             xtol=1e-13,

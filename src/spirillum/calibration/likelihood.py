@@ -67,8 +67,9 @@ class Density:
         first = len(self.problem.coordinates)
         names = self.problem.quantities
         count = len(names)
-        tau = {name: half_normal(z[:, first + n], DISCREPANCY_SCALE) for n, name in enumerate(names)}
-        sigma = {name: half_normal(z[:, first + count + n], ERROR_SCALE) for n, name in enumerate(names)}
+        both = half_normal(z[:, first:], 1.0)
+        tau = {name: DISCREPANCY_SCALE * both[:, n] for n, name in enumerate(names)}
+        sigma = {name: ERROR_SCALE * both[:, count + n] for n, name in enumerate(names)}
         return tau, sigma
 
     def values(self, z: Samples) -> dict[str, Samples]:

@@ -73,17 +73,42 @@ class Problem:
         Returns:
             Parameter to (draws, robots), or (draws, 1) where all robots share it.
         """
-        found: dict[str, Samples] = {}
+        values = self._all_values(z)
+        return {name: values[:, places] for name, places in self._places.items()}
+
+    @cached_property
+    def _places(self) -> dict[str, np.ndarray]:
+        """Parameter to the column of each robot's number; one column where all robots share it."""
+        found = {}
         for name in dict.fromkeys(item.parameter.name for item in self.coordinates):
-            places = [n for n, item in enumerate(self.coordinates) if item.parameter.name == name]
-            columns = np.stack([self.coordinates[n].prior.value(z[:, n]) for n in places], axis=1)
-            by_channel = self.coordinates[places[0]].channel is not None
-            found[name] = columns[:, self.experiment.channel] if by_channel else columns
+            places = np.array([n for n, item in enumerate(self.coordinates) if item.parameter.name == name])
+            by_channel = self.coordinates[int(places[0])].channel is not None
+            found[name] = places[self.experiment.channel] if by_channel else places
         return found
+
+    def _all_values(self, z: Samples) -> Samples:
+        """Every free number, (draws, free numbers); log-normal ones at once, for that is asked thousands of times."""
+        medians, spreads = self._log_normal
+        found: Samples = medians * np.exp(spreads * np.clip(z[:, : medians.size], -30.0, 30.0))
+        for place, item in enumerate(self.coordinates):
+            if not isinstance(item.prior, LogNormal):
+                found[:, place] = item.prior.value(z[:, place])
+        return found
+
+    @cached_property
+    def _log_normal(self) -> tuple[Samples, Samples]:
+        """Medians and spreads of the log-normal priors; 1 and 0 for others."""
+        pairs = [
+            (item.prior.median, item.prior.spread) if isinstance(item.prior, LogNormal) else (1.0, 0.0)
+            for item in self.coordinates
+        ]
+        table = np.array(pairs, dtype=float).reshape(-1, 2)
+        return table[:, 0], table[:, 1]
 
     def values(self, z: Samples) -> dict[str, Samples]:
         """Free numbers by label at coordinates, (draws,) each."""
-        return {item.label: item.prior.value(z[:, n]) for n, item in enumerate(self.coordinates)}
+        found = self._all_values(z)
+        return {item.label: found[:, n] for n, item in enumerate(self.coordinates)}
 
     def predicted(self, z: Samples) -> dict[Quantity, Samples]:
         """What is compared, (draws, robots)."""

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.plots.evidence import spread
@@ -101,11 +102,13 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
                 _draw(axes, found, row, here)
             axes_row[0].set_ylabel(row["label"])
             if np.all(row["positive"]):
-                axes_row[0].set_ylim(bottom=0.0)
+                tops = np.concatenate([row[name][inside] for name in ("values", "high", "seen")])
+                axes_row[0].set_ylim(0.0, 1.08 * float(np.nanmax(tops)))
         for amplitude, axes in zip(columns, panels[0], strict=True):
             axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
         for axes in panels[-1]:
             axes.set_xlabel(r"wavelength $\lambda$ (mm)")
+            axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
         return figure
 
 

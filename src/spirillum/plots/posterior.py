@@ -146,7 +146,8 @@ def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
             axes.axhline(_LIMIT, color="#444444", linewidth=0.8, linestyle=":")
             axes.set_ylim(0.0, 3.2 * _LIMIT)
             axes.set_xlabel(_label(profile.label).replace("\n", " "), fontsize=7.5)
-            axes.xaxis.set_major_locator(MaxNLocator(4))
+            axes.xaxis.set_major_locator(MaxNLocator(3))
+            axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         for axes in every[len(profiles) :]:
             axes.remove()
         for row in panels:
