@@ -70,6 +70,9 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
     amplitudes = np.unique(np.array([robot.tail.amplitude for robot in experiment.robots])[inside].round(9))
     columns = [float(amplitudes[n]) for n in spread(amplitudes.size, _MOST_COLUMNS)]
     rows = _rows(found)
+    waves = 1e3 * np.array([robot.tail.wavelength for robot in experiment.robots])[inside]
+    room = 0.06 * float(np.ptp(waves)) or 1.0
+    ends = (float(waves.min()) - room, float(waves.max()) + room)
     model = found.problem.model.name
     with styled():
         look = look_of_model(model)
@@ -101,6 +104,8 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
                 here = inside & np.array([abs(r.tail.amplitude - amplitude) < 1e-9 for r in experiment.robots])
                 _draw(axes, found, row, here)
             axes_row[0].set_ylabel(row["label"])
+            for axes in axes_row:
+                axes.set_xlim(*ends)
             if np.all(row["positive"]):
                 tops = np.concatenate([row[name][inside] for name in ("values", "high", "seen")])
                 axes_row[0].set_ylim(0.0, 1.08 * float(np.nanmax(tops)))
