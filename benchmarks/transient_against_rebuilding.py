@@ -86,7 +86,7 @@ def main() -> None:
         return min(times)
 
     ours = best(lambda: transient.motor_transient(batch.electrics, response.slip, samples, duty), 30)
-    whole = best(lambda: sp.simulate(robot, model="rft"), 10)
+    whole = best(lambda: sp.simulate(robot, model="rft", motion="held"), 10)
     one_matrix = best(lambda: rebuilt_tail_matrix(batch, 0.3), 5)
     exact = sp.resistance(robot, part="tail", phase=0.3).matrix
     error = float(np.abs(rebuilt_tail_matrix(batch, 0.3) - exact).max() / np.abs(exact).max())

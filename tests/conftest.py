@@ -9,8 +9,17 @@ import pytest
 from hypothesis import Phase, settings
 from jaxtyping import install_import_hook
 
+HOOKED = [
+    "spirillum.hydrodynamics",
+    "spirillum.motion",
+    "spirillum.exports",
+    "spirillum.robot.geometry",
+    "spirillum.robot.links",
+    "spirillum.robot.mesh",
+    "spirillum.robot.surface",
+]
 # Before anything imports these modules: the hook decorates their functions as they are read.
-install_import_hook(["spirillum.hydrodynamics", "spirillum.motion", "spirillum.robot.geometry"], "beartype.beartype")
+install_import_hook(HOOKED, "beartype.beartype")
 
 # Without the phase that explains a failure: it can take a minute.
 phases = (Phase.explicit, Phase.generate, Phase.shrink)

@@ -18,6 +18,11 @@ HEAVY = (
     "emcee",
     "arviz_base",
     "arviz_stats",
+    "pyvista",
+    "vtkmodules",
+    "av",
+    "PIL",
+    "trimesh",
 )
 
 

@@ -1,20 +1,28 @@
-"""Draw the pictures of the README: the paper's robot from its robot file, and the flow around it."""
+"""Draw the pictures of README and pages: the robot from its file, flat and in space, its wire, the flow around it."""
 
 from pathlib import Path
 
 import spirillum as sp
 from spirillum.plots.flow import flow_figure
+from spirillum.plots.frenet import frenet_figure
+from spirillum.plots.magnetic import magnetic_figure
 from spirillum.plots.robot import robot_figure
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 
 if __name__ == "__main__":
     flow = sp.flow("biorob2012-wide", tail_rate="1.2 Hz")
+    tilted = sp.load("magnetic-helix", **{"magnetic.moment_angle": "75 deg"})
     pictures = {
         "overview": (robot_figure(sp.load("biorob2012-wide")), 150),
         "flow": (flow_figure(flow, flow.plane("xz")), 90),
+        "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 110),
+        "frenet": (frenet_figure(sp.load("biorob2012-wide")), 120),
     }
     for name, (figure, dpi) in pictures.items():
         target = FOLDER / f"{name}.png"
         figure.savefig(target, dpi=dpi, metadata={"Software": None})
         print(target.name, target.stat().st_size, "bytes")
+    target = FOLDER / "robot3d.png"
+    sp.show("biorob2012-wide", target, phase="30 deg")
+    print(target.name, target.stat().st_size, "bytes")

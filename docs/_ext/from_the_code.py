@@ -217,7 +217,7 @@ class Quantities(SphinxDirective):
     """`quantities`: the quantities of a prediction."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.motion.swimming import Swimming
+        from spirillum.motion.quantities import Swimming
 
         rows = [
             (f"`{f.name}`", f.metadata["unit"], f.metadata["meaning"], f.metadata["source"])
@@ -284,12 +284,25 @@ class Flags(SphinxDirective):
 
 
 class SimulationVariables(SphinxDirective):
-    """`simulation-variables`: the variables that `simulate` writes."""
+    """`simulation-variables free|held`: the variables that `simulate` writes."""
+
+    required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
         from spirillum import simulate
 
-        dataset = simulate("biorob2012-wide", duration="1 s")
+        dataset = simulate("biorob2012-wide", duration="0.1 s", motion=self.arguments[0])
+        names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
+        return [table(_VARIABLE, _variable_rows(dataset, names), _VARIABLE_WIDTHS)]
+
+
+class SweepVariables(SphinxDirective):
+    """`sweep-variables`: the variables that `magnetic-sweep` writes."""
+
+    def run(self) -> list[nodes.Node]:
+        from spirillum import magnetic_sweep
+
+        dataset = magnetic_sweep("magnetic-helix", ["1 Hz"], turns=4.0)
         names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
         return [table(_VARIABLE, _variable_rows(dataset, names), _VARIABLE_WIDTHS)]
 
@@ -471,6 +484,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
         "study-figures": StudyFigures,
         "outside-flags": Flags,
         "simulation-variables": SimulationVariables,
+        "sweep-variables": SweepVariables,
         "claims": Claims,
         "models": Models,
         "reference-list": References,

@@ -14,13 +14,18 @@ if TYPE_CHECKING:
     from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
     from spirillum.errors import InputError
+    from spirillum.exports.write import Export, export
     from spirillum.hydrodynamics.resistance import Resistance, resistance
     from spirillum.motion.comparison import ModelComparison, compare_models
     from spirillum.motion.flow import Flow, flow
+    from spirillum.motion.magnetic_sweep import magnetic_sweep
     from spirillum.motion.prediction import Prediction, predict
+    from spirillum.motion.quantities import Swimming
     from spirillum.motion.settling import Settling, settle
-    from spirillum.motion.swimming import Swimming, swim
-    from spirillum.motion.transient import simulate
+    from spirillum.motion.simulation import simulate
+    from spirillum.motion.swimming import swim
+    from spirillum.render.film import Film, film
+    from spirillum.render.show import Picture3D, show
     from spirillum.robot import Robot, RobotBatch, load
     from spirillum.studies import study
 
@@ -28,9 +33,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Calibrated",
+    "Export",
+    "Film",
     "Flow",
     "InputError",
     "ModelComparison",
+    "Picture3D",
     "Prediction",
     "Ranking",
     "Resistance",
@@ -42,12 +50,16 @@ __all__ = [
     "calibrate",
     "citation",
     "compare_models",
+    "export",
+    "film",
     "flow",
     "load",
+    "magnetic_sweep",
     "predict",
     "rank_models",
     "resistance",
     "settle",
+    "show",
     "simulate",
     "study",
     "suggest",
@@ -56,9 +68,12 @@ __all__ = [
 
 _HOME = {
     "Calibrated": "spirillum.calibration.fit",
+    "Export": "spirillum.exports.write",
+    "Film": "spirillum.render.film",
     "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
     "ModelComparison": "spirillum.motion.comparison",
+    "Picture3D": "spirillum.render.show",
     "Prediction": "spirillum.motion.prediction",
     "Ranking": "spirillum.calibration.ranking",
     "Resistance": "spirillum.hydrodynamics.resistance",
@@ -66,17 +81,21 @@ _HOME = {
     "RobotBatch": "spirillum.robot",
     "Settling": "spirillum.motion.settling",
     "Suggestion": "spirillum.calibration.suggest",
-    "Swimming": "spirillum.motion.swimming",
+    "Swimming": "spirillum.motion.quantities",
     "calibrate": "spirillum.calibration.fit",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
+    "export": "spirillum.exports.write",
+    "film": "spirillum.render.film",
     "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
+    "magnetic_sweep": "spirillum.motion.magnetic_sweep",
     "predict": "spirillum.motion.prediction",
     "rank_models": "spirillum.calibration.ranking",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
-    "simulate": "spirillum.motion.transient",
+    "show": "spirillum.render.show",
+    "simulate": "spirillum.motion.simulation",
     "study": "spirillum.studies",
     "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.motion.swimming",

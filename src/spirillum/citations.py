@@ -30,6 +30,32 @@ REFERENCES: dict[str, str] = {
         "D. J. Jeffrey and Y. Onishi. The slow motion of a cylinder next to a plane wall. "
         "Quarterly Journal of Mechanics and Applied Mathematics 34:129-137, 1981."
     ),
+    "reynolds1886": (
+        "O. Reynolds. On the theory of lubrication and its application to Mr. Beauchamp Tower's experiments. "
+        "Philosophical Transactions of the Royal Society 177:157-234, 1886."
+    ),
+    "morozov2014": ("K. I. Morozov and A. M. Leshansky. The chiral magnetic nanomotors. Nanoscale 6:1580-1588, 2014."),
+    "man2013": (
+        "Y. Man and E. Lauga. The wobbling-to-swimming transition of rotated helices. "
+        "Physics of Fluids 25:071904, 2013."
+    ),
+    "adler1946": "R. Adler. A study of locking phenomena in oscillators. Proceedings of the IRE 34:351-357, 1946.",
+    "honda1996": (
+        "T. Honda, K. I. Arai and K. Ishiyama. Micro swimming mechanisms propelled by external magnetic fields. "
+        "IEEE Transactions on Magnetics 32:5085-5087, 1996."
+    ),
+    "darnton2007": (
+        "N. C. Darnton, L. Turner, S. Rojevsky and H. C. Berg. On torque and tumbling in swimming Escherichia coli. "
+        "Journal of Bacteriology 189:1756-1764, 2007."
+    ),
+    "chattopadhyay2006": (
+        "S. Chattopadhyay, R. Moldovan, C. Yeung and X. L. Wu. Swimming efficiency of bacterium Escherichia coli. "
+        "Proceedings of the National Academy of Sciences 103:13712-13717, 2006."
+    ),
+    "gabrielli1950": (
+        "G. Gabrielli and T. von Karman. What price speed? Specific power required for propulsion of vehicles. "
+        "Mechanical Engineering 72:775-781, 1950."
+    ),
     "perrin1934": (
         "F. Perrin. Mouvement brownien d'un ellipsoide (I). Journal de Physique et le Radium 5:497-511, 1934; "
         "(II) 7:1-11, 1936."

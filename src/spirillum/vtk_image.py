@@ -13,7 +13,7 @@ from spirillum.files import whole_file
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["write_vti"]
+__all__ = ["add_comment", "write_vti"]
 
 _AXES = ("x", "y", "z")
 
@@ -44,10 +44,10 @@ def write_vti(dataset: xr.Dataset, path: Path) -> None:
                 "inside": np.ascontiguousarray(ordered["inside"].values.astype(np.uint8)),
             },
         )
-        _add_comment(temporary, json.dumps(dict(ordered.attrs), sort_keys=True, default=str))
+        add_comment(temporary, json.dumps(dict(ordered.attrs), sort_keys=True, default=str))
 
 
-def _add_comment(path: Path, text: str) -> None:
+def add_comment(path: Path, text: str) -> None:
     """Put a JSON text behind the XML declaration; the data are addressed from a mark of their own and do not mind."""
     declaration, rest = path.read_bytes().split(b"\n", 1)
     safe = text.replace("--", "-\\u002d")  # a comment must not hold two hyphens; JSON may spell one of them

@@ -111,7 +111,9 @@ def test_simulation_writes_what_it_says(run: Callable[..., Any], tmp_path: Path)
     arguments = ("--duration", "0.5s", "--on", "0s:0.2s", "--on", "0.3 s:0.4 s", "--json")
     answer = json.loads(run("simulate", "biorob2012-wide", "-o", str(target), *arguments).out)
     with xr.open_dataset(target) as stored:
-        assert answer["final_position"]["value"] == pytest.approx(float(stored["position"][-1]))
+        assert answer["final_position"]["value"] == pytest.approx(stored["position"][-1].values)
+        assert answer["motion"] == "free"
+        assert [event["time"] for event in answer["events"]] == [0.0, 0.2, 0.3, 0.4]
         assert set(np.unique(stored["duty"].values)) == {0.0, 1.0}
     assert [path.name for path in tmp_path.iterdir()] == ["run.nc"]
 
@@ -174,5 +176,6 @@ def test_calibration_files_replace_the_robots_factors(run: Callable[..., Any], t
 def test_completion_offers_presets(monkeypatch, capsys: pytest.CaptureFixture[str]) -> None:
     from spirillum.cli import options
 
-    assert options.complete_presets("bio") == list(preset_names())
+    assert options.complete_presets("") == list(preset_names())
+    assert options.complete_presets("bio") == ["biorob2012-narrow", "biorob2012-wide"]
     assert options.complete_parts("ro") == ["robot", "rotor"]

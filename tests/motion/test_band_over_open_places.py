@@ -13,7 +13,7 @@ from spirillum.cli import main
 from spirillum.hydrodynamics.pieces import Geometry, solids_of_geometry, wire_of_geometry
 from spirillum.hydrodynamics.tube_place import WIRE_FILM
 from spirillum.motion.band import TOLERANCE, at_place, band_places, left_open
-from spirillum.motion.swimming import Swimming
+from spirillum.motion.quantities import Swimming
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.seat import body_gap, offset_for_gap, tail_clearance

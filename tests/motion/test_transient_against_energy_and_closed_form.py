@@ -1,9 +1,17 @@
 """The motor's transient: energy balance, the closed form of a linear circuit, and the steady state."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import spirillum as sp
+
+
+def held(robot: Any, **options: Any) -> Any:
+    """Two degrees of freedom, by the model that knows the axial entries only unless another is asked for."""
+    return sp.simulate(robot, motion="held", **{"model": "sbt", **options})
+
 
 LINEAR_CIRCUIT = {
     "motor": {"resistance": {"constant": "10 ohm", "decay": "0 ohm", "growth": "0 ohm", "slope": "0 ohm/A"}},
@@ -23,7 +31,7 @@ ENERGIES = (
 @pytest.mark.parametrize("model", ["sbt", "rft"])
 def test_energy_is_balanced_at_every_sample(reading: str, hand: str, model: str) -> None:
     robot = sp.load("biorob2012-narrow", **{"tail.handedness": hand, "drive.duty": 0.7})
-    run = sp.simulate(robot, model=model, friction=reading, on=[(0.0, 0.1), (0.15, 1.0)])
+    run = held(robot, model=model, friction=reading, on=[(0.0, 0.1), (0.15, 1.0)])
     spent = sum(run[name] for name in ENERGIES)
     scale = float(run["electrical_energy"][-1])
     assert scale > 0
@@ -31,7 +39,7 @@ def test_energy_is_balanced_at_every_sample(reading: str, hand: str, model: str)
 
 
 def test_energies_are_the_integrals_of_their_powers() -> None:
-    run = sp.simulate("biorob2012-wide", model="rft", duration="0.05 s", samples_per_turn=10_000)
+    run = held("biorob2012-wide", model="rft", duration="0.05 s", samples_per_turn=10_000)
     for name in ("electrical", "friction", "dissipated"):
         power, time = run[f"{name}_power"].values, run["time"].values
         integral = np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(time))
@@ -41,7 +49,7 @@ def test_energies_are_the_integrals_of_their_powers() -> None:
 def test_linear_circuit_rises_exponentially() -> None:
     """With constant R, L dI/dt = V - (R + r + K_b K_m dw/dtau) I has a closed form."""
     robot = sp.load("biorob2012-wide", **LINEAR_CIRCUIT)
-    run = sp.simulate(robot, model="rft", duration="0.05 s", samples_per_turn=1000)
+    run = held(robot, model="rft", duration="0.05 s", samples_per_turn=1000)
     steady = sp.predict(robot, model="rft")
     rate_per_current = steady.motor_rotation_rate / steady.motor_current
     resistance = 10.0 + 0.8 + 0.004 * rate_per_current
@@ -52,7 +60,7 @@ def test_linear_circuit_rises_exponentially() -> None:
 @pytest.mark.parametrize("model", ["sbt", "rft"])
 def test_average_over_the_last_two_of_three_turns_is_the_steady_state(model: str) -> None:
     """The electrical transient lasts milliseconds, so that the paper's averages are steady values."""
-    run, steady = sp.simulate("biorob2012-wide", model=model), sp.predict("biorob2012-wide", model=model)
+    run, steady = held("biorob2012-wide", model=model), sp.predict("biorob2012-wide", model=model)
     assert float(run["mean_forward_velocity"]) == pytest.approx(steady.forward_velocity, rel=1e-7)
     assert float(run["mean_tail_rotation_rate"]) == pytest.approx(steady.tail_rotation_rate, rel=1e-7)
     assert float(run["mean_body_rotation_rate"]) == pytest.approx(steady.body_rotation_rate, rel=1e-7)
@@ -61,15 +69,15 @@ def test_average_over_the_last_two_of_three_turns_is_the_steady_state(model: str
 
 
 def test_left_handed_robot_is_the_mirror_image() -> None:
-    right = sp.simulate("biorob2012-wide", duration="0.1 s")
-    left = sp.simulate(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), duration="0.1 s")
+    right = held("biorob2012-wide", duration="0.1 s")
+    left = held(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), duration="0.1 s")
     np.testing.assert_allclose(left["position"], right["position"], rtol=1e-12)
     for name in ("tail_angle", "body_angle", "motor_current", "motor_torque"):
         np.testing.assert_allclose(left[name], -right[name], rtol=1e-12)
 
 
 def test_switching_off_stops_the_robot() -> None:
-    run = sp.simulate("biorob2012-wide", duration="1 s", on=[(0.0, 0.4)])
+    run = held("biorob2012-wide", duration="1 s", on=[(0.0, 0.4)])
     late = run.sel(time=slice(0.6, None))
     assert float(abs(late["motor_current"]).max()) < 1e-9
     assert float(late["position"][-1] - late["position"][0]) == pytest.approx(0.0, abs=1e-12)
@@ -77,7 +85,7 @@ def test_switching_off_stops_the_robot() -> None:
 
 
 def test_battery_gives_duty_times_the_motor_current() -> None:
-    half = sp.simulate(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), duration="0.5 s")
+    half = held(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), duration="0.5 s")
     charge = np.trapezoid(0.5 * half["motor_current"].values, half["time"].values)
     assert float(half["battery_charge_used"][-1]) == pytest.approx(charge, rel=1e-3)
 
@@ -99,13 +107,13 @@ def test_battery_gives_duty_times_the_motor_current() -> None:
 )
 def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:
     with pytest.raises(sp.InputError, match="allowed") as caught:
-        sp.simulate("biorob2012-wide", **options)
+        held("biorob2012-wide", **options)
     assert words in str(caught.value)
 
 
 def test_switching_times_are_quantities_too() -> None:
-    in_words = sp.simulate("biorob2012-wide", duration="0.2 s", on=[("0 s", "100 ms")])
-    in_seconds = sp.simulate("biorob2012-wide", duration=0.2, on=[(0.0, 0.1)])
+    in_words = held("biorob2012-wide", duration="0.2 s", on=[("0 s", "100 ms")])
+    in_seconds = held("biorob2012-wide", duration=0.2, on=[(0.0, 0.1)])
     assert in_words.identical(in_seconds)
     assert in_words.attrs["switches"] == "duty 1 from 0 s, duty 0 from 0.1 s"
 
@@ -113,14 +121,12 @@ def test_switching_times_are_quantities_too() -> None:
 def test_only_a_motor_has_a_transient() -> None:
     robot = sp.load("biorob2012-wide", drive={"kind": "rate", "rate": "1 Hz"})
     with pytest.raises(sp.InputError, match="dc-motor"):
-        sp.simulate(robot)
+        held(robot)
 
 
 def test_accuracy_reaches_the_model_and_its_error_the_dataset() -> None:
     settings = {"model": "slender", "duration": "1 s"}
-    standard, high = (
-        sp.simulate("biorob2012-wide", accuracy=accuracy, **settings) for accuracy in ("standard", "high")
-    )
+    standard, high = (held("biorob2012-wide", accuracy=accuracy, **settings) for accuracy in ("standard", "high"))
     for dataset, accuracy in ((standard, "standard"), (high, "high")):
         alone = sp.predict("biorob2012-wide", model="slender", accuracy=accuracy)
         assert dataset.attrs["error_estimate"] == alone.error_estimate

@@ -26,13 +26,31 @@ def volume_and_moment(outline: Outline) -> np.ndarray:
     return total
 
 
+def end_volume_and_moment(end: str) -> tuple[float, float, float]:
+    """Volume of an end, its first moment about the plane where it joins the straight part, and its height."""
+    R, f = DIAMETER / 2, FILLET
+    core = R - f
+    return {
+        "hemisphere": (2 / 3 * np.pi * R**3, np.pi * R**4 / 4, R),
+        "fillet": (
+            np.pi * (core**2 * f + np.pi / 2 * core * f**2 + 2 / 3 * f**3),
+            np.pi * (core**2 * f**2 / 2 + 2 / 3 * core * f**3 + f**4 / 4),
+            f,
+        ),
+        "flat": (0.0, 0.0, 0.0),
+    }[end]
+
+
 @pytest.mark.parametrize("front", ENDS)
 @pytest.mark.parametrize("rear", ENDS)
 def test_volume_and_centroid(front: str, rear: str) -> None:
     outline = body_outline("cylinder", DIAMETER, LENGTH, FILLET, front, rear)
     columns = [np.array([value]) for value in (DIAMETER, LENGTH, FILLET)]
     volume = geometry.body_volume("cylinder", *columns, front, rear)[0]
-    centroid = geometry.body_volume_centroid("cylinder", *columns, front, rear)[0]
+    (v_f, m_f, h_f), (v_r, m_r, h_r) = end_volume_and_moment(front), end_volume_and_moment(rear)
+    x_f, x_r = LENGTH / 2 - h_f, -LENGTH / 2 + h_r
+    straight = np.pi * DIAMETER**2 / 8 * (x_f**2 - x_r**2)
+    centroid = (straight + v_f * x_f + m_f + v_r * x_r - m_r) / volume
     found, moment = volume_and_moment(outline)
     assert found == pytest.approx(volume, rel=1e-9)
     assert moment / found == pytest.approx(centroid, rel=1e-7, abs=1e-9 * LENGTH)

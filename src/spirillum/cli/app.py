@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
+from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
+from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
 from spirillum.cli.options import (
     Accuracy,
@@ -21,8 +23,8 @@ from spirillum.cli.options import (
     ImposedFlow,
     Json,
     Model,
+    Motion,
     NoCalibration,
-    Output,
     Phases,
     Picture,
     Pitch,
@@ -39,6 +41,7 @@ from spirillum.cli.options import (
 )
 from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
+from spirillum.cli.show_commands import film, show
 
 __all__ = ["app"]
 
@@ -56,6 +59,9 @@ app.command()(settle)
 app.command()(calibrate)
 app.command("rank-models")(rank_models)
 app.command()(suggest)
+app.command()(export)
+app.command()(show)
+app.command()(film)
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
@@ -74,7 +80,8 @@ def _root(
 ) -> None:
     """Predict, measure and explain how a robot with a rotating helical tail swims in a fluid-filled channel.
 
-    ROBOT is a preset (`biorob2012-wide`, `biorob2012-narrow`) or a TOML file (`spirillum robot new`).
+    ROBOT is a preset (`biorob2012-wide`, `biorob2012-narrow`, `ecoli`, `magnetic-helix`) or a TOML file
+    (`spirillum robot new`).
     """
 
 
@@ -100,6 +107,7 @@ def predict(
         bool,
         typer.Option("--no-band", help="Model tube: the reference place alone where gap or pitch is not given; fast."),
     ] = False,
+    motion: Motion = "held",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -124,6 +132,7 @@ def predict(
             tolerance=tolerance,
             phases=phases,
             band=not no_band,
+            motion=motion,
             progress=progress,
         )
     text.show(result.to_dict(), text.prediction, json=json)
@@ -281,53 +290,8 @@ def study(
     text.show(text.study_answer(dataset, output), text.study, json=json)
 
 
-@app.command()
-def simulate(
-    robot: RobotArgument,
-    output: Output,
-    model: Model = "sbt",
-    friction: Friction = None,
-    turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail.")] = 3.0,
-    duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.")
-    ] = None,
-    on: Annotated[
-        list[str] | None,
-        typer.Option(metavar="FROM:TO", help="When the remote switches the motor on, such as 0s:2s; repeatable."),
-    ] = None,
-    samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
-    no_calibration: NoCalibration = False,
-    calibration: Calibration = None,
-    accuracy: Accuracy = None,
-    settings: Settings = None,
-    json: Json = False,
-) -> None:
-    """Simulate axial swimming from rest (two degrees of freedom): motor transient, path, energies.
-
-    Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
-    """
-    from spirillum.cli import text
-    from spirillum.files import netcdf_target, write_dataset
-    from spirillum.motion.transient import simulate as answer
-
-    target = netcdf_target(output)
-    with text.patience(model, quiet=json):
-        dataset = answer(
-            loaded_robot(robot, settings),
-            model=model,
-            friction=friction,
-            turns=turns,
-            duration=duration,
-            on=[text.time_window(window) for window in on] if on else None,
-            samples_per_turn=samples_per_turn,
-            calibrated=not no_calibration,
-            calibration=calibration,
-            accuracy=accuracy,
-        )
-    write_dataset(dataset, target)
-    text.show(text.simulation_answer(dataset, output), text.simulation, json=json)
-
-
+app.command()(simulate)
+app.command("magnetic-sweep")(magnetic_sweep)
 app.command()(flow)
 
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 __all__ = ["comparison_answer", "model_comparison"]
 
+_LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
+"""What follows from other rows, and stands in the JSON only."""
+
 
 def comparison_answer(comparison: ModelComparison, picture: Path | None) -> dict[str, Any]:
     """Answer of `compare-models`, which names the picture that was drawn."""
@@ -33,6 +36,8 @@ def model_comparison(answer: Answer, console: Console) -> None:
         rows.add_column(name if name == reference else f"{name}, vs {reference}", justify="right")
     rows.add_column("unit", no_wrap=True)
     for name in models[0]["relative_difference"]:
+        if name in _LEFT_OUT:
+            continue
         values = [item[name]["value"] for item in models]
         known = [value for value in values if value is not None]
         if not known:

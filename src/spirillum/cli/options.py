@@ -17,6 +17,7 @@ __all__ = [
     "ImposedFlow",
     "Json",
     "Model",
+    "Motion",
     "NoCalibration",
     "Output",
     "Phases",
@@ -94,6 +95,10 @@ def _complete_ends(incomplete: str) -> list[str]:
     return _starting(("closed", "open"), incomplete)
 
 
+def _complete_motions(incomplete: str) -> list[str]:
+    return _starting(("free", "held"), incomplete)
+
+
 def _complete_friction(incomplete: str) -> list[str]:
     return _starting(("body", "none", "paper", "rotor"), incomplete)
 
@@ -114,6 +119,12 @@ Friction = Annotated[
     typer.Option(
         autocompletion=_complete_friction,
         help="Where the rotary friction acts: none, rotor (in the joint), body (on the wall), paper (as printed).",
+    ),
+]
+Motion = Annotated[
+    str,
+    typer.Option(
+        autocompletion=_complete_motions, help="Lateral motion and tilt held, as the channel's floor does, or free."
     ),
 ]
 NoCalibration = Annotated[bool, typer.Option("--no-calibration", help="Leave the calibration factors out.")]

@@ -32,6 +32,15 @@ _NUMBERS = ("value", "low", "high", "SI")
 _FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
 _FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml"}
 _LONG = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
+# What is so small is read in another unit.
+_SMALL = {
+    "m/s": (1e-4, "um/s"),
+    "m": (1e-5, "um"),
+    "m/rad": (1e-7, "um/turn"),
+    "kg": (1e-6, "kg"),
+    "m^3": (1e-12, "m^3"),
+}
+_SMALL |= {"N": (1e-8, "N"), "N m": (1e-8, "N m"), "W": (1e-8, "W")}
 
 
 class _PipedConsole(Console):
@@ -75,6 +84,8 @@ def friendly_unit(value: float | None, unit: str) -> str:
     """The unit in which people read such a value."""
     if value is not None and unit in _LONG and abs(value) >= _LONG[unit][0]:
         return _LONG[unit][1]
+    if value and unit in _SMALL and abs(value) < _SMALL[unit][0]:
+        return _SMALL[unit][1]
     return _FRIENDLY.get(unit, unit)
 
 
@@ -95,7 +106,8 @@ def add_quantities(table: Table, items: Mapping[str, Any]) -> None:
 def prediction(answer: Answer, console: Console) -> None:
     """Table of `predict`."""
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
-    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}"
+    free = ", free motion" if answer["motion"] == "free" else ""
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
     if "band" in answer or "kind" in answer["forward_velocity"]:
         table = grid(title, "quantity", "value", "low", "high", "unit")
@@ -116,7 +128,7 @@ def prediction(answer: Answer, console: Console) -> None:
             highlight=False,
             soft_wrap=True,
         )
-    _show_error(answer["error_estimate"], console)
+    show_error(answer["error_estimate"], console)
 
 
 def _add_bands(table: Table, items: Mapping[str, Any]) -> None:
@@ -151,7 +163,7 @@ def _band_words(item: Mapping[str, Any]) -> str:
     return f" (open: band over {low} to {high} {unit})"
 
 
-def _show_error(error: Answer, console: Console) -> None:
+def show_error(error: Answer, console: Console) -> None:
     """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
         share = f"{100 * error['value']:.2g} %"
@@ -193,7 +205,7 @@ def robot(answer: Answer, console: Console) -> None:
     console.print(f"[bold]{escape(fields['name'])}[/bold]  {escape(fields['description'])}", highlight=False)
     table = grid("fields", "field", "value", "unit")
     for name, item in fields.items():
-        word = "none" if name in ("tail.taper", "channel") and item is None else _word(item)
+        word = "none" if name in ("tail.taper", "channel", "seal") and item is None else _word(item)
         value, unit = _friendly(item["value"], item["unit"]) if isinstance(item, Mapping) else (word, "")
         if name not in ("name", "description", "reference"):
             table.add_row(name, value, unit)
@@ -208,6 +220,8 @@ def robot(answer: Answer, console: Console) -> None:
 def _word(value: Any) -> str:
     if value is None:
         return "-"
+    if isinstance(value, tuple):
+        return escape(", ".join(str(item) for item in value)) or "-"
     return f"{value:.6g}" if isinstance(value, float) else escape(str(value))
 
 
@@ -272,36 +286,6 @@ def study(answer: Answer, console: Console) -> None:
         console.print(f"statements of the paper: {claims}", highlight=False)
     console.print(f"observations: {escape(answer['observations'])}", highlight=False)
     console.print(f"open {escape(answer['folder'])}/report.html", highlight=False, soft_wrap=True)
-
-
-def simulation_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
-    """Answer of `simulate`: averages over the last two thirds, and the end of the run."""
-    last = dataset.isel(time=-1)
-    ends = ("position", "tail_angle", "body_angle", "electrical_energy", "battery_charge_used")
-    content: dict[str, Any] = {
-        "robot": dataset.attrs["robot"],
-        "model": dataset.attrs["model"],
-        "friction": dataset.attrs["friction"],
-        "motion": dataset.attrs["motion"],
-        "error_estimate": quantity(float(dataset.attrs["error_estimate"]), "1", statement=dataset.attrs["known_error"]),
-        "file": str(output),
-        "duration": quantity(float(last["time"]), "s"),
-    }
-    scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]
-    content |= {name: quantity(float(dataset[name]), str(dataset[name].attrs["units"])) for name in scalars}
-    content |= {f"final_{name}": quantity(float(last[name]), str(last[name].attrs["units"])) for name in ends}
-    return envelope("simulation", content, [line for line in dataset.attrs["warnings"].split("\n") if line])
-
-
-def simulation(answer: Answer, console: Console) -> None:
-    """Table of `simulate`."""
-    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
-    table = grid(title, "quantity", "value", "unit", "SI")
-    add_quantities(table, {name: item for name, item in answer.items() if name != "error_estimate"})
-    console.print(table)
-    _show_error(answer["error_estimate"], console)
-    console.print("means are over the last two thirds of the run", highlight=False)
-    console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 
 
 def angle(text: str) -> float:

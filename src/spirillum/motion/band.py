@@ -25,7 +25,8 @@ from spirillum.arrays import PerRobot
 from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.hydrodynamics.pieces import Geometry, solids_of_geometry
 from spirillum.hydrodynamics.tube_place import GAP_BAND, WIRE_FILM
-from spirillum.motion.swimming import Swimming, requirements
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import requirements
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken

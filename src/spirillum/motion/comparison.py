@@ -13,7 +13,8 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.motion.prediction import Prediction, predict
-from spirillum.motion.swimming import Swimming, friction_reading
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import friction_reading
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
 from spirillum.robot.placement import Placement

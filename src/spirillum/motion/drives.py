@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -32,6 +32,12 @@ class DriveState:
     effective: PerRobot
     torques: FrictionTorques
     residual: PerRobot
+    step_out: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: fastest rotation of the field that the robot follows, rad/s."""
+    lag: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: angle of the moment behind the turning field, rad; NaN where the robot does not follow."""
+    driving_rate: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: rate of the field, against which its torque works, rad/s."""
 
 
 def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
@@ -138,9 +144,28 @@ def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
 
 def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> DriveState:
     """Fixed joint: body and tail turn together under an external torque or rate."""
-    load = s.bb + s.br + s.rb + s.rr
-    own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + s.t_b + s.t_r) / load
+    load, flow = s.bb + s.br + s.rb + s.rr, s.t_b + s.t_r
+    zero, none = np.zeros(1), np.full(1, np.nan)
+    frictionless = FrictionTorques(zero, zero, zero, zero, zero)
+    if batch.drive == "magnetic" and np.all(np.isnan(tail_rate)):
+        step_out, lag, rate = _in_rotating_field(batch, load, flow)
+        return DriveState(rate, rate, none, none, frictionless, none, step_out, lag, batch.field_rate)
+    own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + flow) / load
     rate = np.where(np.isnan(tail_rate), own, tail_rate)
-    zero = np.zeros(1)
-    none = np.full(1, np.nan)
-    return DriveState(rate, rate, none, none, FrictionTorques(zero, zero, zero, zero, zero), none)
+    return DriveState(rate, rate, none, none, frictionless, none)
+
+
+def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """Step-out rate, phase lag and mean rate of a robot held to the axis about which the field turns.
+
+    The moment's part across the axis, m sin(moment_angle), lags behind the field by an angle with
+    m B sin(lag) = load * rate. Beyond step-out the lag grows without end, d(lag)/dt = rate - step_out sin(lag), and
+    the robot turns at rate - sqrt(rate^2 - step_out^2) on average (R. Adler, Proc. IRE 34:351, 1946).
+    """
+    strength = batch.magnetic_moment * np.sin(batch.moment_angle) * batch.magnetic_field
+    wanted = batch.field_rate - flow / load  # what the field has to drive beyond the flow's own turning
+    step_out = strength / load
+    follows = np.abs(wanted) <= step_out
+    lag = np.where(follows, np.arcsin(np.where(follows, np.abs(wanted) / step_out, 0.0)), np.nan)
+    slipping = wanted - np.sign(wanted) * np.sqrt(np.where(follows, 0.0, wanted**2 - step_out**2))
+    return step_out, lag, np.where(follows, wanted, slipping) + flow / load

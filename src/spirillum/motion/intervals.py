@@ -19,7 +19,8 @@ import numpy as np
 from spirillum.arrays import Axial, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.model import SwimmerModel
-from spirillum.motion.swimming import Swimming, swim
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import swim
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.calibration_file import CalibrationFile, FittedFriction, FittedValues, calibrated_robot
 from spirillum.robot.options import Calibration, FittedTo

@@ -14,9 +14,11 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.band import Band, band_of
+from spirillum.motion.drive_warnings import drive_warnings
+from spirillum.motion.freedom import Motion, motion_of
 from spirillum.motion.intervals import Intervals, intervals_of, read_posterior
+from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import (
-    Swimming,
     calibrated_balance,
     friction_reading,
     requirements,
@@ -64,6 +66,8 @@ class Prediction:
     """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
     """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
+    motion: Motion = "held"
+    """Lateral motion and tilt held, or released."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -95,6 +99,7 @@ class Prediction:
             "model": self.model.name,
             "friction": self.friction,
             "calibrated": self.calibrated,
+            "motion": self.motion,
             **quantities,
             "placement": self.placement,
             **({"band": band.to_dict()} if band else {}),
@@ -127,6 +132,7 @@ def predict(
     tolerance: float | None = None,
     phases: int | None = None,
     band: bool = True,
+    motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
@@ -153,6 +159,8 @@ def predict(
         phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
         band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
             place alone.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`: released, without weight
+            and walls; the forward velocity is then that along the axis of the screw on which the robot moves.
         progress: told what is being computed, how many places are done, and of how many.
 
     Raises:
@@ -172,7 +180,7 @@ def predict(
 
     def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
         rates = None if rate is None else np.array([rate])
-        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated)
+        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated, motion=motion)
 
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
@@ -184,8 +192,9 @@ def predict(
         *ready.warnings,
         *(calibration_warnings(ready, chosen.name) if calibrated else ()),
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
-        *_drive_warnings(ready, chosen, reading, result, rate),
+        *drive_warnings(ready, chosen, reading, result, rate),
     ]
+    warnings += _free_warnings(ready, motion)
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
     error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
@@ -196,7 +205,9 @@ def predict(
         warnings.append(
             f"{drawn.observations} says that its numbers are synthetic: the intervals rest on nothing measured"
         )
-    return Prediction(ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over)
+    return Prediction(
+        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
+    )
 
 
 def prepared(
@@ -314,8 +325,11 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
         return []
     entry = robot.calibration.get(model)
     if entry is None:
-        walls = "" if robot.channel is None else ", and nothing stands for the channel's walls"
-        return [f"no calibration for model '{model}': body drag factors are 1{walls}"]
+        if robot.channel is None:  # nothing to stand for
+            return []
+        return [
+            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
+        ]
     fitted = entry.fitted_to
     channel = robot.channel.diameter if robot.channel else None
     pairs = (
@@ -333,59 +347,8 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
     return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
 
 
-def _drive_warnings(
-    robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
-) -> list[str]:
-    motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
-    factors = robot.calibration.get(model.name)
-    found = []
-    if reading == "paper" and factors is not None and factors.body_rotation < 1:
-        found.append(
-            f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already makes up for friction on "
-            "the body; with friction reading 'paper' it is counted twice"
-        )
-    if not motor_driven:
-        return found
-    if rate is None:
-        return found + _unset_friction_warning(robot, reading)
-    return found + _prescribed_rate_warnings(robot, reading, result)
-
-
-def _against_the_drive(robot: Robot, result: Swimming) -> bool:
-    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
-
-
-def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]:
-    if reading == "none":
-        return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
-    if robot.friction.effective is not None or robot.motor is None:
+def _free_warnings(robot: Robot, motion: str) -> list[str]:
+    """What a free motion leaves out."""
+    if motion == "held" or robot.channel is None:
         return []
-    own = f"the rotor's own B_m = {robot.motor.rotor_friction:g} N m s/rad"
-    if reading == "body":
-        return [f"friction.effective is unset: no wall friction on the body, {own} in the joint"]
-    return [f"friction.effective is unset: {own} alone is used, which makes the rates upper bounds"]
-
-
-def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[str]:
-    found = []
-    if reading in ("rotor", "paper"):
-        if robot.friction.effective is not None:
-            found.append("friction.effective is ignored: with a tail rate it is inferred from (17) and (18)")
-        if _against_the_drive(robot, result):
-            found.append(
-                "the tail turns against the way that its motor drives (motor.polarity, tail.handedness): the inferred "
-                "effective friction has no meaning"
-            )
-        elif result.effective_friction[0] < 0:
-            found.append(
-                "the inferred effective friction is negative: at this rate the model's hydrodynamic torque exceeds "
-                "what the motor gives"
-            )
-    else:
-        found.append(
-            f"friction reading '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained"
-        )
-    if result.electrical_power[0] < 0:
-        found.append("at this rate the tail drives the motor: current and electrical power are negative")
-    return found
+    return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]

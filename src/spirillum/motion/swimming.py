@@ -2,128 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from typing import cast, get_args
 
 import numpy as np
 
-from spirillum.arrays import Flags, MeanFlow, PerRobot
+from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.hydrodynamics.perrin import body_axial
 from spirillum.motion.balance import TorqueBalance, force_free
 from spirillum.motion.drives import DriveState, at_rate, driven, one_piece
+from spirillum.motion.freedom import Motion, Screw, check_full, motion_of, released
 from spirillum.motion.motor import battery_voltage, run_time
+from spirillum.motion.quantities import Swimming
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.robot import STANDARD_GRAVITY
 
-__all__ = ["Swimming", "calibrated_balance", "friction_reading", "requirements", "speed_difference", "swim"]
+__all__ = [
+    "Swimming",
+    "calibrated_balance",
+    "calibrated_resistance",
+    "friction_reading",
+    "requirements",
+    "speed_difference",
+    "swim",
+]
 
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
-
-
-@dataclass(frozen=True)
-class Swimming:
-    """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`."""
-
-    forward_velocity: PerRobot = field(
-        metadata={"unit": "m/s", "meaning": "forward velocity U_x", "source": "eqs (1), (8), (15)"}
-    )
-    advance_per_radian: PerRobot = field(
-        metadata={"unit": "m/rad", "meaning": "forward velocity over tail rate", "source": "eqs (1), (15)"}
-    )
-    tail_rotation_rate: PerRobot = field(
-        metadata={
-            "unit": "rad/s",
-            "meaning": "rotation rate omega of the tail (lab)",
-            "source": "eqs (15), (18)",
-        }
-    )
-    body_rotation_rate: PerRobot = field(
-        metadata={"unit": "rad/s", "meaning": "rotation rate Omega_x of the body", "source": "eqs (2), (15)"}
-    )
-    motor_rotation_rate: PerRobot = field(
-        metadata={"unit": "rad/s", "meaning": "motor rate omega_m = omega - Omega_x", "source": "Table II"}
-    )
-    tail_torque: PerRobot = field(
-        metadata={
-            "unit": "N m",
-            "meaning": "hydrodynamic torque T_h on the rotor, magnitude",
-            "source": "eqs (12), (18)",
-        }
-    )
-    drive_torque: PerRobot = field(
-        metadata={"unit": "N m", "meaning": "torque that turns the rotor against the fluid", "source": "eq. (18)"}
-    )
-    motor_current: PerRobot = field(metadata={"unit": "A", "meaning": "motor current I", "source": "eq. (17)"})
-    battery_voltage: PerRobot = field(
-        metadata={"unit": "V", "meaning": "battery voltage V(I) at the terminals", "source": "Table II"}
-    )
-    effective_friction: PerRobot = field(
-        metadata={
-            "unit": "N m s/rad",
-            "meaning": "effective rotary friction B_eff (reading body: B of the wall)",
-            "source": "eq. (18)",
-        }
-    )
-    motor_residual_torque: PerRobot = field(
-        metadata={
-            "unit": "N m",
-            "meaning": "motor torque that the friction reading leaves unexplained",
-            "source": "eq. (18)",
-        }
-    )
-    electrical_power: PerRobot = field(
-        metadata={"unit": "W", "meaning": "electrical power at the battery's terminals", "source": "Table II"}
-    )
-    shaft_power: PerRobot = field(
-        metadata={"unit": "W", "meaning": "drive torque times motor rate", "source": "eq. (18)"}
-    )
-    friction_power: PerRobot = field(
-        metadata={"unit": "W", "meaning": "power lost to friction", "source": "eqs (18), (19)"}
-    )
-    dissipated_power: PerRobot = field(
-        metadata={
-            "unit": "W",
-            "meaning": "viscous dissipation (in an imposed flow: what the robot adds to it)",
-            "source": "eq. (9)",
-        }
-    )
-    hydrodynamic_efficiency: PerRobot = field(
-        metadata={
-            "unit": "1",
-            "meaning": "isolated uncalibrated body drag times U^2 over shaft power",
-            "source": "eq. (16)",
-        }
-    )
-    reynolds_number: PerRobot = field(
-        metadata={"unit": "1", "meaning": "Reynolds number on the body's diameter", "source": "definition"}
-    )
-    tail_reynolds_number: PerRobot = field(
-        metadata={
-            "unit": "1",
-            "meaning": "Reynolds number rho |omega| B_o^2/mu on the tail's amplitude",
-            "source": "definition",
-        }
-    )
-    battery_run_time: PerRobot = field(
-        metadata={"unit": "s", "meaning": "time until the rated charge is spent", "source": "Table II"}
-    )
-    plug_velocity: PerRobot = field(
-        metadata={
-            "unit": "m/s",
-            "meaning": "mean velocity of the fluid through the channel",
-            "source": "models with a channel",
-        }
-    )
-    valid: Flags = field(
-        metadata={
-            "unit": "1",
-            "meaning": "robot can be built and lies inside the model's domain",
-            "source": "domain of the model",
-        }
-    )
 
 
 def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
@@ -133,14 +41,27 @@ def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
 
 def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> TorqueBalance:
     """The force-free torque balance; a calibration factor f adds (f - 1) times the isolated body's drag."""
-    r = model.axial(batch)
-    factors = batch.calibration.get(model.name) if calibrated else None
-    if factors is not None:
-        drag, rotation = body_axial(batch)
-        r = np.array(np.broadcast_to(r, (np.broadcast_shapes(r.shape[:1], factors.body_drag.shape)[0], 4, 4)))
-        r[:, 0, 0] += (factors.body_drag - 1.0) * drag
-        r[:, 1, 1] += (factors.body_rotation - 1.0) * rotation
+    r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
     return force_free(r, model.axial_load(batch))
+
+
+def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> Matrix12:
+    """R of both parts at phase 0 with the same factors, for a motion that is not held to the axis."""
+    return _with_factors(model.resistance(batch, np.zeros(1)), (0, 3), batch, model, calibrated=calibrated)
+
+
+def _with_factors(
+    r: Samples, places: tuple[int, int], batch: RobotBatch, model: SwimmerModel, *, calibrated: bool
+) -> Samples:
+    """R with calibration factors on the body's axial drag and rotation, whose places in R are given."""
+    factors = batch.calibration.get(model.name) if calibrated else None
+    if factors is None:
+        return r
+    size = np.broadcast_shapes(r.shape[:1], factors.body_drag.shape)
+    r = np.array(np.broadcast_to(r, (*size, *r.shape[1:])))
+    for place, factor, entry in zip(places, (factors.body_drag, factors.body_rotation), body_axial(batch), strict=True):
+        r[:, place, place] += (factor - 1.0) * entry
+    return r
 
 
 def swim(
@@ -151,6 +72,7 @@ def swim(
     motor_rate: PerRobot | None = None,
     friction: str | None = None,
     calibrated: bool = True,
+    motion: str = "held",
 ) -> Swimming:
     """Steady swimming of every robot of a batch.
 
@@ -162,6 +84,7 @@ def swim(
         motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
         friction: reading of the friction; None: the robots' own.
         calibrated: apply the robots' calibration factors for this model.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free` (released; without weight).
 
     Returns:
         One value for each robot; NaN and `valid = False` where a robot cannot be built or is outside the
@@ -175,13 +98,30 @@ def swim(
     if batch.joint == "fixed" and motor_rate is not None:
         raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
-    free = tail_rate is None and motor_rate is None
+    driven_freely = tail_rate is None and motor_rate is None
     reading = friction_reading(friction or batch.friction)
+    lateral = motion_of(motion)
+    if lateral == "free":
+        _check_free(batch, chosen)
     parts = [
-        _swim_block(block, chosen, tail[cut], motor[cut], reading, free=free, calibrated=calibrated)
+        _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
         for cut, block in batch.blocks(_BLOCK)
     ]
     return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+
+
+def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
+    """Refuse a free motion that the torque balance about the motor axis does not decide.
+
+    Raises:
+        InputError: for a model that does not know all entries, or a drive that does not turn about the motor axis.
+    """
+    check_full(model)
+    if batch.drive == "magnetic":
+        raise InputError(
+            "motion = 'free' with drive.kind = 'magnetic': the field does not turn the robot about its own axis then; "
+            "allowed: motion 'held', or `magnetic-sweep` and `simulate` for the free robot"
+        )
 
 
 def speed_difference(check: Swimming, result: Swimming) -> PerRobot:
@@ -216,36 +156,49 @@ def _swim_block(
     tail_rate: PerRobot,
     motor_rate: PerRobot,
     friction: FrictionReading,
-    *,
-    free: bool,
-    calibrated: bool,
+    motion: Motion,
+    driven_freely: bool,  # noqa: FBT001 - passed on by the one caller
+    calibrated: bool,  # noqa: FBT001
 ) -> Swimming:
     valid = batch.known & all_hold(requirements(batch, model))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        balance = calibrated_balance(batch, model, calibrated=calibrated)
+        shared = None
+        if motion == "held":
+            balance = calibrated_balance(batch, model, calibrated=calibrated)
+        else:
+            balance, shared = released(calibrated_resistance(batch, model, calibrated=calibrated))
         if batch.joint == "fixed":
             state = one_piece(batch, balance, tail_rate)
-        elif free:
+        elif driven_freely:
             state = driven(batch, balance, friction)
         else:
             state = at_rate(batch, balance, tail_rate, motor_rate, friction)
-        return _answer(batch, balance, state, valid, model.mean_flow(batch))
+        screw = None if shared is None else Screw.of(shared, state.body_rate, state.tail_rate)
+        return _answer(batch, balance, state, screw, valid, model.mean_flow(batch))
 
 
 def _answer(
-    batch: RobotBatch, s: TorqueBalance, state: DriveState, valid: Flags, mean_flow: MeanFlow | None
+    batch: RobotBatch,
+    s: TorqueBalance,
+    state: DriveState,
+    screw: Screw | None,
+    valid: Flags,
+    mean_flow: MeanFlow | None,
 ) -> Swimming:
     body_rate, tail_rate = state.body_rate, state.tail_rate
-    speed = s.speed(body_rate, tail_rate)
+    speed = s.speed(body_rate, tail_rate) if screw is None else screw.speed
     slip = tail_rate - body_rate
     load = s.rotor_load(body_rate, tail_rate)
     dissipated = load * tail_rate + s.body_load(body_rate, tail_rate) * body_rate
     if batch.joint == "fixed":
         drive = load + s.body_load(body_rate, tail_rate)
-        shaft = drive * tail_rate
+        # The mean power of a slipping robot is its mean torque times the rate of the field, not times its own.
+        from_field = ~np.isnan(state.driving_rate)
+        shaft = drive * np.where(from_field, state.driving_rate, tail_rate)
+        dissipated = np.where(from_field, shaft, dissipated)
     else:
         drive, shaft = load, load * slip
-    drag, _ = body_axial(batch)
+    towing = body_axial(batch)[0] * speed**2
     motor, current = batch.electrics, state.current
     none: PerRobot = np.full(1, np.nan)
     voltage = electrical = lasting = none
@@ -269,10 +222,17 @@ def _answer(
         "shaft_power": shaft,
         "friction_power": state.torques.power(body_rate, tail_rate),
         "dissipated_power": dissipated,
-        "hydrodynamic_efficiency": drag * speed**2 / shaft,
+        "hydrodynamic_efficiency": towing / shaft,
+        "propulsive_power": towing,
+        "overall_efficiency": towing / electrical,
+        "cost_of_transport": np.where(np.isnan(electrical), shaft, electrical) / (_weight(batch) * np.abs(speed)),
         "reynolds_number": batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity,
         "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
         "battery_run_time": lasting,
+        "wobble_angle": none if screw is None else screw.tilt,
+        "path_radius": none if screw is None else screw.radius,
+        "step_out_rate": state.step_out,
+        "phase_lag": state.lag,
         "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
     }
     # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
@@ -285,6 +245,12 @@ def _answer(
         **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
         valid=np.array(np.broadcast_to(moving, (size,))),
     )
+
+
+def _weight(batch: RobotBatch) -> PerRobot:
+    """Weight of the whole robot in vacuum, N; NaN where its masses are not known."""
+    wire = 0.25 * np.pi * batch.wire_diameter**2 * batch.arc_length
+    return STANDARD_GRAVITY * (batch.body_mass + batch.tail_density * wire)
 
 
 def _plug_velocity(mean_flow: MeanFlow, speed: PerRobot, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:

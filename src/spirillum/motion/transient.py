@@ -21,21 +21,22 @@ from spirillum.errors import InputError
 from spirillum.motion.balance import friction_torques, rates_per_torque
 from spirillum.motion.motor import battery_voltage, winding_resistance
 from spirillum.motion.prediction import Prediction, predict
+from spirillum.motion.remote import schedule, windows_of
+from spirillum.motion.sampling import duration_of, sample_times
 from spirillum.motion.swimming import calibrated_balance
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, parse_option, show
+from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AxialResponse", "MotorTransient", "axial_response", "motor_transient", "simulate"]
+__all__ = ["AxialResponse", "MotorTransient", "axial_response", "motor_transient", "swim_in_time"]
 
 _TOLERANCE = 1e-9
 # Orders above 4 have so small a region of stability that the decay with L/R needs ten times the steps.
 _HIGHEST_ORDER = 4
 _MOST_TIME_CONSTANTS = 1e6
-_LARGEST_SAMPLES = 1_000_000
 
 
 class AxialResponse(NamedTuple):
@@ -184,7 +185,7 @@ def _segment(
     return block, np.array(last)
 
 
-def simulate(
+def swim_in_time(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = "sbt",
@@ -194,10 +195,11 @@ def simulate(
     turns: float = 3.0,
     duration: str | float | None = None,
     on: Sequence[tuple[str | float, str | float]] | None = None,
+    duty: str | Path | None = None,
     samples_per_turn: int = 100,
     accuracy: str | None = None,
 ) -> xr.Dataset:
-    """Simulate axial swimming (two degrees of freedom) from rest.
+    """Axial swimming (two degrees of freedom) from rest: `spirillum.simulate` with `motion="held"`.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
@@ -209,6 +211,7 @@ def simulate(
         duration: length of the run instead, with its unit (``"2 s"``) or a float in s.
         on: times (start, stop) between which the remote switches the motor on, each with its unit (``"2 s"``) or a
             float in s; None: on throughout.
+        duty: duty file instead, see `spirillum.motion.remote`.
         samples_per_turn: samples of the output per steady turn of the tail.
         accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
 
@@ -228,56 +231,12 @@ def simulate(
     if prediction.tail_rotation_rate == 0:
         raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
-    end = _duration(turns, turn, duration)
-    time = _sample_times(end, turn, samples_per_turn)
-    windows = (
-        None
-        if on is None
-        else [(parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in on]
-    )
-    switches = _switches(windows, float(batch.electrics.duty[0]), end)
+    end = duration_of(turns, turn, duration)
+    time = sample_times(end, turn, samples_per_turn)
+    switches = schedule(windows_of(on), duty, float(batch.electrics.duty[0]), end)
     response = axial_response(batch, prediction)
     transient = motor_transient(batch.electrics, response.slip, time, switches)
     return _dataset(prediction, batch.electrics, response, transient, switches)
-
-
-def _duration(turns: float, turn: float, duration: str | float | None) -> float:
-    if duration is None:
-        if not 0 < turns <= 1e5:
-            raise InputError(f"turns = {turns}; allowed: more than 0, at most 1e5")
-        return turns * turn
-    end = parse_option("duration", duration, KINDS["time"])
-    if end <= 0:
-        raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
-    return end
-
-
-def _sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
-    count = math.ceil(end / turn * samples_per_turn)
-    if not 1 <= samples_per_turn <= 10_000 or count > _LARGEST_SAMPLES:
-        raise InputError(
-            f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: 1 to 10000 a turn and "
-            f"{_LARGEST_SAMPLES} in all"
-        )
-    return np.linspace(0.0, end, max(count, 1) + 1)
-
-
-def _switches(on: Sequence[tuple[float, float]] | None, duty: float, end: float) -> list[tuple[float, float]]:
-    """(time, duty) of every switching within the run, the first at 0."""
-    if on is None:
-        return [(0.0, duty)]
-    switches: list[tuple[float, float]] = [(0.0, 0.0)]
-    before = 0.0
-    for start, stop in on:
-        if not before <= start < stop:
-            raise InputError(f"on = {start:g} s to {stop:g} s; allowed: increasing times from 0 s, start before stop")
-        before = stop
-        for time, value in ((start, duty), (stop, 0.0)):
-            if switches[-1][0] == time:
-                switches[-1] = (time, value)
-            elif time < end:
-                switches.append((time, value))
-    return switches
 
 
 def _dataset(
@@ -342,8 +301,9 @@ def _dataset(
             "calibrated": int(prediction.calibrated),
             "error_estimate": prediction.error_estimate,
             "known_error": prediction.model.stated_error(prediction.robot.model),
-            "motion": "axial",
+            "motion": "held",
             "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
+            "events": json.dumps([{"time": time, "what": f"duty {duty:g}"} for time, duty in switches]),
             "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
             "integrator": f"VODE Adams, order up to {_HIGHEST_ORDER}, relative tolerance {_TOLERANCE:g}",
             "references": " ".join(prediction.references),

@@ -79,7 +79,17 @@ _NO_DATE: dict[str, dict[str, Any]] = {
 }
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
-_PREFIXES = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"))
+_PREFIXES = (
+    (1e-18, "a"),
+    (1e-15, "f"),
+    (1e-12, "p"),
+    (1e-9, "n"),
+    (1e-6, "µ"),
+    (1e-3, "m"),
+    (1.0, ""),
+    (1e3, "k"),
+    (1e6, "M"),
+)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -11,6 +12,10 @@ from spirillum.robot.fields import (
     Charge,
     Inductance,
     InverseCurrent,
+    Length,
+    MagneticField,
+    MagneticMoment,
+    MomentAngle,
     Rate,
     Resistance,
     ResistancePerCurrent,
@@ -21,7 +26,9 @@ from spirillum.robot.fields import (
     Voltage,
 )
 
-__all__ = ["Battery", "Drive", "Friction", "FrictionReading", "Motor", "MotorResistance"]
+__all__ = ["Battery", "Drive", "DriveKind", "Friction", "FrictionReading", "Magnetic", "Motor", "MotorResistance"]
+
+DriveKind = Literal["dc-motor", "rate", "torque", "magnetic"]
 
 FrictionReading = Literal["none", "rotor", "body", "paper"]
 
@@ -29,8 +36,8 @@ FrictionReading = Literal["none", "rotor", "body", "paper"]
 class Drive(Section):
     """What turns the tail, and the joint between tail and body."""
 
-    kind: Literal["dc-motor", "rate", "torque"]
-    """`dc-motor` (the motor and battery of the file), `rate` or `torque` (prescribed)."""
+    kind: DriveKind
+    """`dc-motor` (motor and battery of the file), `rate` or `torque` (prescribed), `magnetic` (a rotating field)."""
     joint: Literal["revolute", "fixed"] = "revolute"
     """`revolute`: the tail turns against the body; `fixed`: one piece, driven from outside."""
     rate: Rate | None = None
@@ -73,6 +80,8 @@ class Motor(Section):
     """Equivalent resistance R(I) of motor and driver (Table II)."""
     polarity: Literal["forward", "reverse"] = "forward"
     """`forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
+    shaft_diameter: Length | None = None
+    """Diameter of the shaft (Table I's rotor), for pictures and exports only; unset: the wire's."""
 
 
 class Battery(Section):
@@ -84,6 +93,19 @@ class Battery(Section):
     """Voltage lost per current."""
     capacity: Charge | None = None
     """Rated charge."""
+
+
+class Magnetic(Section):
+    """A magnet fixed in the robot, and the uniform field that turns it about the lab's x axis."""
+
+    moment: MagneticMoment
+    """Magnetic moment m of the robot, fixed in it."""
+    moment_angle: MomentAngle = 0.5 * pi
+    """Angle between the moment and the motor axis, towards +z at rest; 90 deg (the default) is across the axis."""
+    field: MagneticField
+    """Flux density B of the field, which is at right angles to its axis of rotation."""
+    rotation_rate: Rate
+    """Rotation rate of the field about +x in the lab."""
 
 
 class Friction(Section):

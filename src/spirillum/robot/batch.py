@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Flags, PerRobot
 from spirillum.errors import InputError
 from spirillum.robot import geometry
-from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.actuation import DriveKind, FrictionReading
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.parts import End, Shape
 from spirillum.robot.placement import Placement
@@ -43,6 +43,12 @@ _COLUMNS: dict[str, tuple[str, float]] = {
     "effective_friction": ("friction.effective", np.nan),
     "drive_rate": ("drive.rate", np.nan),
     "drive_torque": ("drive.torque", np.nan),
+    "magnetic_moment": ("magnetic.moment", np.nan),
+    "moment_angle": ("magnetic.moment_angle", np.nan),
+    "magnetic_field": ("magnetic.field", np.nan),
+    "field_rate": ("magnetic.rotation_rate", np.nan),
+    "body_mass": ("body.mass", np.nan),
+    "tail_density": ("tail.density", np.nan),
 }
 _ELECTRIC_COLUMNS: dict[str, tuple[str, float]] = {
     "torque_constant": ("motor.torque_constant", np.nan),
@@ -123,6 +129,12 @@ class RobotBatch:
     effective_friction: PerRobot
     drive_rate: PerRobot
     drive_torque: PerRobot
+    magnetic_moment: PerRobot
+    moment_angle: PerRobot
+    magnetic_field: PerRobot
+    field_rate: PerRobot
+    body_mass: PerRobot
+    tail_density: PerRobot
     hand: PerRobot
     electrics: Electrics | None
     calibration: Mapping[str, CalibrationFactors]
@@ -130,7 +142,7 @@ class RobotBatch:
     front: End | None
     rear: End | None
     options: ModelOptions
-    drive: Literal["dc-motor", "rate", "torque"] | None
+    drive: DriveKind | None
     joint: Literal["revolute", "fixed"]
     friction: FrictionReading
     placement: Placement
@@ -258,9 +270,27 @@ def _cut(struct: _S, cut: slice) -> _S:
     return type(struct)(**{f.name: part(getattr(struct, f.name)) for f in fields(struct)})
 
 
-_MAY_BE_UNSET = ("model.rft.axis_height", "friction.effective", "drive.rate", "drive.torque")
-_MAY_BE_ZERO = ("coupling.diameter", "coupling.length", "coupling.clearance", "body.fillet", "friction.effective")
-_OF_ANY_SIGN = ("drive.rate", "drive.torque")
+_MAY_BE_UNSET = (
+    "model.rft.axis_height",
+    "friction.effective",
+    "drive.rate",
+    "drive.torque",
+    "magnetic.moment",
+    "magnetic.moment_angle",
+    "magnetic.field",
+    "magnetic.rotation_rate",
+    "body.mass",
+    "tail.density",
+)
+_MAY_BE_ZERO = (
+    "coupling.diameter",
+    "coupling.length",
+    "coupling.clearance",
+    "body.fillet",
+    "friction.effective",
+    "magnetic.moment_angle",
+)
+_OF_ANY_SIGN = ("drive.rate", "drive.torque", "magnetic.rotation_rate")
 _INFINITE = ("tail.taper", "channel.diameter", "channel.length")
 
 

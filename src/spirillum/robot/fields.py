@@ -22,7 +22,10 @@ __all__ = [
     "InverseCurrent",
     "Length",
     "LengthOrZero",
+    "MagneticField",
+    "MagneticMoment",
     "Mass",
+    "MomentAngle",
     "Pitch",
     "Rate",
     "Resistance",
@@ -123,6 +126,9 @@ Torque = Annotated[float, *_quantity("torque")]
 Pitch = Annotated[float, *_quantity("pitch")]
 Velocity = Annotated[float, *_quantity("velocity")]
 RotaryFriction = Annotated[float, *_quantity("rotary friction")]
+MagneticMoment = Annotated[float, *_quantity("magnetic moment")]
+MagneticField = Annotated[float, *_quantity("magnetic field")]
+MomentAngle = Annotated[float, *_quantity("moment angle")]
 Voltage = Annotated[float, *_quantity("voltage")]
 Resistance = Annotated[float, *_quantity("resistance")]
 Inductance = Annotated[float, *_quantity("inductance")]

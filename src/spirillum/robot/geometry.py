@@ -15,7 +15,6 @@ __all__ = [
     "arc_fraction",
     "arc_length",
     "body_volume",
-    "body_volume_centroid",
     "centreline",
     "coil_spacing",
     "pitch_angle",
@@ -128,16 +127,6 @@ def _end_volume(end: End | None, radius: Values, fillet: Values) -> Values:
     return 0.0 * radius
 
 
-def _end_moment(end: End | None, radius: Values, fillet: Values) -> Values:
-    """Volume moment of an end about the plane where it joins the straight part."""
-    if end == "hemisphere":
-        return 0.25 * np.pi * radius**4
-    if end == "fillet":
-        core = radius - fillet
-        return np.pi * (0.5 * core**2 * fillet**2 + 2.0 / 3.0 * core * fillet**3 + 0.25 * fillet**4)
-    return 0.0 * radius
-
-
 def shortest_body(diameter: Values, fillet: Values, front: End | None, rear: End | None) -> Values:
     """Sum of the heights of both ends: no capsule or cylinder can be shorter, m."""
     radius = 0.5 * diameter
@@ -158,28 +147,3 @@ def body_volume(
         return 4.0 / 3.0 * np.pi * radius**2 * (0.5 * length)
     straight = length - shortest_body(diameter, fillet, front, rear)
     return np.pi * radius**2 * straight + _end_volume(front, radius, fillet) + _end_volume(rear, radius, fillet)
-
-
-def body_volume_centroid(
-    shape: Shape,
-    diameter: Values,
-    length: Values,
-    fillet: Values,
-    front: End | None,
-    rear: End | None,
-) -> Values:
-    """X of the body's volume centroid from its mid-length, m (positive towards the nose)."""
-    radius = 0.5 * diameter
-    if shape in ("sphere", "spheroid"):
-        return 0.0 * radius
-    x_front = 0.5 * length - _end_height(front, radius, fillet)
-    x_rear = -0.5 * length + _end_height(rear, radius, fillet)
-    straight = np.pi * radius**2 * 0.5 * (x_front**2 - x_rear**2)
-    moment = (
-        straight
-        + _end_volume(front, radius, fillet) * x_front
-        + _end_moment(front, radius, fillet)
-        + _end_volume(rear, radius, fillet) * x_rear
-        - _end_moment(rear, radius, fillet)
-    )
-    return moment / body_volume(shape, diameter, length, fillet, front, rear)

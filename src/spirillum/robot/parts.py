@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, WithJsonSchema
 
 from spirillum.robot.fields import Density, Length, LengthOrZero, Mass, Section, Viscosity
 
-__all__ = ["Body", "Channel", "ChannelOrNone", "Coupling", "End", "Fluid", "Shape", "Tail"]
+__all__ = [
+    "Body",
+    "Channel",
+    "ChannelOrNone",
+    "Coupling",
+    "End",
+    "Fluid",
+    "Seal",
+    "SealOrNone",
+    "Shape",
+    "StripeColour",
+    "Tail",
+]
 
 
 def _read_taper(value: Any) -> float | None:
@@ -26,6 +38,22 @@ def _read_channel(value: Any) -> Any:
         raise ValueError("'none', or a [channel] table")  # noqa: TRY004 - pydantic collects ValueError only
     return value
 
+
+def _read_seal(value: Any) -> Any:
+    if value == "none":
+        return None
+    if not isinstance(value, (dict, Seal)):
+        raise ValueError("'none', or a [seal] table")  # noqa: TRY004 - pydantic collects ValueError only
+    return value
+
+
+def _read_stripes(value: Any) -> Any:
+    if not isinstance(value, (list, tuple)) or len(value) == 1 or len(value) > _MOST_STRIPES:
+        raise ValueError(f"a list of 2 to {_MOST_STRIPES} names of colours, or an empty one")
+    return tuple(value)
+
+
+_MOST_STRIPES = 48
 
 Taper = Annotated[
     float | None,
@@ -77,6 +105,27 @@ class Body(Section):
     def rear_end(self) -> End | None:
         """Rear end in force; None for a sphere or spheroid, which have no ends of their own."""
         return self.rear or _DEFAULT_END.get(self.shape)
+
+
+StripeColour = Literal["red", "yellow", "green", "blue", "white", "black", "orange", "magenta", "cyan"]
+
+Stripes = Annotated[
+    tuple[StripeColour, ...],
+    BeforeValidator(_read_stripes),
+    WithJsonSchema({"type": "array", "items": {"enum": list(get_args(StripeColour))}, "maxItems": _MOST_STRIPES}),
+]
+
+
+class Seal(Section):
+    """The rear part of the body's surface and its stripes, by which a camera sees the body turn; for pictures only."""
+
+    length: Length
+    """Axial length from the body's rear."""
+    stripes: Stripes = ()
+    """Colours of equally wide stripes around; the first is centred on +z, the next follow from there towards -y."""
+
+
+SealOrNone = Annotated[Seal | None, BeforeValidator(_read_seal)]
 
 
 class Coupling(Section):

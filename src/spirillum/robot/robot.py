@@ -8,13 +8,13 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.robot import geometry
-from spirillum.robot.actuation import Battery, Drive, Friction, Motor
+from spirillum.robot.actuation import Battery, Drive, Friction, Magnetic, Motor
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import Section, Text
 from spirillum.robot.limits import assembly_limits, broken
+from spirillum.robot.links import links_of, robot_solids
 from spirillum.robot.options import Calibrations, ModelOptions
-from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, Tail
+from spirillum.robot.parts import Body, ChannelOrNone, Coupling, Fluid, SealOrNone, Tail
 
 __all__ = ["STANDARD_GRAVITY", "Derived", "Robot"]
 
@@ -44,6 +44,8 @@ class Robot(Section):
     """Where its numbers come from."""
     body: Body
     """The body."""
+    seal: SealOrNone = None
+    """The striped seal at the body's rear, or `none` (here None) for a plain body; pictures and exports show it."""
     coupling: Coupling = Coupling()
     """The coupling between motor and tail."""
     tail: Tail
@@ -58,6 +60,8 @@ class Robot(Section):
     """The motor of a `dc-motor` drive."""
     battery: Battery | None = None
     """The battery of a `dc-motor` drive."""
+    magnetic: Magnetic | None = None
+    """The magnet and the rotating field of a `magnetic` drive."""
     friction: Friction = Friction()
     """Rotary friction."""
     model: ModelOptions = ModelOptions()
@@ -122,6 +126,14 @@ class Robot(Section):
             problems.append(
                 f"drive.duty = {drive.duty:g} with drive.kind = '{drive.kind}'; allowed: only for 'dc-motor'"
             )
+        magnetic = drive.kind == "magnetic"
+        if magnetic and drive.joint == "revolute":
+            problems.append("drive.joint = 'revolute' with drive.kind = 'magnetic'; allowed: 'fixed'")
+        if magnetic != (self.magnetic is not None):
+            problems.append(
+                f"magnetic is {'missing' if magnetic else 'set'} with drive.kind = '{drive.kind}'; "
+                "allowed: a [magnetic] table exactly when drive.kind = 'magnetic'"
+            )
         for kind in ("rate", "torque"):
             given = getattr(drive, kind) is not None
             if given != (drive.kind == kind):
@@ -162,51 +174,39 @@ class Robot(Section):
         Weight and centre of mass need `body.mass` and `tail.density`; without them they are left out. The
         centre of mass assumes that the measured mass is spread evenly over body and coupling.
         """
-        batch, tail, coupling = RobotBatch.of(self), self.tail, self.coupling
+        batch, tail = RobotBatch.of(self), self.tail
         alpha, arc = float(batch.arc_fraction[0]), float(batch.arc_length[0])
-        wire = 0.25 * np.pi * tail.wire_diameter**2 * arc
-        solid = max(coupling.length - 2 * coupling.clearance, 0.0)
-        coupling_volume = 0.25 * np.pi * coupling.diameter**2 * solid
-        body = float(batch.body_volume[0])
-        volume = body + coupling_volume + wire
+        solids, links = robot_solids(self), links_of(self)
+        coupling = solids["coupling"].volume if "coupling" in solids else 0.0
+        volumes = np.array([link.volume for link in links])
+        volume = float(np.sum(volumes))
         found = {
             "arc_fraction": Derived(alpha, "1", "alpha: axial over arc length of the tail"),
             "pitch_angle": Derived(float(np.arccos(alpha)), "rad", "angle between wire and tail axis"),
             "turns": Derived(tail.length / tail.wavelength, "1", "number of turns of the tail"),
             "arc_length": Derived(arc, "m", "arc length of the wire (plain helix)"),
             "robot_length": Derived(
-                self.body.length + coupling.length + tail.length, "m", "body, coupling and tail together"
+                self.body.length + self.coupling.length + tail.length, "m", "body, coupling and tail together"
             ),
-            "body_volume": Derived(body, "m^3", "volume of the body"),
-            "coupling_volume": Derived(coupling_volume, "m^3", "volume of the coupling's solid"),
-            "wire_volume": Derived(wire, "m^3", "volume of the wire"),
+            "body_volume": Derived(solids["body"].volume, "m^3", "volume of the body"),
+            "coupling_volume": Derived(coupling, "m^3", "volume of the coupling's solid"),
+            "wire_volume": Derived(solids["tail"].volume, "m^3", "volume of the wire, its bend at the root included"),
             "displaced_volume": Derived(volume, "m^3", "volume of body, coupling and wire"),
         }
-        if self.body.mass is not None and tail.density is not None:
-            found |= self._weight(volume, body, coupling_volume, wire, tail.density * wire, self.body.mass)
-        return found
-
-    def _weight(
-        self, volume: float, body: float, coupling_volume: float, wire: float, wire_mass: float, measured: float
-    ) -> dict[str, Derived]:
-        b = RobotBatch.of(self)
-        x_body = float(
-            geometry.body_volume_centroid(b.shape, b.body_diameter, b.body_length, b.fillet, b.front, b.rear)[0]
-        )
-        x_coupling = -0.5 * self.body.length - 0.5 * self.coupling.length
-        x_wire = -float(b.root[0]) - 0.5 * self.tail.length
-        x_main = (body * x_body + coupling_volume * x_coupling) / (body + coupling_volume)
-        mass = measured + wire_mass
-        buoyancy = self.fluid.density * volume
-        x_buoyancy = (body * x_body + coupling_volume * x_coupling + wire * x_wire) / volume
-        return {
-            "tail_mass": Derived(wire_mass, "kg", "mass of the wire"),
+        if self.body.mass is None or tail.density is None:
+            return found
+        masses = np.array([link.mass for link in links])
+        mass = float(np.sum(masses))
+        centre = masses @ np.array([link.centre[0] for link in links]) / mass
+        buoyancy = volumes @ np.array([link.centroid[0] for link in links]) / volume
+        return found | {
+            "tail_mass": Derived(tail.density * solids["tail"].volume, "kg", "mass of the wire"),
             "mass": Derived(mass, "kg", "mass of the robot"),
-            "submerged_weight": Derived((mass - buoyancy) * STANDARD_GRAVITY, "N", "weight less buoyancy"),
-            "centre_of_mass": Derived(
-                (measured * x_main + wire_mass * x_wire) / mass,
-                "m",
-                "x of the centre of mass (assumes body.mass spread evenly over body and coupling)",
+            "submerged_weight": Derived(
+                (mass - self.fluid.density * volume) * STANDARD_GRAVITY, "N", "weight less buoyancy"
             ),
-            "centre_of_buoyancy": Derived(x_buoyancy, "m", "x of the centre of buoyancy"),
+            "centre_of_mass": Derived(
+                float(centre), "m", "x of the centre of mass (assumes body.mass spread evenly over body and coupling)"
+            ),
+            "centre_of_buoyancy": Derived(float(buoyancy), "m", "x of the centre of buoyancy"),
         }

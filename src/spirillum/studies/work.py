@@ -15,7 +15,8 @@ from spirillum.files import whole_file
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
 from spirillum.motion.intervals import PosteriorFile, intervals_of
 from spirillum.motion.prediction import accuracy_limits
-from spirillum.motion.swimming import Swimming, requirements, speed_difference, swim
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import requirements, speed_difference, swim
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.robot.limits import broken

@@ -1,0 +1,78 @@
+"""How much faster than real time does a warm free run of the paper's robot go, and than SciPy's integrator?
+
+The run is 100 turns at the tail's rate of the paper's order (1.3 Hz), on the floor of the wide channel, with all of its
+energies and the labelled dataset. The baseline integrates the same compiled right-hand side by `scipy.integrate`.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+
+import spirillum as sp
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.kernels import two_links as kernel
+from spirillum.motion.start import start_state
+from spirillum.motion.trajectory import TOLERANCE
+from spirillum.motion.two_links import two_links
+from spirillum.robot.placement import Placement
+
+TURNS = 100.0
+
+
+def best(function, repeats: int) -> float:
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def main() -> None:
+    from scipy.integrate import solve_ivp
+
+    robot = sp.load("biorob2012-wide", **{"friction.effective": "1.1e-5 N m s/rad"})
+    run = sp.simulate(robot, turns=TURNS)
+    simulated = float(run["time"][-1])
+    whole = best(lambda: sp.simulate(robot, turns=TURNS), 10)
+    links = two_links(
+        robot,
+        sp.RobotBatch.of(robot),
+        find_swimmer_model("rft"),
+        friction="rotor",
+        effective=1.1e-5,
+        calibrated=True,
+        weight=True,
+        roughness=None,
+    )
+    data, dy = links.data, np.empty(kernel.STATES)
+
+    def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
+        kernel.rates(dy, t, y, data)
+        return dy.copy()
+
+    start = start_state(robot, Placement(), lying=True)
+    scipy_time = best(
+        lambda: solve_ivp(right_hand_side, (0.0, simulated), start, method="RK45", rtol=TOLERANCE, atol=1e-11), 2
+    )
+    print(
+        json.dumps(
+            {
+                "question": "warm free run of 100 turns against real time and against scipy.integrate",
+                "simulated_s": simulated,
+                "whole_run_with_dataset_s": whole,
+                "scipy_same_right_hand_side_s": scipy_time,
+                "real_time_factor": simulated / whole,
+                "ratio_to_scipy": scipy_time / whole,
+                "target_real_time_factor": 1000,
+            },
+            indent=2,
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,179 @@
+"""The commands of motion in time: `spirillum simulate` and `spirillum magnetic-sweep`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.options import (
+    Accuracy,
+    Calibration,
+    Friction,
+    Json,
+    Motion,
+    NoCalibration,
+    Output,
+    RobotArgument,
+    Settings,
+    complete_models,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["magnetic_sweep", "simulate"]
+
+_FullModel = Annotated[
+    str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: rft or slender; held also sbt, tube.")
+]
+
+
+def simulate(
+    robot: RobotArgument,
+    output: Output,
+    model: _FullModel = "rft",
+    motion: Motion = "free",
+    friction: Friction = None,
+    turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail (of the field).")] = 3.0,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.")
+    ] = None,
+    on: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FROM:TO", help="When the remote switches the drive on, such as 0s:2s; repeatable."),
+    ] = None,
+    duty: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Duty over time instead: CSV with the columns time_s, duty.")
+    ] = None,
+    gap: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Free: smallest distance of body and wall at the start; else 1/18 of the body's radius.",
+        ),
+    ] = None,
+    eccentricity: Annotated[
+        float | None, typer.Option(help="Free, instead of --gap: the body's offset towards the floor over R - a.")
+    ] = None,
+    pitch: Annotated[
+        str | None, typer.Option(metavar="ANGLE", help="Free: angle by which the nose is raised at the start.")
+    ] = None,
+    no_weight: Annotated[bool, typer.Option("--no-weight", help="Free: leave weight and buoyancy out.")] = False,
+    roughness: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Free: roughness under the robot, else 1e-4 of its radius.")
+    ] = None,
+    samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.")] = None,
+    movie: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).")
+    ] = None,
+    no_calibration: NoCalibration = False,
+    calibration: Calibration = None,
+    accuracy: Accuracy = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Simulate swimming from rest: six degrees of freedom, weight, floor, motor and remote; or two (`--motion held`).
+
+    Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
+    """
+    from spirillum.cli import simulation_text, text
+    from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
+    from spirillum.motion.simulation import simulate as answer
+
+    target = netcdf_target(output)
+    picture = None if plot is None else output_target(plot, PICTURES, "run.png")
+    if movie is not None:
+        _check_movie(movie)
+    loaded = loaded_robot(robot, settings)
+    with text.progress_bar(quiet=json) as progress:
+        dataset = answer(
+            loaded,
+            model=model,
+            motion=motion,
+            friction=friction,
+            turns=turns,
+            duration=duration,
+            on=[text.time_window(window) for window in on] if on else None,
+            duty=duty,
+            samples_per_turn=samples_per_turn,
+            calibrated=not no_calibration,
+            calibration=calibration,
+            accuracy=accuracy,
+            placement=placement_from(gap, eccentricity, pitch, None, None, None),
+            weight=not no_weight,
+            roughness=roughness,
+            progress=progress,
+        )
+        write_dataset(dataset, target)
+        more = _drawn(dataset, picture, movie, progress)
+    text.show(simulation_text.simulation_answer(dataset, output, more), simulation_text.simulation, json=json)
+
+
+def _check_movie(movie: Path) -> None:
+    """Refuse a film that cannot be written before anything is computed."""
+    from spirillum.files import output_target
+    from spirillum.render.encode import FILMS
+    from spirillum.render.window import required
+
+    output_target(movie, FILMS, "run.mp4")
+    for package in ("pyvista", "av"):
+        required(package, "a film")
+
+
+def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progress: Any) -> dict[str, Any]:
+    """Draw and film a run; the files by what they are, and the film's warnings."""
+    files: dict[str, Any] = {}
+    if picture is not None:
+        from spirillum.plots.style import save_as
+        from spirillum.plots.trajectory import trajectory_figure
+
+        save_as(trajectory_figure(dataset), picture)
+        files["plot"] = str(picture)
+    if movie is not None:
+        from spirillum.render.film import film
+
+        files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)
+        files["movie"] = str(movie)
+    return files
+
+
+def magnetic_sweep(
+    robot: RobotArgument,
+    output: Output,
+    rate: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RATE", help="Rate of the field, such as 2Hz; repeatable, increasing; else 40 of them."),
+    ] = None,
+    model: Annotated[
+        str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: rft or slender.")
+    ] = "rft",
+    turns: Annotated[float, typer.Option(help="Turns of the field at each rate; the second half is averaged.")] = 60.0,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it too: .png, .pdf or .svg.")] = None,
+    accuracy: Accuracy = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Sweep the rate of a rotating field: speed, phase lag, wobble and step-out of a free one-piece swimmer.
+
+    Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
+    """
+    from spirillum.cli import simulation_text, text
+    from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
+    from spirillum.motion.magnetic_sweep import magnetic_sweep as answer
+
+    target = netcdf_target(output)
+    picture = None if plot is None else output_target(plot, PICTURES, "sweep.png")
+    loaded = loaded_robot(robot, settings)
+    with text.progress_bar(quiet=json) as progress:
+        dataset = answer(loaded, rate, model=model, turns=turns, accuracy=accuracy, progress=progress)
+    write_dataset(dataset, target)
+    if picture is not None:
+        from spirillum.plots.magnetic import magnetic_figure
+        from spirillum.plots.style import save_as
+
+        save_as(magnetic_figure(dataset), picture)
+    text.show(simulation_text.sweep_answer(dataset, output, plot), simulation_text.sweep, json=json)

@@ -1,0 +1,117 @@
+"""The commands `spirillum show` and `spirillum film`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.options import Json, RobotArgument, Settings
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+__all__ = ["film", "show"]
+
+_VIEWS = ("front", "perspective", "rear", "side", "top")
+
+
+def _complete_views(incomplete: str) -> list[str]:
+    return [name for name in _VIEWS if name.startswith(incomplete)]
+
+
+def _complete_cameras(incomplete: str) -> list[str]:
+    return [name for name in ("auto", "fixed", "follow") if name.startswith(incomplete)]
+
+
+_View = Annotated[
+    str, typer.Option(autocompletion=_complete_views, help="perspective, or to scale: side, top, front, rear.")
+]
+
+
+def show(
+    robot: RobotArgument,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="The picture (PNG); else robot.png.")
+    ] = None,
+    view: _View = "perspective",
+    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the picture.")] = "1600x900",
+    no_channel: Annotated[bool, typer.Option("--no-channel", help="Leave the channel out.")] = False,
+    window: Annotated[
+        bool, typer.Option("--window", help="A window to turn the robot in, instead of a file unless -o names one.")
+    ] = False,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Draw a robot in three dimensions: a picture of its computed geometry. Needs the extra `3d`.
+
+    Example: `spirillum show biorob2012-wide -o robot.png --view side`
+    """
+    from spirillum.cli import text
+    from spirillum.render.show import show as answer
+
+    target = output if output is not None or window else Path("robot.png")
+    found = answer(
+        loaded_robot(robot, settings),
+        target,
+        view=view,
+        phase=text.angle(phase),
+        size=size,
+        channel=not no_channel,
+        window=window,
+    )
+    text.show(found.to_dict(), _picture, json=json)
+
+
+def _picture(answer: Mapping[str, Any], console: Console) -> None:
+    from rich.markup import escape
+
+    size = f"{answer['width']}x{answer['height']} pixels, view {answer['view']}"
+    where = "shown in a window" if answer["file"] is None else escape(answer["file"])
+    console.print(f"{where}: {escape(answer['robot'])}, {size}", highlight=False, soft_wrap=True)
+
+
+def film(
+    run: Annotated[Path, typer.Argument(help="A run (NetCDF), written by `spirillum simulate`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The film: .mp4 or .gif.")],
+    view: _View = "perspective",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the film, even numbers.")] = "1280x720",
+    fps: Annotated[int, typer.Option(help="Frames a second.")] = 30,
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Seconds of the run in a second of film; else 1, or slower where the tail turns fast."),
+    ] = None,
+    camera: Annotated[
+        str,
+        typer.Option(autocompletion=_complete_cameras, help="fixed, follow, or auto: follow a robot that swims far."),
+    ] = "auto",
+    json: Json = False,
+) -> None:
+    """Film a run in three dimensions. Needs the extra `3d`.
+
+    Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
+    """
+    from spirillum.cli import text
+    from spirillum.files import output_target
+    from spirillum.render.encode import FILMS
+    from spirillum.render.film import film as answer
+    from spirillum.render.run_file import open_run
+
+    output_target(output, FILMS, "run.mp4")
+    dataset = open_run(run)
+    with text.progress_bar(quiet=json) as progress:
+        found = answer(dataset, output, view=view, size=size, fps=fps, speed=speed, camera=camera, progress=progress)
+    text.show(found.to_dict(), _film, json=json)
+
+
+def _film(answer: Mapping[str, Any], console: Console) -> None:
+    from rich.markup import escape
+
+    size, fps = f"{answer['width']}x{answer['height']} pixels", answer["frames_per_second"]
+    length = f"{answer['duration']['value']:.3g} s at {fps} frames a second, speed x{answer['speed']:g}"
+    said = f"{answer['frames']} frames of {size}, {length}"
+    console.print(f"{escape(answer['file'])}: {escape(answer['robot'])}, {said}", highlight=False, soft_wrap=True)

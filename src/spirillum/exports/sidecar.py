@@ -1,0 +1,105 @@
+"""What other programs need to move the robot in its fluid: masses, joint, buoyancy and the resistance of both links."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.hydrodynamics.models import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.links import Link, links_of
+from spirillum.robot.robot import STANDARD_GRAVITY, Robot
+
+__all__ = ["FULL_MODELS", "joint_friction", "sidecar_of"]
+
+FULL_MODELS = ("rft", "slender")
+"""Models that know the whole 12x12 in unbounded fluid, for any motion of the robot."""
+
+_UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
+_CONVENTION = (
+    "(F_body, T_body, F_rotor, T_rotor) = -R (U_body, Omega_body, U_rotor, Omega_rotor): force and torque of the fluid "
+    "on each link against velocity and rotation of each link; torques and velocities at the origin, which is the "
+    "body's mid-length on the motor axis; all in the axes of the body (x forward, z up) with the tail at phase 0; "
+    "R is symmetric and positive definite, and units repeat in blocks of 3x3"
+)
+_TURNING = (
+    "at joint angle q, positive about +x, the tail's phase is q + joint.phase_at_zero, and R is Q R Q' with Q four "
+    "blocks of the rotation about x by that phase; the same without turning R: express all velocities in the axes of "
+    "the rotor, and the wrenches come out in them. R does not change with place or attitude"
+)
+
+
+def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
+    """Masses, joint, buoyancy and 12x12 resistance of a robot, SI.
+
+    Args:
+        robot: a checked robot.
+        model: `rft` or `slender`.
+        phase: phase of the tail at joint angle zero, rad.
+
+    Raises:
+        InputError: for another model, or a robot outside the model's domain.
+    """
+    if model not in FULL_MODELS:
+        find_swimmer_model(model)
+        raise InputError(
+            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
+            f"{', '.join(FULL_MODELS)}"
+        )
+    chosen, batch = find_swimmer_model(model), RobotBatch.of(robot)
+    outside = broken(chosen.domain(batch))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
+    matrix = chosen.resistance(batch, np.zeros(1))[0]
+    warnings = [limit.sentence() for limit in broken(chosen.cautions(batch))]
+    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
+        warnings.append(f"model '{model}' leaves the coupling out")
+    links = links_of(robot)
+    content = {
+        "robot": robot.name,
+        "model": model,
+        "known_error": chosen.stated_error(robot.model),
+        "references": list(chosen.references),
+        "viscosity": quantity(robot.fluid.viscosity, "Pa s"),
+        "density": quantity(robot.fluid.density, "kg/m^3"),
+        "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
+        "joint": {
+            "type": "fixed" if _fixed(robot) else "revolute",
+            "origin": quantity([0.0, 0.0, 0.0], "m"),
+            "axis": [1.0, 0.0, 0.0],
+            "phase_at_zero": quantity(phase, "rad"),
+            "friction": quantity(joint_friction(robot), "N m s/rad"),
+        },
+        "links": {"body": _link(links.body), "rotor": _link(links.rotor)},
+        "matrix": {**quantity(matrix, ""), "unit": _UNITS},
+        "convention": _CONVENTION,
+        "turning": _TURNING,
+    }
+    return envelope("links", content, warnings)
+
+
+def _fixed(robot: Robot) -> bool:
+    return robot.drive is not None and robot.drive.joint == "fixed"
+
+
+def joint_friction(robot: Robot) -> float:
+    """Friction inside the joint, N m s/rad; what acts on body or rotor from outside is not in it."""
+    own = robot.motor.rotor_friction if robot.motor is not None else 0.0
+    if robot.friction.reading == "rotor":
+        return own if robot.friction.effective is None else robot.friction.effective
+    return own if robot.friction.reading == "body" else 0.0
+
+
+def _link(link: Link) -> dict[str, Any]:
+    """Of one link, at phase 0 of the tail; null where a mass is not known."""
+    return {
+        "mass": quantity(link.mass, "kg"),
+        "centre_of_mass": quantity(link.centre, "m"),
+        "inertia": quantity(link.inertia, "kg m^2", about="centre_of_mass"),
+        "displaced_volume": quantity(link.volume, "m^3"),
+        "centre_of_buoyancy": quantity(link.centroid, "m"),
+    }

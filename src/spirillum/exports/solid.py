@@ -1,0 +1,94 @@
+"""One watertight body from pieces that overlap, and its STL file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.mesh import RobotMesh
+from spirillum.robot.surface import Faces, mass_properties
+
+__all__ = ["UnitedBody", "is_watertight", "stl_bytes", "united"]
+
+_MERGED = (1e-6, 1e-5, 1e-4)
+"""Edges shorter than this share of the robot's length are taken out: single precision would not tell their ends. The
+first that leaves a watertight body is taken."""
+
+
+class UnitedBody(NamedTuple):
+    """The union of pieces as one closed surface, m."""
+
+    vertices: Samples
+    """(n, 3), m."""
+    faces: Faces
+    """Outward oriented, (m, 3)."""
+    bodies: int
+    """Number of separate bodies; 1 where all pieces hang together."""
+
+    @property
+    def volume(self) -> float:
+        """Volume, m^3."""
+        return mass_properties(self.vertices, self.faces)[0]
+
+
+def united(pieces: Iterable[RobotMesh]) -> UnitedBody:
+    """The union of closed pieces; what lies inside another piece is gone.
+
+    Args:
+        pieces: pieces that overlap where they are joined.
+    """
+    from manifold3d import Manifold, Mesh64, OpType
+
+    chosen = list(pieces)
+    # Scaled to its own length: a robot of micrometres is then no smaller than one of metres.
+    size = float(np.ptp(np.concatenate([piece.vertices for piece in chosen]), axis=0).max())
+    solids = [
+        Manifold(Mesh64(np.ascontiguousarray(piece.vertices / size), piece.faces.astype(np.uint64))) for piece in chosen
+    ]
+    union = Manifold.batch_boolean(solids, OpType.Add)
+    for merged in _MERGED:
+        simple = union.simplify(merged)
+        mesh = simple.to_mesh64()
+        vertices, faces = np.array(mesh.vert_properties[:, :3], dtype=float), np.array(mesh.tri_verts, dtype=np.int64)
+        if is_watertight(vertices, faces):
+            break
+    return UnitedBody(size * vertices, faces, len(simple.decompose()))
+
+
+def is_watertight(vertices: Samples, faces: Faces) -> bool:
+    """Whether each edge belongs to two triangles that run along it in opposite directions.
+
+    Vertices at the same place in single precision count as one, as a reader of the file has to take them.
+
+    Args:
+        vertices: (n, 3).
+        faces: (m, 3).
+    """
+    _, merged = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    joined = merged.reshape(-1)[faces]
+    edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
+    keys, back = edges @ [len(vertices), 1], edges @ [1, len(vertices)]
+    alone = np.unique(keys)
+    return bool(alone.size == keys.size and np.array_equal(alone, np.sort(back)) and np.all(edges[:, 0] != edges[:, 1]))
+
+
+def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:
+    """A binary STL file.
+
+    Args:
+        vertices: in the unit of the file, (n, 3).
+        faces: outward oriented, (m, 3).
+        title: for the head of the file, which has room for 80 characters.
+    """
+    corners = vertices.astype(np.float32)[faces]
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    record = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    record["normal"] = normal / np.where(length > 0, length, 1.0)
+    record["corners"] = corners
+    head = title.encode("ascii", "replace")[:80].ljust(80)
+    return head + np.uint32(len(faces)).tobytes() + record.tobytes()

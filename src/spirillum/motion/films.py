@@ -1,0 +1,109 @@
+"""Where a robot may near the wall of its channel, and what resists there: films of fluid between them.
+
+The gap of two smooth surfaces with relative curvatures 1/R_1 and 1/R_2 is h + x^2/2R_1 + y^2/2R_2. Reynolds' equation
+for surfaces that near each other at speed U is solved exactly by p = 6 mu U/((1/R_1 + 1/R_2) h(x, y)^2), so that the
+film resists with
+
+    F/U = 12 pi mu (R_1 R_2)^(3/2)/((R_1 + R_2) h)          at a point
+    F/U = 3 sqrt(2) pi mu (R_2/h)^(3/2) per length          along a line (R_1 infinite)
+
+In a tube of radius R a body of radius a has R_2 = a R/(R - a). (O. Reynolds, Phil. Trans. R. Soc. 177:157, 1886; the
+line against a plane: D. J. Jeffrey and Y. Onishi, Q. J. Mech. Appl. Math. 34:129, 1981.) Sliding along the wall is not
+resisted by a film: what the walls add to it are the calibration factors, or the model `tube`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+
+__all__ = ["ROUGHNESS_SHARE", "Films", "films_of"]
+
+ROUGHNESS_SHARE = 1e-4
+"""Roughness over the body's radius where none is given: 0.9 micrometres for the paper's robot. Assumed."""
+_SIDE = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
+"""Rings along a straight side and their shares of it: both ends, and points between them (Gauss-Lobatto)."""
+_STIFFEST = 1e8
+"""Largest resistance of a film over that of the robot: numbers stay numbers, and what still creeps is 1e-8 of it."""
+
+
+@dataclass(frozen=True)
+class Films:
+    """Rings of a robot that may near the wall, as `kernels.two_links` reads them."""
+
+    wall: Samples
+    """Radius of the channel (infinite without one), roughness, m; largest resistance of a film, N s/m (3,)."""
+    spots: Samples
+    """Place x, radius, half-length along the axis, resistance, power, reach, 1 for the rotor (n, 7).
+
+    A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not at all
+    beyond its reach, where the resistance in open fluid is all there is.
+    """
+
+
+def films_of(robot: Robot, roughness: float | None, drag: float) -> Films:
+    """The films between a robot and its channel.
+
+    Args:
+        robot: the robot; without a channel it has none.
+        roughness: height of what keeps the surfaces apart, m; None: `ROUGHNESS_SHARE` of the body's radius.
+        drag: resistance of the robot to sideways motion, N s/m.
+    """
+    radius = 0.5 * robot.body.diameter
+    height = ROUGHNESS_SHARE * radius if roughness is None else roughness
+    if robot.channel is None:
+        return Films(np.array([np.inf, height, np.inf]), np.zeros((0, 7)))
+    channel = 0.5 * robot.channel.diameter
+    rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
+    spots = np.array(rows)
+    spots[:, 3] /= spots[:, 5] ** spots[:, 4]
+    return Films(np.array([channel, height, _STIFFEST * drag]), spots)
+
+
+def _across(radius: float, channel: float) -> float:
+    """R_2 of a body of that radius in the channel."""
+    return radius * channel / (channel - radius)
+
+
+def _point(along: float, across: float, viscosity: float) -> float:
+    """Coefficient of 1/h at a point."""
+    return float(12.0 * np.pi * viscosity * (along * across) ** 1.5 / (along + across))
+
+
+def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
+    body, viscosity = robot.body, robot.fluid.viscosity
+    radius, half = 0.5 * body.diameter, 0.5 * body.length
+    across = _across(radius, channel)
+    round_ = {"hemisphere": radius, "fillet": body.fillet or 0.0}
+    if body.shape in ("sphere", "spheroid"):
+        return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius, 0.0]]
+    front, rear = half - round_.get(body.front_end or "", 0.0), -half + round_.get(body.rear_end or "", 0.0)
+    length = front - rear
+    if length < 1e-6 * radius:
+        return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius, 0.0]]
+    line = 3.0 * np.sqrt(2.0) * np.pi * viscosity * across**1.5 * length
+    rings = []
+    for place, share in _SIDE:
+        end = body.front_end if place == 1.0 else body.rear_end if place == -1.0 else None
+        reach = radius if end == "hemisphere" else 0.0
+        x = 0.5 * (front + rear) + 0.5 * length * place
+        rings.append([x, radius, reach, line * share, 1.5, radius, 0.0])
+    return rings
+
+
+def _tail_rings(robot: Robot, channel: float) -> list[list[float]]:
+    """The circle on which the wire turns, where it begins to have its full radius and at its tip.
+
+    The wire touches with its own small radius: its film stops it, and resists little before.
+    """
+    tail = robot.tail
+    wire, root = 0.5 * tail.wire_diameter, 0.5 * robot.body.length + robot.coupling.length
+    radius = tail.amplitude + wire
+    coefficient = _point(wire, _across(wire, channel), robot.fluid.viscosity)
+    settled = 0.0 if tail.taper is None else min(3.0 / tail.taper, 0.5) * tail.length
+    return [[x, radius, 0.0, coefficient, 1.0, radius, 1.0] for x in (-root - settled, -root - tail.length)]

@@ -1,0 +1,127 @@
+"""What the remote control does in a run: switching on and off, or a duty that follows a file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from spirillum.errors import InputError
+from spirillum.files import read_text
+from spirillum.units import KINDS, parse_option
+
+__all__ = ["DUTY_COLUMNS", "Switch", "Window", "read_duty", "schedule", "windows_of"]
+
+DUTY_COLUMNS = ("time_s", "duty")
+"""Columns of a duty file; each row holds until the next one."""
+_WHAT = "a duty file (CSV with the columns time_s and duty)"
+_LARGEST = 64 << 20
+
+Window = tuple[float, float]
+"""Start and stop of a time in which the motor is on, s."""
+
+
+class Switch(NamedTuple):
+    """From a time on, the drive has a duty."""
+
+    time: float
+    """s."""
+    duty: float
+    """0 (off) to 1 (full throttle)."""
+
+
+def windows_of(on: Sequence[tuple[str | float, str | float]] | None) -> list[Window] | None:
+    """Times at which the motor is on, s; None: throughout.
+
+    Raises:
+        InputError: for what is no time.
+    """
+    if on is None:
+        return None
+    return [(parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])) for start, stop in on]
+
+
+def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float, end: float) -> list[Switch]:
+    """Every switching within a run, the first at 0.
+
+    Args:
+        on: times at which the motor has its own duty; None: throughout.
+        table: duty file instead.
+        duty: the drive's own duty.
+        end: length of the run, s.
+
+    Raises:
+        InputError: for times that go back, both ways at once, or a wrong file.
+    """
+    if table is not None:
+        if on is not None:
+            raise InputError(f"on and duty = {str(table)[:80]} are given together; allowed: one of them")
+        return [step for step in read_duty(table) if step.time < end]
+    if on is None:
+        return [Switch(0.0, duty)]
+    switches = [Switch(0.0, 0.0)]
+    before = 0.0
+    for start, stop in on:
+        if not before <= start < stop:
+            raise InputError(f"on = {start:g} s to {stop:g} s; allowed: increasing times from 0 s, start before stop")
+        before = stop
+        for switch in (Switch(start, duty), Switch(stop, 0.0)):
+            if switches[-1].time == switch.time:
+                switches[-1] = switch
+            elif switch.time < end:
+                switches.append(switch)
+    return switches
+
+
+def read_duty(path: str | Path) -> list[Switch]:
+    """Read and check a duty file; before its first row the motor is off.
+
+    Args:
+        path: CSV with the columns `time_s` and `duty`; `#` starts a comment line.
+
+    Raises:
+        InputError: if the file or a cell is wrong; the sentence names file, row and column.
+    """
+    path = Path(path)
+    lines = [(n, line) for n, line in enumerate(read_text(path, _WHAT, _LARGEST).splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    try:
+        rows = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
+    except csv.Error as error:
+        raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
+    header = tuple(name.strip() for name in rows[0]) if rows else ()
+    if header != DUTY_COLUMNS:
+        shown = ", ".join(header)[:80]
+        raise InputError(f"{path} has the columns '{shown}'; allowed: {', '.join(DUTY_COLUMNS)}")
+    if len(rows) < 2:
+        raise InputError(f"{path} holds no rows; allowed: a header line and at least one row")
+    switches: list[Switch] = []
+    for (number, _), cells in zip(lines[1:], rows[1:], strict=False):
+        switch = _row(path, number, cells)
+        if switches and switch.time <= switches[-1].time:
+            raise InputError(
+                f"{path}, row {number}: time_s = {switch.time:g} does not follow {switches[-1].time:g}; allowed: times "
+                "that increase"
+            )
+        switches.append(switch)
+    return switches if switches[0].time == 0 else [Switch(0.0, 0.0), *switches]
+
+
+def _row(path: Path, number: int, cells: Sequence[str]) -> Switch:
+    if len(cells) != len(DUTY_COLUMNS):
+        raise InputError(f"{path}, row {number} has {len(cells)} cells; allowed: {len(DUTY_COLUMNS)}")
+    values = []
+    for name, cell, most in zip(DUTY_COLUMNS, cells, (1e9, 1.0), strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            value = math.nan
+        if not 0.0 <= value <= most:
+            raise InputError(
+                f"{path}, row {number}: {name} = {cell.strip()[:40]}; allowed: a number from 0 to {most:g}"
+            )
+        values.append(value)
+    return Switch(*values)

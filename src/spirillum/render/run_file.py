@@ -1,0 +1,130 @@
+"""Runs read back from their NetCDF files, checked: what a file says is not believed before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from pydantic import BaseModel
+
+from spirillum.errors import InputError
+from spirillum.robot.problems import problems_in
+from spirillum.robot.robot import Robot
+from spirillum.units import Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["open_run", "robot_of"]
+
+_WHAT = "a run written by `spirillum simulate`"
+
+
+def open_run(path: str | Path) -> xr.Dataset:
+    """A run from its file, loaded whole.
+
+    Args:
+        path: NetCDF file.
+
+    Raises:
+        InputError: if it is missing, no NetCDF file, or damaged.
+    """
+    path = Path(path)
+    try:
+        if not path.exists():
+            raise InputError(f"{str(path)[:200]} does not exist; allowed: {_WHAT}")
+        if not path.is_file():
+            raise InputError(f"{str(path)[:200]} is not a regular file; allowed: {_WHAT}")
+        with path.open("rb") as stream:
+            start = stream.read(8)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{str(path)[:200]!r} cannot be read ({error}); allowed: {_WHAT}") from error
+    if start != b"\x89HDF\r\n\x1a\n":
+        raise InputError(f"{path} is not a NetCDF-4 file; allowed: {_WHAT}")
+    import xarray as xr
+
+    try:
+        return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
+    except Exception as error:  # a damaged file raises whatever the library meets first
+        raise InputError(f"{path} cannot be read ({_first_line(error)}); allowed: {_WHAT}") from error
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:150]
+
+
+def robot_of(dataset: xr.Dataset) -> Robot:
+    """The robot of a run, from the settings in its attributes, checked like a robot file.
+
+    Raises:
+        InputError: if there are none, or they describe no robot.
+    """
+    settings = dataset.attrs.get("settings")
+    if not isinstance(settings, str):
+        raise InputError(f"the run has no attribute 'settings' with its robot; allowed: {_WHAT}")
+    try:
+        table = json.loads(settings)
+    except (ValueError, RecursionError) as error:
+        raise InputError(
+            f"the run's attribute 'settings' is not JSON ({str(error)[:100]}); allowed: {_WHAT}"
+        ) from error
+    if not isinstance(table, dict):
+        raise InputError(f"the run's attribute 'settings' is no table; allowed: {_WHAT}")
+    robot = problems_in(Robot, _with_units(Robot, table))
+    if isinstance(robot, Robot):
+        return robot
+    raise InputError(f"the run's settings: {robot[0]}", [f"the run's settings: {problem}" for problem in robot])
+
+
+def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
+    """SI numbers as quantities, which is what a robot is checked from."""
+    found: dict[str, Any] = {}
+    for name, value in table.items():
+        info = model.model_fields.get(name)
+        if value is None and info is not None:
+            if info.default is not None:
+                found[name] = "none"
+            continue
+        if info is None:
+            found[name] = value
+            continue
+        unit = _unit(info.annotation, info.metadata)
+        section = _section(info.annotation)
+        if unit is not None and isinstance(value, float | int) and not isinstance(value, bool):
+            found[name] = f"{value!r} {unit}"
+        elif section is not None and isinstance(value, Mapping):
+            if name in _BY_NAME:
+                found[name] = {
+                    key: _with_units(section, item) if isinstance(item, Mapping) else item
+                    for key, item in value.items()
+                }
+            else:
+                found[name] = _with_units(section, value)
+        else:
+            found[name] = value
+    return found
+
+
+_BY_NAME = ("calibration",)
+"""Fields that hold sections by names of the user's."""
+
+
+def _unit(annotation: Any, metadata: list[Any]) -> str | None:
+    kinds = [item for item in metadata if isinstance(item, Kind)]
+    for part in get_args(annotation):
+        kinds += [item for item in getattr(part, "__metadata__", ()) if isinstance(item, Kind)]
+    return kinds[0].unit if kinds else None
+
+
+def _section(annotation: Any) -> type[BaseModel] | None:
+    """The section class inside an annotation such as ``Motor | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in get_args(annotation):
+        if (found := _section(part)) is not None:
+            return found
+    return None

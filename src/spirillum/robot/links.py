@@ -1,0 +1,204 @@
+"""Mass, centre, inertia and buoyancy of the two rigid links, body and rotor.
+
+A solid of revolution needs integrals of rho^2 and rho^4 along its outline, which Gauss quadrature gives to rounding. A
+round wire of radius a along a curve p(s) with tangent t needs no curvature: over its section the volume element is
+1 - kappa u (Pappus), kappa n is dt/ds, and integration by parts leaves
+
+    volume        = pi a^2 L
+    first moment  = pi a^2 (int p ds - a^2/4 [t])
+    second moment = pi a^2 (int (p p' + a^2/4 (1 + t t')) ds - a^2/4 [p t' + t p'])
+
+with brackets between the ends. They are exact as long as the wire is thinner than its bends.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples, Tensors, Vectors
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import centreline
+from spirillum.robot.outline import Arc, Line, Outline, body_outline, solid_outlines
+
+if TYPE_CHECKING:
+    from spirillum.robot.robot import Robot
+
+__all__ = ["Link", "Links", "Solid", "links_of", "outlines_of", "revolution_solid", "robot_solids", "wire_solid"]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_PANELS_PER_TURN = 4
+_ROOT_LENGTHS = 60.0
+"""The amplitude of a tapered wire has risen to within rounding after so many lengths L_t/c."""
+
+
+class Solid(NamedTuple):
+    """A homogeneous solid of density 1, in the frame of the body at phase 0 of the tail; SI."""
+
+    volume: float
+    """Volume, m^3."""
+    centroid: Vectors
+    """Centroid of the volume, m, (3,)."""
+    inertia: Tensors
+    """Inertia about the centroid at density 1, m^5, (3, 3)."""
+
+
+class Link(NamedTuple):
+    """A rigid link in the frame of the body at phase 0 of the tail; SI."""
+
+    mass: float
+    """Mass, kg; NaN where `body.mass` or `tail.density` is needed and unset."""
+    centre: Vectors
+    """Centre of mass, m, (3,); NaN with the mass."""
+    inertia: Tensors
+    """Inertia about the centre of mass, kg m^2, (3, 3); NaN with the mass."""
+    volume: float
+    """Displaced volume, m^3."""
+    centroid: Vectors
+    """Centroid of the displaced volume (centre of buoyancy), m, (3,)."""
+
+
+class Links(NamedTuple):
+    """Both links of a robot."""
+
+    body: Link
+    """The body, without the coupling."""
+    rotor: Link
+    """Coupling and wire."""
+
+
+def links_of(robot: Robot) -> Links:
+    """Mass, centre, inertia and displaced volume of body and rotor.
+
+    `body.mass` is that of body and coupling together; it is assumed to be spread evenly over their volumes. The wire
+    has `tail.density`.
+
+    Args:
+        robot: a checked robot.
+    """
+    solids = robot_solids(robot)
+    body, wire = solids["body"], solids["tail"]
+    main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)
+    density = np.nan if robot.body.mass is None else robot.body.mass / main
+    wire_density = np.nan if robot.tail.density is None else robot.tail.density
+    rotor = [(solids["coupling"], density)] if "coupling" in solids else []
+    return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
+
+
+def robot_solids(robot: Robot) -> dict[str, Solid]:
+    """Volume, centroid and inertia of `body`, `coupling` (where there is one) and `tail`, each of density 1.
+
+    Args:
+        robot: a checked robot.
+    """
+    batch = RobotBatch.of(robot)
+    found = {name: revolution_solid(outline) for name, outline in outlines_of(robot).items()}
+    found["tail"] = wire_solid(
+        root=float(batch.root[0]),
+        wavelength=robot.tail.wavelength,
+        amplitude=robot.tail.amplitude,
+        length=robot.tail.length,
+        wire_diameter=robot.tail.wire_diameter,
+        taper=float(batch.taper[0]),
+        hand=robot.hand,
+    )
+    return found
+
+
+def outlines_of(robot: Robot) -> dict[str, Outline]:
+    """Outlines of `body` and, where there is one, `coupling`.
+
+    Args:
+        robot: a checked robot.
+    """
+    body, coupling = robot.body, robot.coupling
+    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance)
+
+
+def revolution_solid(outline: Outline) -> Solid:
+    """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding.
+
+    Args:
+        outline: from the pole in front to the pole behind.
+    """
+    t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
+    x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
+    volume = float(np.pi * np.sum(square * dx))
+    middle = float(np.pi * np.sum(square * x * dx)) / volume
+    about_axis = 0.5 * np.pi * float(np.sum(square**2 * dx))
+    across = 0.5 * about_axis + float(np.pi * np.sum(square * (x - middle) ** 2 * dx))
+    return Solid(volume, np.array([middle, 0.0, 0.0]), np.diag([about_axis, across, across]))
+
+
+def _run(piece: Line | Arc, t: Samples, weight: Samples) -> tuple[Samples, Samples, Samples]:
+    """x, rho^2 and the weighted -dx (the outline runs from front to rear) at t from 0 to 1."""
+    x, rho = piece.points(t)
+    if isinstance(piece, Line):
+        slope = np.full_like(t, piece.end[0] - piece.start[0])
+    else:
+        turn = piece.angles[1] - piece.angles[0]
+        slope = -piece.semi_axes[0] * np.sin(piece.angles[0] + turn * t) * turn
+    return x, rho**2, -slope * weight
+
+
+def wire_solid(
+    *,
+    root: float,
+    wavelength: float,
+    amplitude: float,
+    length: float,
+    wire_diameter: float,
+    taper: float,
+    hand: float,
+) -> Solid:
+    """A round wire along eq. (10) at phase 0, its ends cut square.
+
+    Args:
+        root: x_r, distance of the root behind the origin, m.
+        wavelength: lambda, m.
+        amplitude: B_o, m.
+        length: L_t, m.
+        wire_diameter: D_t, m.
+        taper: c; infinite for a plain helix.
+        hand: h, +1 (right) or -1 (left).
+    """
+    panels = np.linspace(0.0, length, 1 + int(np.ceil(_PANELS_PER_TURN * length / wavelength)))
+    if np.isfinite(taper):
+        rise = np.arange(0.0, min(_ROOT_LENGTHS, taper)) * length / taper
+        panels = np.unique(np.concatenate([panels, rise]))
+    half = 0.5 * np.diff(panels)
+    xi = np.concatenate([[0.0], (panels[:-1] + half)[:, None] + half[:, None] * _NODES, [length]], axis=None)
+    numbers = {"wavelength": wavelength, "amplitude": amplitude, "length": length, "taper": taper, "hand": hand}
+    columns = {name: np.full(1, value) for name, value in numbers.items()}
+    # From the root on, in its phase, so that a short tail far behind the origin loses no digits.
+    phase = np.full(1, -hand * 2.0 * np.pi * root / wavelength)
+    line = centreline(xi, root=np.zeros(1), phase=phase, **columns)
+    p, t = line.position, line.tangent
+    ds = (half[:, None] * _WEIGHTS).ravel() * line.stretch[1:-1]
+    square = 0.25 * wire_diameter**2  # a^2
+    arc = float(np.sum(ds))
+    middle = (ds @ p[1:-1] - 0.25 * square * (t[-1] - t[0])) / arc
+    p = p - middle
+    inner, along = p[1:-1], t[1:-1]
+    ends = [np.outer(p[i], t[i]) + np.outer(t[i], p[i]) for i in (0, -1)]
+    second = (inner * ds[:, None]).T @ inner
+    second += 0.25 * square * (arc * np.eye(3) + (along * ds[:, None]).T @ along - (ends[1] - ends[0]))
+    inertia = np.pi * square * (np.trace(second) * np.eye(3) - second)
+    return Solid(np.pi * square * arc, middle - np.array([root, 0.0, 0.0]), inertia)
+
+
+def _link(parts: list[tuple[Solid, float]]) -> Link:
+    """Rigidly joined solids, each with its density, kg/m^3."""
+    volumes = np.array([solid.volume for solid, _ in parts])
+    masses = np.array([solid.volume * density for solid, density in parts])
+    centroids = np.array([solid.centroid for solid, _ in parts])
+    mass = float(np.sum(masses))
+    centre = masses @ centroids / mass
+    inertia = np.zeros((3, 3))
+    for (solid, density), own, centroid in zip(parts, masses, centroids, strict=True):
+        arm = centroid - centre
+        inertia += density * solid.inertia + own * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    volume = float(np.sum(volumes))
+    return Link(mass, centre, inertia, volume, volumes @ centroids / volume)

@@ -1,0 +1,281 @@
+"""The robot as closed surfaces of triangles: one geometry for pictures, exports and hydrodynamics.
+
+Body and coupling are the solids of revolution that the resolved models take, the tail is a round wire along eq. (10).
+What the models leave out is there too, so that nothing hangs in mid-air: the motor's shaft into the coupling, a stub
+of wire from the coupling to the tail's root, and an arm where the root does not lie on the axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.robot.geometry import Centreline, centreline, shortest_body
+from spirillum.robot.links import outlines_of
+from spirillum.robot.outline import Outline
+from spirillum.robot.parts import Seal, StripeColour
+from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
+from spirillum.units import show
+
+if TYPE_CHECKING:
+    from spirillum.robot.robot import Robot
+
+__all__ = ["COLOURS", "STRIPE_COLOURS", "RobotMesh", "TailLine", "robot_mesh", "tail_line"]
+
+Colour = tuple[float, float, float]
+
+STRIPE_COLOURS: dict[StripeColour, Colour] = {
+    "red": (0.80, 0.11, 0.13),
+    "yellow": (0.97, 0.82, 0.13),
+    "green": (0.10, 0.55, 0.27),
+    "blue": (0.10, 0.28, 0.68),
+    "white": (0.95, 0.95, 0.95),
+    "black": (0.09, 0.09, 0.09),
+    "orange": (0.93, 0.48, 0.10),
+    "magenta": (0.78, 0.15, 0.54),
+    "cyan": (0.10, 0.64, 0.77),
+}
+"""sRGB of a stripe's colour names, 0 to 1."""
+COLOURS: dict[str, Colour] = {
+    "body": (0.82, 0.85, 0.89),
+    "seal": (0.91, 0.90, 0.86),
+    "shaft": (0.62, 0.64, 0.67),
+    "coupling": (0.74, 0.76, 0.79),
+    "stub": (0.72, 0.45, 0.20),
+    "arm": (0.72, 0.45, 0.20),
+    "tail": (0.72, 0.45, 0.20),
+}
+"""sRGB of the pieces, 0 to 1; for pictures only."""
+
+_AROUND_BODY, _AROUND_WIRE, _PER_TURN = 96, 24, 48
+"""Sides of a body and of a wire, and points along a turn of the tail, at fineness 1."""
+_FINENESS = (0.1, 20.0)
+_ROOT = 0.2
+"""Share of the tail's length within which a sharp bend is the root's."""
+_SHARPEST = 0.9
+"""Largest curvature of a wire that is swept, over the inverse of its radius."""
+
+
+@dataclass(frozen=True)
+class RobotMesh:
+    """One piece of the robot: a closed surface, in the frame of the body, m."""
+
+    name: str
+    """`body`, `shaft`, `coupling`, `stub`, `arm` or `tail`."""
+    part: Literal["body", "rotor"]
+    """The link that it moves with."""
+    vertices: Samples = field(repr=False)
+    """(n, 3), m."""
+    faces: Faces = field(repr=False)
+    """Triangles, outward oriented, (m, 3)."""
+    colours: Samples = field(repr=False)
+    """sRGB of each triangle, 0 to 1, (m, 3)."""
+    regions: tuple[str, ...]
+    """Regions of the surface: the piece's name; on the body also `seal`, `stripe 1`, `stripe 2`, ..."""
+    region: Faces = field(repr=False)
+    """Which of the regions each triangle belongs to, (m,)."""
+
+    @property
+    def volume(self) -> float:
+        """Volume inside the triangles, m^3."""
+        return mass_properties(self.vertices, self.faces)[0]
+
+    @property
+    def centroid(self) -> Samples:
+        """Centroid of that volume, m, (3,)."""
+        return mass_properties(self.vertices, self.faces)[1]
+
+    @property
+    def area(self) -> float:
+        """Area of the triangles, m^2."""
+        return mass_properties(self.vertices, self.faces)[2]
+
+
+@dataclass(frozen=True)
+class TailLine:
+    """The centreline of the tail, dense enough for a swept wire; m, at phase 0."""
+
+    points: Samples
+    """(k, 3), m."""
+    tangents: Samples
+    """Unit tangents away from the root, (k, 3)."""
+    xi: Samples
+    """Axial distance from the root, m, (k,)."""
+
+
+def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tuple[RobotMesh, ...]:
+    """The robot's pieces, each one closed surface by itself; neighbours overlap where they are joined.
+
+    Vertices lie on the true surfaces, so volumes fall short of the true ones with the inverse square of `fineness`.
+    The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards -y.
+
+    Args:
+        robot: a checked robot.
+        phase: phase phi of the tail, rad; all pieces of the rotor turn with it.
+        fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
+
+    Raises:
+        InputError: if the fineness is out of range, or the seal longer than the body behind its nose.
+    """
+    fineness = _checked_fineness(fineness)
+    around, sides = (max(6, round(count * fineness)) for count in (_AROUND_BODY, _AROUND_WIRE))
+    outlines = outlines_of(robot)
+    pieces = [_body(robot, outlines["body"], around)]
+    for name, surface in _rotor(robot, outlines.get("coupling"), around, sides, fineness):
+        cos, sin = np.cos(phase), np.sin(phase)
+        turn = np.array([[1.0, 0.0, 0.0], [0.0, cos, -sin], [0.0, sin, cos]])
+        turned = surface._replace(vertices=surface.vertices @ turn.T)
+        pieces.append(_piece(name, "rotor", turned, (name,), (COLOURS[name],)))
+    return tuple(pieces)
+
+
+def _checked_fineness(fineness: float) -> float:
+    """The fineness as a number in its range.
+
+    Raises:
+        InputError: if it is not one.
+    """
+    try:
+        number = float(fineness)
+    except (TypeError, ValueError):
+        number = float("nan")
+    if not _FINENESS[0] <= number <= _FINENESS[1]:
+        raise InputError(f"fineness = {fineness!r}; allowed: {_FINENESS[0]} to {_FINENESS[1]}")
+    return number
+
+
+def _piece(
+    name: str,
+    part: Literal["body", "rotor"],
+    surface: Surface,
+    regions: tuple[str, ...],
+    palette: tuple[Colour, ...],
+    region: Faces | None = None,
+) -> RobotMesh:
+    """A piece whose triangles have the colours of their regions; by default the first."""
+    which = np.zeros(len(surface.faces), dtype=np.int64) if region is None else region
+    return RobotMesh(name, part, surface.vertices, surface.faces, np.array(palette)[which], regions, which)
+
+
+def _body(robot: Robot, outline: Outline, around: int) -> RobotMesh:
+    """The body with its seal as a region of its surface; edges of seal and stripes are edges of triangles."""
+    seal = robot.seal
+    if seal is None:
+        return _piece("body", "body", revolved(profile_of(outline, around), around), ("body",), (COLOURS["body"],))
+    _check_seal(robot, seal)
+    front, stripes = seal.length - 0.5 * robot.body.length, len(seal.stripes)
+    profile = profile_of(outline, around, (front,))
+    sectors = max(stripes, 1)
+    around = sectors * int(np.ceil(around / sectors))
+    surface = revolved(profile, around, -np.pi / sectors)
+    sealed = (0.5 * (profile.x[1:] + profile.x[:-1]) < front)[surface.band]
+    region = np.where(sealed, 1, 0)
+    if stripes:  # not on the flat rear face: they are seen from the side
+        striped = sealed & ~np.array(profile.flat)[surface.band]
+        region = np.where(striped, 2 + surface.sector * stripes // around, region)
+    names = ("body", "seal", *(f"stripe {index + 1}" for index in range(stripes)))
+    palette = (COLOURS["body"], COLOURS["seal"], *(STRIPE_COLOURS[colour] for colour in seal.stripes))
+    return _piece("body", "body", surface, names, palette, region)
+
+
+def _check_seal(robot: Robot, seal: Seal) -> None:
+    """The seal ends behind the nose.
+
+    Raises:
+        InputError: if it does not.
+    """
+    body = robot.body
+    if body.shape in ("sphere", "spheroid"):
+        nose = 0.5 * body.length
+    else:
+        numbers = (np.array([body.diameter]), np.array([body.fillet or 0.0]))
+        nose = float(shortest_body(*numbers, body.front_end, "flat")[0])
+    longest = body.length - nose
+    if seal.length > longest * (1.0 + 1e-12):
+        raise InputError(
+            f"seal.length = {show(seal.length, 'mm')}; allowed: at most {show(longest, 'mm')}, where the nose of the "
+            "body begins, or seal = 'none' for a plain body"
+        )
+
+
+def _rotor(
+    robot: Robot, coupling: Outline | None, around: int, sides: int, fineness: float
+) -> list[tuple[str, Surface]]:
+    """Surfaces of the rotor at phase 0, by name."""
+    rear, radius = -0.5 * robot.body.length, 0.5 * robot.tail.wire_diameter
+    root = np.array([rear - robot.coupling.length, 0.0, 0.0])
+    # Each thinner than the next by a little more than its flat sides: surfaces that nearly coincide cannot be joined.
+    arm = 0.99 * np.cos(np.pi / sides) * radius
+    stub = 0.99 * np.cos(np.pi / sides) * arm
+    found: list[tuple[str, Surface]] = []
+    before = rear + min(2.0 * radius, 0.5 * robot.body.length)  # how far a rod reaches into what holds it
+    if coupling is not None:
+        front, back = (float(piece.points(np.zeros(1))[0][0]) for piece in (coupling.pieces[0], coupling.pieces[-1]))
+        shaft = radius
+        if robot.motor is not None and robot.motor.shaft_diameter is not None:
+            shaft = 0.5 * robot.motor.shaft_diameter
+        shaft = min(shaft, 0.5 * robot.coupling.diameter)
+        into = min(2.0 * shaft, 0.5 * (front - back))
+        start, end = rear + min(2.0 * shaft, 0.5 * robot.body.length), front - into
+        line = np.array([[start, 0.0, 0.0], [end, 0.0, 0.0]])
+        found.append(("shaft", rod(line[0], line[1], shaft, sides, round_start=False, round_end=False)))
+        found.append(("coupling", revolved(profile_of(coupling, around), around)))
+        before = back + min(2.0 * radius, 0.5 * (front - back))
+    found.append(("stub", rod(np.array([before, 0.0, 0.0]), root, stub, sides, round_start=False, round_end=True)))
+    wire = tail_line(robot, fineness=fineness)
+    if np.linalg.norm(wire.points[0] - root) > 1e-9 * radius:
+        found.append(("arm", rod(root, wire.points[0], arm, sides, round_start=True, round_end=True)))
+    found.append(("tail", swept(wire.points, wire.tangents, radius, sides)))
+    return found
+
+
+def tail_line(robot: Robot, *, fineness: float = 1.0) -> TailLine:
+    """Points along the tail, spaced evenly in the angle by which its tangent and its phase turn.
+
+    A wire cannot be swept around a bend sharper than its own radius, as a very large `tail.taper` makes at the root:
+    there the line starts behind the bend.
+
+    Args:
+        robot: a checked robot.
+        fineness: number of points, relative to the normal one.
+    """
+    tail = robot.tail
+    wavenumber = 2.0 * np.pi / tail.wavelength
+    xi = np.linspace(0.0, tail.length, 2 + int(np.ceil(_PER_TURN * tail.length / tail.wavelength)))
+    if tail.taper is not None:
+        rise = np.arange(0.0, min(40.0, tail.taper), 0.05) * tail.length / tail.taper
+        xi = np.unique(np.concatenate([xi, rise]))
+    line = _along(robot, xi)
+    bend = np.linalg.norm(np.diff(line.tangent, axis=0), axis=1)
+    arc = np.linalg.norm(np.diff(line.position, axis=0), axis=1)
+    first = 0
+    if tail.taper is not None:
+        helix = tail.amplitude * wavenumber**2 / (1.0 + (tail.amplitude * wavenumber) ** 2)
+        sharp = np.flatnonzero(bend > max(2.0 * _SHARPEST / tail.wire_diameter, 1.2 * helix) * arc)
+        behind = int(sharp[-1]) + 1 if sharp.size else 0
+        first = behind if xi[behind] < _ROOT * tail.length else 0  # a coil too tight for its wire stays as it is
+    turned = np.concatenate([np.zeros(1), np.cumsum(np.hypot(bend, wavenumber * np.diff(xi)))])
+    count = max(4, int(np.ceil(fineness * _PER_TURN * (turned[-1] - turned[first]) / (2.0 * np.pi))))
+    spaced = np.interp(np.linspace(turned[first], turned[-1], count + 1), turned, xi)
+    spaced[-1] = tail.length
+    line = _along(robot, spaced)
+    return TailLine(line.position, line.tangent, spaced)
+
+
+def _along(robot: Robot, xi: Samples) -> Centreline:
+    """The wire's centreline at phase 0."""
+    tail = robot.tail
+    numbers = {
+        "root": 0.5 * robot.body.length + robot.coupling.length,
+        "wavelength": tail.wavelength,
+        "amplitude": tail.amplitude,
+        "length": tail.length,
+        "taper": np.inf if tail.taper is None else tail.taper,
+        "hand": robot.hand,
+        "phase": 0.0,
+    }
+    return centreline(xi, **{name: np.full(1, value) for name, value in numbers.items()})

@@ -1,0 +1,228 @@
+"""Closed surfaces of triangles: solids of revolution, round rods, and round wires along a curve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
+from jaxtyping import Int
+
+from spirillum.arrays import Samples
+from spirillum.robot.outline import Arc, Line, Outline
+
+if TYPE_CHECKING:
+    _Integers = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+else:
+    _Integers = np.ndarray
+
+__all__ = ["Faces", "Profile", "Surface", "mass_properties", "profile_of", "revolved", "rod", "swept"]
+
+Faces: TypeAlias = Int[_Integers, "..."]
+"""Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
+
+_LEAST_AROUND = 3
+
+
+class Surface(NamedTuple):
+    """A closed surface of triangles, outward oriented, made of bands one behind the other."""
+
+    vertices: Samples
+    """(n, 3), m."""
+    faces: Faces
+    """(m, 3)."""
+    band: Faces
+    """Which band each triangle lies in, from the first pole to the last, (m,)."""
+    sector: Faces
+    """Which sector around each triangle lies in, (m,)."""
+
+
+class Profile(NamedTuple):
+    """Points of an outline from its pole in front to its pole behind."""
+
+    x: Samples
+    """m, (k,)."""
+    rho: Samples
+    """Distance from the axis, m; zero at both poles, (k,)."""
+    flat: tuple[bool, ...]
+    """Whether each band, from a point to the next, lies in a plane across the axis."""
+
+
+def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Profile:
+    """Points along an outline: as many on each arc as its share of `around` on a full circle, ends only on lines.
+
+    Args:
+        outline: of the solid.
+        around: number of sides that approximate a circle.
+        cuts: places x where there has to be a point, m; those off the outline are left out.
+    """
+    x: list[Samples] = []
+    rho: list[Samples] = []
+    flat: list[bool] = []
+    for piece in outline.pieces:
+        if isinstance(piece, Line):
+            count = 1
+        else:
+            count = max(2, int(np.ceil(around * abs(piece.angles[1] - piece.angles[0]) / (2.0 * np.pi))))
+        t: Samples = np.linspace(0.0, 1.0, count + 1)
+        for cut in cuts:
+            t = _with_cut(t, _parameter(piece, cut))
+        here_x, here_rho = piece.points(t)
+        first = 1 if x else 0  # pieces share their ends
+        x.append(here_x[first:])
+        rho.append(here_rho[first:])
+        flat += [isinstance(piece, Line) and piece.start[0] == piece.end[0]] * (len(t) - 1)
+    all_rho = np.concatenate(rho)
+    all_rho[[0, -1]] = 0.0
+    return Profile(np.concatenate(x), all_rho, tuple(flat))
+
+
+def _parameter(piece: Line | Arc, x: float) -> float:
+    """Where on the piece (0 to 1) it passes x; NaN where it does not."""
+    if isinstance(piece, Line):
+        run = piece.end[0] - piece.start[0]
+        return (x - piece.start[0]) / run if run != 0 else float("nan")
+    cosine = (x - piece.centre[0]) / piece.semi_axes[0]
+    if abs(cosine) > 1.0:
+        return float("nan")
+    return float((np.arccos(cosine) - piece.angles[0]) / (piece.angles[1] - piece.angles[0]))
+
+
+def _with_cut(t: Samples, cut: float) -> Samples:
+    """The parameters with one more; an inner one that is close to it gives way, so that no band is a sliver."""
+    if not 1e-9 < cut < 1.0 - 1e-9:
+        return t
+    inner = t[1:-1]
+    kept = inner[np.abs(inner - cut) > 0.3 / (len(t) - 1)]
+    return np.sort(np.concatenate([t[:1], kept, t[-1:], np.full(1, cut)]))
+
+
+def revolved(profile: Profile, around: int, start: float = 0.0) -> Surface:
+    """The surface of a solid of revolution about the x axis.
+
+    Args:
+        profile: its outline.
+        around: number of sectors around.
+        start: angle of the first sector's first edge about +x, counted from +z, rad.
+    """
+    around = max(around, _LEAST_AROUND)
+    angle = start + 2.0 * np.pi * np.arange(around) / around
+    x, rho = profile.x[1:-1, None], profile.rho[1:-1, None]
+    rings = np.stack(np.broadcast_arrays(x, -rho * np.sin(angle), rho * np.cos(angle)), axis=-1)
+    poles = np.zeros((2, 3))
+    poles[:, 0] = profile.x[[0, -1]]
+    return _closed(poles[0], rings, poles[1])
+
+
+def rod(start: Samples, end: Samples, radius: float, around: int, *, round_start: bool, round_end: bool) -> Surface:
+    """A round rod from one point to another, its ends flat, or balls about those points.
+
+    Args:
+        start: centre of the first end, m, (3,).
+        end: centre of the last end, m, (3,).
+        radius: m.
+        around: number of sides.
+        round_start: whether the first end is a ball.
+        round_end: whether the last end is a ball.
+    """
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    ball = 0.5 * np.pi * (np.arange(1, max(2, around // 4)) / max(2, around // 4))
+    x, rho = [np.array([length])], [np.array([radius])]
+    if round_end:
+        x.insert(0, length + radius * np.cos(ball))
+        rho.insert(0, radius * np.sin(ball))
+    x.append(np.zeros(1))
+    rho.append(np.array([radius]))
+    if round_start:
+        x.append(-radius * np.cos(ball[::-1]))
+        rho.append(radius * np.sin(ball[::-1]))
+    tips = length + (radius if round_end else 0.0), -radius if round_start else 0.0
+    profile = Profile(
+        np.concatenate([[tips[0]], *x, [tips[1]]]), np.concatenate([[0.0], *rho, [0.0]]), (False,) * (len(x) + 1)
+    )
+    surface = revolved(profile, around)
+    along = axis / length
+    across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+    across /= np.linalg.norm(across)
+    frame = np.stack([along, across, np.cross(along, across)])
+    return surface._replace(vertices=start + surface.vertices @ frame)
+
+
+def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Surface:
+    """The surface of a round wire along a curve, its ends cut square.
+
+    Its cross-sections do not turn about the curve: from each to the next they are carried by two reflections
+    (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27:2, 2008).
+
+    Args:
+        points: along the centreline, m, (k, 3).
+        tangents: unit tangents there, (k, 3).
+        radius: m.
+        around: number of sides.
+    """
+    around = max(around, _LEAST_AROUND)
+    least = np.argmin(np.abs(tangents), axis=1)
+    some = _unit(np.cross(tangents, np.eye(3)[least]))  # any vector across the curve will do
+    chord, own = np.diff(points, axis=0), some[:-1]
+    carried, turned = _reflected(own, chord), _reflected(tangents[:-1], chord)
+    carried = _reflected(carried, tangents[1:] - turned)
+    other = np.cross(tangents[1:], some[1:])
+    twist = np.arctan2(np.sum(carried * other, axis=1), np.sum(carried * some[1:], axis=1))
+    angle = np.concatenate([np.zeros(1), np.cumsum(twist)])[:, None] - 2.0 * np.pi * np.arange(around) / around
+    across = np.cos(angle)[..., None] * some[:, None]
+    across = across + np.sin(angle)[..., None] * np.cross(tangents, some)[:, None]
+    return _closed(points[0], points[:, None] + radius * across, points[-1])
+
+
+def _unit(vectors: Samples) -> Samples:
+    unit: Samples = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return unit
+
+
+def _reflected(vectors: Samples, normals: Samples) -> Samples:
+    """Mirror images in the planes across `normals`; a zero normal leaves its vector."""
+    square = np.sum(normals**2, axis=1)
+    share = np.sum(vectors * normals, axis=1) / np.where(square > 0, square, 1.0)
+    image: Samples = vectors - 2.0 * share[:, None] * normals
+    return image
+
+
+def _closed(first: Samples, rings: Samples, last: Samples) -> Surface:
+    """Rings of vertices (k, n, 3) joined one to the next, and to a pole at both ends.
+
+    Around each ring the vertices turn counter-clockwise as seen from the first pole's side.
+    """
+    count, around = rings.shape[:2]
+    vertices = np.concatenate([first[None], rings.reshape(-1, 3), last[None]])
+    here, sector = np.arange(around), np.arange(around)
+    beside = np.roll(here, -1)
+    ring = 1 + around * np.arange(count)[:, None]
+    a, b = ring[:-1] + here, ring[:-1] + beside
+    d, c = ring[1:] + here, ring[1:] + beside
+    front = np.stack([np.zeros_like(here), ring[0] + here, ring[0] + beside], axis=-1)
+    rear = np.stack([ring[-1] + here, np.full_like(here, len(vertices) - 1), ring[-1] + beside], axis=-1)
+    sides = np.stack([np.stack([a, d, b], axis=-1), np.stack([b, d, c], axis=-1)], axis=2).reshape(-1, 3)
+    bands = np.repeat(np.arange(1, count), 2 * around)
+    return Surface(
+        vertices,
+        np.concatenate([front, sides, rear]),
+        np.concatenate([np.zeros(around, dtype=bands.dtype), bands, np.full(around, count)]),
+        np.concatenate([sector, np.tile(np.repeat(sector, 2), count - 1), sector]),
+    )
+
+
+def mass_properties(vertices: Samples, faces: Faces) -> tuple[float, Samples, float]:
+    """Volume (m^3), centroid of the volume (m, (3,)) and area (m^2) of a closed surface.
+
+    Args:
+        vertices: m, (n, 3).
+        faces: outward oriented, (m, 3).
+    """
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    a, b, c = np.moveaxis((vertices - middle)[faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    six = np.sum(a * normal, axis=1)
+    volume = float(np.sum(six)) / 6.0
+    centroid = np.sum(six[:, None] * (a + b + c), axis=0) / (24.0 * volume)
+    return volume, centroid + middle, 0.5 * float(np.sum(np.linalg.norm(normal, axis=1)))

@@ -1,0 +1,144 @@
+"""The figure of a run shows the run's numbers in its axes' units, and leaves out what the run does not have."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.plots.trajectory import trajectory_figure
+
+TIME = np.linspace(0.0, 2.0, 101)
+
+
+@pytest.fixture
+def run() -> Any:
+    """A made-up free run with a motor, in the place of a simulation."""
+    import xarray as xr
+
+    on = np.where(TIME < 1.0, 1.0, 0.0)
+    series = {
+        "forward_velocity": 1e-3 * on,
+        "tail_rotation_rate": 8.0 * on,
+        "body_rotation_rate": -1.0 * on,
+        "motor_rotation_rate": 9.0 * on,
+        "motor_current": 0.3 * on,
+        "electrical_power": 1.0 * on,
+        "shaft_power": 3e-4 * on,
+        "dissipated_power": 2e-4 * on,
+        "friction_power": 1e-4 * on,
+        "electrical_energy": np.minimum(TIME, 1.0),
+        "dissipated_energy": 2e-4 * np.minimum(TIME, 1.0),
+        "wall_gap": 5e-4 - 1e-4 * TIME,
+        "pitch": np.radians(0.5 * TIME),
+        "yaw": np.radians(-0.2 * TIME),
+    }
+    path = np.stack([1e-3 * np.minimum(TIME, 1.0), 1e-5 * np.sin(TIME), -0.0105 - 1e-5 * TIME], axis=-1)
+    return xr.Dataset(
+        {"position": (("time", "axis"), path), **{name: ("time", values) for name, values in series.items()}},
+        coords={"time": TIME, "axis": list("xyz")},
+        attrs={
+            "robot": "a robot with $ in its name",
+            "model": "slender",
+            "motion": "free",
+            "events": json.dumps([{"time": 1.0, "what": "motor off"}, {"time": 9.0, "what": "after the end"}]),
+        },
+    )
+
+
+def panels(dataset: Any) -> dict[str, Any]:
+    return {axes.get_ylabel(): axes for axes in trajectory_figure(dataset).axes}
+
+
+def test_path_from_the_side_and_from_above(run: Any) -> None:
+    shown = panels(run)
+    for label, axis in (("$z$ (mm)", 2), ("$y$ (mm)", 1)):
+        line, start, end = shown[label].lines
+        assert np.stack([line.get_xdata(), line.get_ydata()], axis=-1) == pytest.approx(
+            1e3 * run["position"].values[:, [0, axis]]
+        )
+        assert start.get_xdata() == pytest.approx([0.0])
+        assert end.get_xdata() == pytest.approx([1.0])
+        assert shown[label].get_xlabel() == "$x$ (mm)"
+
+
+def test_lines_over_time_show_the_run_in_readable_units(run: Any) -> None:
+    shown = panels(run)
+    expected = {
+        "gap to the wall (mm)": [("wall_gap", 1e3)],
+        "velocity $U_x$ (mm/s)": [("forward_velocity", 1e3)],
+        "motor current (A)": [("motor_current", 1.0)],
+        "rate (Hz)": [(f"{name}_rotation_rate", 0.5 / np.pi) for name in ("tail", "body", "motor")],
+        "angle (deg)": [("pitch", 180 / np.pi), ("yaw", 180 / np.pi)],
+    }
+    for label, lines in expected.items():
+        for line, (name, factor) in zip(shown[label].lines, lines, strict=False):
+            assert line.get_ydata() == pytest.approx(factor * run[name].values), name
+            assert line.get_xdata() == pytest.approx(TIME)
+    assert [text.get_text() for text in shown["rate (Hz)"].get_legend().get_texts()] == ["tail", "body", "motor"]
+
+
+def test_powers_that_differ_by_far_stand_on_a_logarithmic_axis(run: Any) -> None:
+    shown = panels(run)
+    assert shown["power (W)"].get_yscale() == "log"
+    electrical = np.asarray(shown["power (W)"].lines[0].get_ydata(), dtype=float)
+    assert np.nanmax(electrical) == pytest.approx(1.0)
+    assert np.isnan(electrical[TIME > 1.0]).all()  # no power has no logarithm
+    assert panels(run.drop_vars("electrical_power"))["power (mW)"].get_yscale() == "linear"
+
+
+def test_time_axis_is_shared_and_spans_the_run(run: Any) -> None:
+    over_time = [axes for label, axes in panels(run).items() if not label.startswith("$")]
+    assert all(axes.get_xlim() == (0.0, 2.0) for axes in over_time)
+    assert sum(axes.get_xlabel() == "time (s)" for axes in over_time) == 2
+
+
+def test_events_are_marked_and_named(run: Any) -> None:
+    figure = trajectory_figure(run)
+    words = " ".join(text.get_text() for text in figure.texts)
+    assert "1: motor off (1 s)" in words
+    assert "after the end" not in words
+    assert "computed, nothing is measured" in words
+    for axes in figure.axes[2:]:
+        assert [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 2] == [1.0]
+
+
+@pytest.mark.parametrize("events", ["", "not JSON", "[1, 2]", '{"time": 1}', '[{"time": "x", "what": 1}]'])
+def test_events_that_cannot_be_read_cost_only_themselves(run: Any, events: str) -> None:
+    run.attrs["events"] = events
+    assert len(trajectory_figure(run).axes) == 9
+
+
+def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
+    gone = [name for name in run.data_vars if str(name).startswith(("motor", "electrical"))]
+    run = run.drop_vars(gone).assign(wobble_angle=("time", 0.1 + 0 * TIME), phase_lag=("time", 0.5 + 0 * TIME))
+    shown = panels(run)
+    assert not {"motor current (A)", "motor current (mA)"} & set(shown)
+    assert shown["wobble angle (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.1) + 0 * TIME)
+    assert shown["phase lag (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.5) + 0 * TIME)
+
+
+def test_panel_of_nothing_but_nan_is_left_out(run: Any) -> None:
+    run["wall_gap"][:] = np.nan
+    assert not [label for label in panels(run) if label.startswith("gap")]
+
+
+def test_robot_that_does_not_move_can_be_drawn(run: Any) -> None:
+    for name in ("position", "forward_velocity", "pitch", "yaw"):
+        run[name][:] = 0.0
+    assert all(np.all(np.isfinite(axes.get_ylim())) for axes in trajectory_figure(run).axes)
+
+
+def test_held_run_has_no_path_but_its_rates() -> None:
+    run = sp.simulate("biorob2012-wide", motion="held", duration=0.2, samples_per_turn=50)
+    shown = panels(run)
+    assert not [label for label in shown if label.startswith("$")]
+    assert shown["rate (Hz)"].lines[0].get_ydata() == pytest.approx(run["tail_rotation_rate"].values / (2 * np.pi))
+
+
+def test_run_without_data_is_named(run: Any) -> None:
+    with pytest.raises(sp.InputError, match="the run has 1 samples of time; allowed: at least 2, increasing"):
+        trajectory_figure(run.isel(time=[0]))
+    with pytest.raises(sp.InputError, match="no variable to draw"):
+        trajectory_figure(run[["time"]])
