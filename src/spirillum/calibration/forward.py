@@ -205,7 +205,7 @@ class Forward:
         """
         motor = self._motor(draws)
         m = self.matrices(draws)
-        shape = np.broadcast_shapes(m.shape[:2], np.shape(friction), motor.torque_constant.shape)
+        shape = np.broadcast_shapes(m.shape[:2], np.shape(friction), *_motor_shapes(motor))
         flat = np.broadcast_to(m, (*shape, 3, 3)).reshape(-1, 3, 3)
         four = np.zeros((flat.shape[0], 4, 4))
         pick = np.array([0, 1, 3])
@@ -234,7 +234,7 @@ class Forward:
         found = kinematics(m)
         own = 1.0 / (1.0 - found.turning)
         share = own if tail_share is None else np.where(np.isnan(tail_share), own, tail_share)
-        shape = np.broadcast_shapes(share.shape, np.shape(motor_rate), motor.torque_constant.shape)
+        shape = np.broadcast_shapes(share.shape, np.shape(motor_rate), *_motor_shapes(motor))
         rate = np.broadcast_to(np.abs(motor_rate), shape)
         flat_motor = _flat(motor, shape)
         emf = flat_motor.back_emf_constant * rate.reshape(-1)
@@ -279,6 +279,11 @@ def kinematics(m: Samples) -> Predicted:
     turning = (force[..., 2] * torque[..., 0] - force[..., 0] * torque[..., 2]) / determinant
     load = m[..., 2, 0] * advance + m[..., 2, 1] * turning + m[..., 2, 2]
     return Predicted(advance, turning, load)
+
+
+def _motor_shapes(motor: Electrics) -> list[tuple[int, ...]]:
+    """Shapes of what may be free in a motor."""
+    return [motor.torque_constant.shape, motor.back_emf_constant.shape]
 
 
 def _flat(motor: Electrics, shape: tuple[int, ...]) -> Electrics:

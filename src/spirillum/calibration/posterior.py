@@ -16,6 +16,7 @@ from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE, ERROR_SCALE, Density
 from spirillum.calibration.problem import Problem, Progress
+from spirillum.errors import InputError
 
 __all__ = ["ENSEMBLES", "FEWEST_EFFECTIVE", "LARGEST_RHAT", "Posterior", "Sampling", "sampled"]
 
@@ -42,6 +43,10 @@ class Sampling:
     """Draws of each walker that stay in the answer."""
     seed: int = 1
     doublings: int = _DOUBLINGS
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError(f"seed = {self.seed}; allowed: a whole number from 0")
 
 
 @dataclass(frozen=True)
@@ -156,6 +161,8 @@ class _Ensemble:
             vectorize=True,
             moves=[(emcee.moves.DEMove(), 0.7), (emcee.moves.DESnookerMove(), 0.1), (emcee.moves.StretchMove(), 0.2)],
         )
+        # emcee wraps the density to print what it raises; an interruption is not its to report.
+        self._sampler.log_prob_fn = density
         legacy = np.random.RandomState(int(rng.integers(2**31)))
         self._sampler.random_state = legacy.get_state()
         self._at: Samples | None = start

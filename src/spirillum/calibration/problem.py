@@ -121,7 +121,9 @@ class Problem:
         if self.by_motor_rate:
             friction = draws.get("shared_friction", self.fixed_friction[None])
             answer["motor_rate"] = self.forward.motor_rate(draws, friction)
-        return {name: answer[name] for name in self.quantities}
+        # What does not depend on any free number comes back once for all draws.
+        shape = (z.shape[0], self.experiment.size)
+        return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
 
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor") -> Samples:
         """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
@@ -169,8 +171,12 @@ def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Pro
         interpolation_error=error,
         fixed_friction=np.broadcast_to(friction, (experiment.size,)),
     )
-    coordinates = [item for parameter in parameters for item in _coordinates(problem, parameter, batch, ranges)]
-    return replace(problem, coordinates=tuple(coordinates))
+    laid: dict[str, list[Coordinate]] = {}
+    for parameter in sorted(parameters, key=lambda item: item.name == "shared_friction"):
+        # The prior of B_eff rests on the torque at the middle of all other priors: they come first.
+        before = replace(problem, coordinates=tuple(item for items in laid.values() for item in items))
+        laid[parameter.name] = _coordinates(before, parameter, batch, ranges)
+    return replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
 
 
 def _check_domain(experiment: Experiment, model: SwimmerModel, batch: RobotBatch) -> None:
@@ -275,7 +281,8 @@ def _prior(
 def _middle_friction(problem: Problem) -> float:
     """B_eff that takes half of the motor's torque at the observed rates, N m s/rad."""
     ratio = problem.experiment.motor_rate
-    found = problem.forward.predict({})
-    with_load = problem.forward.friction({}, ratio.mean)[0]
+    middle = problem.draws(problem.start[None])
+    found = problem.forward.predict(middle)
+    with_load = problem.forward.friction(middle, ratio.mean)[0]
     all_of_it = with_load + found.load[0] / (1.0 - found.turning[0])
     return float(0.5 * np.median(all_of_it[ratio.seen]))
