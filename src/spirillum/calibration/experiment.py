@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.calibration.strays import stray_trials
 from spirillum.errors import InputError
 from spirillum.measurement.observations import Observation, check_signs, read_observations
 from spirillum.robot.robot import Robot
@@ -86,6 +87,8 @@ class Experiment:
     """Hash of the file."""
     synthetic: bool
     """Whether the file says that its numbers were made by a program."""
+    strays: tuple[str, ...] = ()
+    """Trials that are far off the others of their tail, a sentence each."""
 
     @property
     def size(self) -> int:
@@ -137,6 +140,8 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     _check_variety(path, observations)
     items = list(groups.values())
     channels = tuple(sorted({group[0].tail[0] for group in items}))
+    for group in items:
+        _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
     content = path.read_bytes()
     return Experiment(
@@ -155,6 +160,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         source=path.name,
         sha256=hashlib.sha256(content).hexdigest(),
         synthetic=path.suffix != ".parquet" and "synthetic" in _comments(content),
+        strays=stray_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
 
 
@@ -200,6 +206,22 @@ def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
             f"{path}, rows {rows[0].row} to {rows[-1].row}, column forward_velocity_mm_s: all are "
             f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
         )
+
+
+def _check_direction(path: Path, items: Sequence[Observation]) -> None:
+    """A trial that swims the other way than all others of its tail, and no less fast, has a wrong sign."""
+    speeds = np.array([item.forward_velocity for item in items])
+    for place, item in enumerate(items):
+        others = np.delete(speeds, place)
+        others = others[np.isfinite(others)]
+        if others.size == 0 or np.ptp(np.sign(others)) > 0:
+            continue
+        typical = float(np.median(others))
+        if speeds[place] * typical < 0 and abs(speeds[place]) > 0.5 * abs(typical):
+            raise InputError(
+                f"{path}, row {item.row}, column forward_velocity_mm_s: {1e3 * speeds[place]:.4g}, while the other "
+                f"trials of its tail swim at {1e3 * typical:.4g}; allowed: the same sign as these"
+            )
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,15 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, read_experiment
 from spirillum.calibration.identifiability import Identifiability, identified
-from spirillum.calibration.least_squares import LeastSquares, least_squares_fit
+from spirillum.calibration.judgement import (
+    check_believable,
+    common_warnings,
+    far_warnings,
+    misfit_warnings,
+    plain_misfit_warnings,
+    stray_warnings,
+)
+from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.paper_method import PaperFit, paper_fit
 from spirillum.calibration.parameters import free_names
 from spirillum.calibration.posterior import Posterior, Sampling, sampled
@@ -147,6 +155,7 @@ def calibrate(
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)
+    check_believable(problem, fit.z)
     report = identified(problem, fit)
     if method == "least-squares":
         return _by_least_squares(problem, fit, report, friction)
@@ -162,6 +171,7 @@ def _has_motor(experiment: Experiment) -> bool:
 def _by_paper(problem: Problem, reading: str) -> Calibrated:
     fit = paper_fit(problem)
     z = problem.coordinate_of({name: np.array(value) for name, value in fit.values.items()})
+    check_believable(problem, z)
     nan = float("nan")
     friction: tuple[Fitted, ...] = ()
     if "friction" in problem.free:
@@ -182,22 +192,31 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         least_squares=None,
         posterior=None,
         identifiability=None,
-        warnings=("method 'paper' gives no uncertainty", *_common_warnings(problem, friction)),
+        warnings=(
+            "method 'paper' gives no uncertainty",
+            *stray_warnings(problem, z),
+            *far_warnings(problem, z),
+            *plain_misfit_warnings(problem, z),
+            *common_warnings(problem, friction),
+        ),
     )
 
 
 def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
-    """Intervals from draws of the normal distribution around the best fit, in coordinates."""
+    """Intervals from draws around the best fit, in coordinates."""
     rng = np.random.default_rng(1)
-    root = np.linalg.cholesky(fit.covariance)
-    z = fit.z + rng.normal(size=(_FRICTION_DRAWS, fit.z.size)) @ root.T
+    z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
     best = problem.values(fit.z[None])
     draws = problem.values(z)
     values = {name: _fitted(float(best[name][0]), draws[name]) for name in best}
     friction = _friction(problem, z, fit.z, fit.error, reading, rng)
-    predicted = _predicted(problem, fit.z, z, fit.discrepancy, rng)
-    discrepancy = {name: Fitted(value, float("nan"), float("nan")) for name, value in fit.discrepancy.items()}
-    warnings = [*report.warnings, *_misfit_warnings(problem, discrepancy), *_common_warnings(problem, friction)]
+    predicted = _predicted(problem, fit.z, z, tau, rng)
+    discrepancy = {name: _fitted(value, tau[name]) for name, value in fit.discrepancy.items()}
+    warnings = [
+        *_of_the_fit(problem, fit, report),
+        *misfit_warnings(problem, discrepancy, fit.left),
+        *common_warnings(problem, friction),
+    ]
     return Calibrated(
         problem=problem,
         method="least-squares",
@@ -235,9 +254,9 @@ def _by_posterior(
     wrong = [f"the posterior may not be used: {problem_found}" for problem_found in posterior.problems()]
     warnings = [
         *wrong,
-        *report.warnings,
-        *_misfit_warnings(problem, discrepancy),
-        *_common_warnings(problem, friction),
+        *_of_the_fit(problem, fit, report),
+        *misfit_warnings(problem, discrepancy, fit.left),
+        *common_warnings(problem, friction),
     ]
     return Calibrated(
         problem=problem,
@@ -254,6 +273,10 @@ def _by_posterior(
         identifiability=report,
         warnings=tuple(warnings),
     )
+
+
+def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability) -> list[str]:
+    return [*stray_warnings(problem, fit.z), *report.warnings, *far_warnings(problem, fit.z)]
 
 
 def limits(draws: Samples) -> tuple[Samples, Samples]:
@@ -305,47 +328,4 @@ def _predicted(
         tau = np.reshape(np.asarray(discrepancy[name], dtype=float), (-1, 1))
         spread = values * (1.0 + tau * rng.normal(size=values.shape))
         found[name] = (middle[name][0], *limits(spread))
-    return found
-
-
-_WORDS: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
-_LARGE_MISFIT = 0.03
-
-
-def _misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Fitted]) -> list[str]:
-    """A wrong model must not look certain: say by how much it misses."""
-    found = []
-    for name, size in discrepancy.items():
-        trials = problem.ratio(name).freedom.sum() > 0
-        if not trials:
-            found.append(
-                f"the {_WORDS[name]} was observed once for each tail: the errors of trials and of the model "
-                "cannot be told "
-                "apart, and the discrepancy holds both"
-            )
-        elif (size.low if np.isfinite(size.low) else size.value) > _LARGE_MISFIT:
-            found.append(
-                f"model '{problem.model.name}' misses the {_WORDS[name]} by {100 * size.value:.2g} % from tail to "
-                "tail, beyond "
-                "the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for these tails"
-            )
-    return found
-
-
-def _common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
-    experiment = problem.experiment
-    found = []
-    if experiment.synthetic:
-        found.append(f"{experiment.source} says that its numbers are synthetic: nothing here is measured")
-    negative = [n for n, item in enumerate(friction) if item.value < 0]
-    if negative:
-        found.append(
-            f"B_eff comes out negative for {len(negative)} of {len(friction)} robots, the first: "
-            f"{experiment.labels()[negative[0]]}: the model's torque exceeds what the motor gives"
-        )
-    if problem.interpolation_error > 0:
-        found.append(
-            f"resistances are interpolated: {100 * problem.interpolation_error:.2g} % largest error of a prediction, "
-            "checked between the points of the table"
-        )
     return found
