@@ -51,7 +51,8 @@ def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> 
     from dataclasses import replace
 
     from spirillum.hydrodynamics import find_swimmer_model
-    from spirillum.motion.intervals import intervals_of, read_posterior
+    from spirillum.motion.intervals import intervals_of
+    from spirillum.motion.posterior_file import read_posterior
 
     posterior = read_posterior(fitted / "posterior.nc", "sbt")
     thin = {name: values[::50] for name, values in posterior.draws.items()}

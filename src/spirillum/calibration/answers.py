@@ -163,6 +163,7 @@ def _head(found: Calibrated) -> list[str]:
         f'method = "{found.method}"',
         f"free = [{', '.join(_quoted(name) for name in problem.free)}]",
         f'friction_reading = "{found.reading}"',
+        f"synthetic = {'true' if experiment.synthetic else 'false'}",
         "uncertainty = [  # 95 % intervals",
         *(f"    {_quoted(text)}," for text in uncertainty),
         "]",
@@ -231,7 +232,7 @@ def _placement_tables(found: Calibrated) -> list[str]:
 def _friction_tables(found: Calibrated) -> list[str]:
     lines = []
     for robot, item in zip(found.experiment.robots, found.friction, strict=False):
-        if not (np.isfinite(item.value) and item.value >= 0) or robot.channel is None:
+        if not np.isfinite(item.value) or robot.channel is None:
             continue
         sizes = {
             "channel_diameter": robot.channel.diameter,
@@ -239,9 +240,12 @@ def _friction_tables(found: Calibrated) -> list[str]:
             "amplitude": robot.tail.amplitude,
         }
         lines += ["", "[[friction]]", *(f'{name} = "{_number(value)} m"' for name, value in sizes.items())]
-        lines.append(f'effective = "{_number(item.value)} N m s/rad"' + _comment(item))
+        effective = max(item.value, 0.0)
+        lines.append(f'effective = "{_number(effective)} N m s/rad"' + _comment(item))
     return lines
 
 
 def _comment(item: Fitted) -> str:
-    return f"  # {item.low:.4g} to {item.high:.4g}" if math.isfinite(item.low) else ""
+    words = [f"comes out as {item.value:.4g}"] if item.value < 0 else []
+    words += [f"{item.low:.4g} to {item.high:.4g}"] if math.isfinite(item.low) else []
+    return f"  # {', '.join(words)}" if words else ""

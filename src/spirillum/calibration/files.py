@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["check_folder", "predictions_text", "write_calibration"]
 
 _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
+_FIGURES = ("observed-", "residuals", "posterior", "profiles")
 _MARK = "# Written by `spirillum calibrate`"
 
 
@@ -52,6 +53,7 @@ def write_calibration(
     """
     check_folder(folder)
     output_folder(folder)
+    _clear(folder)
     written = [folder / "predictions.csv"]
     write_text(written[0], predictions_text(found))
     if found.posterior is not None:
@@ -63,6 +65,15 @@ def write_calibration(
     written.append(folder / "calibration.toml")
     write_text(written[-1], calibration_text(found))
     return written
+
+
+def _clear(folder: Path) -> None:
+    """Take away what an older calibration left: half of it beside a new one would be believed."""
+    for name in _RESULTS:
+        (folder / name).unlink(missing_ok=True)
+    for path in (folder / "figures").glob("*"):
+        if path.is_file() and path.suffix in (".png", ".svg", ".pdf") and path.stem.startswith(_FIGURES):
+            path.unlink()
 
 
 def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:

@@ -13,6 +13,7 @@ import numpy as np
 from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.files import whole_file
+from spirillum.motion.posterior_file import posterior_checksum
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,6 +66,7 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
         "versions": versions(),
         "warnings": "\n".join(found.warnings),
     }
+    tree.attrs["checksum"] = posterior_checksum(tree.attrs, values)
     return tree
 
 

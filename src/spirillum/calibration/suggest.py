@@ -30,7 +30,8 @@ from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.motion.intervals import PosteriorFile, drawn_kinematics, read_posterior
+from spirillum.motion.intervals import drawn_kinematics
+from spirillum.motion.posterior_file import PosteriorFile, read_posterior
 from spirillum.motion.swimming import requirements
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken

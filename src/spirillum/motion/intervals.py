@@ -8,109 +8,27 @@ missed by as much as those that were. An interval is of the robot's own motion, 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from spirillum.arrays import Axial, PerRobot, Samples
-from spirillum.errors import InputError
 from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.motion.posterior_file import PosteriorFile
 from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import swim
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
-from spirillum.robot.calibration_file import CalibrationFile, FittedFriction, FittedValues, calibrated_robot
-from spirillum.robot.options import Calibration, FittedTo
 from spirillum.robot.robot import Robot
 
-__all__ = ["LEVEL", "Intervals", "PosteriorFile", "drawn_kinematics", "intervals_of", "read_posterior"]
+__all__ = ["LEVEL", "Intervals", "drawn_kinematics", "intervals_of"]
 
 LEVEL = 0.95
 """Level of the intervals."""
-_SCHEMA = "spirillum.posterior/1"
-_DRAWS = 1000
-_WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
 _ELECTRIC = ("torque_constant", "back_emf_constant")
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 _WIRE_POINTS = 7
-_TAIL = ("channel_diameter", "wavelength", "amplitude")
-
-
-@dataclass(frozen=True)
-class PosteriorFile:
-    """Draws of a posterior, thinned, with what they were fitted to."""
-
-    source: str
-    sha256: str
-    model: str
-    observations: str
-    synthetic: bool
-    channels: tuple[float, ...]
-    """Channel diameters, m."""
-    body: tuple[float, float]
-    """Diameter and length of the fitted body, m."""
-    draws: Mapping[str, Samples]
-    """Parameter to (draws, channels), or (draws, 1)."""
-    discrepancy: Mapping[str, Samples]
-    """Quantity to (draws,)."""
-    error: Mapping[str, Samples]
-    """Relative error of a trial, quantity to (draws,)."""
-    friction: tuple[Mapping[str, float], ...]
-    """B_eff tail by tail, with `low` and `high`."""
-
-    def central(self, robot: Robot) -> Robot:
-        """The robot with the middle of the posterior in place of its own values."""
-        factors = [name for name in ("body_drag", "body_rotation") if name in self.draws]
-        entries = []
-        for place, diameter in enumerate(self.channels if factors else ()):
-            middle = {name: float(np.median(self._column(name, place))) for name in factors}
-            own = robot.calibration.get(self.model)
-            kept = {name: getattr(own, name) for name in ("body_drag", "body_rotation")} if own else {}
-            fitted_to = FittedTo.model_construct(
-                channel_diameter=diameter, body_diameter=self.body[0], body_length=self.body[1]
-            )
-            entries.append(Calibration.model_construct(**(kept | middle), source=self.source, fitted_to=fitted_to))
-        names = {"shared_friction": "friction"}
-        values: dict[str, Any] = {
-            names.get(name, name): float(np.median(self.draws[name]))
-            for name in self.draws
-            if names.get(name, name) in FittedValues.model_fields
-        }
-        file = CalibrationFile.model_construct(
-            calibration={self.model: tuple(entries)} if entries else {},
-            fitted=FittedValues.model_construct(**values),
-            friction=self.frictions,
-        )
-        return calibrated_robot(robot, file)
-
-    @property
-    def frictions(self) -> tuple[FittedFriction, ...]:
-        """The middle of B_eff, tail by tail."""
-        tails: list[dict[str, Any]] = [
-            {**{key: item[key] for key in _TAIL}, "effective": max(item["value"], 0.0)} for item in self.friction
-        ]
-        return tuple(FittedFriction.model_construct(**tail) for tail in tails)
-
-    def _column(self, name: str, channel: int) -> Samples:
-        columns = self.draws[name]
-        return columns[:, min(channel, columns.shape[1] - 1)]
-
-    def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
-        """Draws for one robot: those of the nearest channel, and its own tail's friction where that was fitted."""
-        diameter = robot.channel.diameter if robot.channel else np.inf
-        nearest = int(np.argmin([abs(np.log(diameter / channel)) for channel in self.channels]))
-        found = {name: self._column(name, nearest) for name in self.draws}
-        for item in self.friction:
-            keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
-            fitted = tuple(item[key] for key in _TAIL)
-            if np.allclose(keys, fitted, rtol=1e-6, atol=0.0) and np.isfinite(item["high"] - item["low"]):
-                spread = (item["high"] - item["low"]) / (2.0 * 1.96)
-                size = next(iter(found.values())).size
-                found["friction"] = np.maximum(item["value"] + spread * rng.normal(size=size), 0.0)
-        return found
 
 
 @dataclass(frozen=True)
@@ -125,78 +43,6 @@ class Intervals:
         if not np.isfinite(self.low[name]):
             return {}
         return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
-
-
-def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
-    """Read a posterior that a calibration has written.
-
-    Args:
-        path: the file.
-        models: models that are asked, of which it has to be one; none: any.
-
-    Raises:
-        InputError: if it is no such file, is damaged, has not converged, or is of another model.
-    """
-    import hashlib
-
-    import xarray as xr
-
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"{path} does not exist; allowed: {_WHAT}")
-    try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            attributes = {str(name): item for name, item in tree.attrs.items()}
-            if attributes.get("schema") != _SCHEMA:
-                raise InputError(f"{path} is no posterior of a calibration; allowed: {_WHAT}")
-            values = {str(name): np.asarray(item.values, float) for name, item in tree["posterior"].data_vars.items()}
-        found = _read(path, attributes, values, hashlib.sha256(path.read_bytes()).hexdigest())
-    except (OSError, ValueError, KeyError, TypeError, IndexError, RuntimeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path} is no posterior, or damaged; allowed: {_WHAT}") from error
-    if not attributes.get("converged"):
-        raise InputError(
-            f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
-        )
-    if "gap" in found.draws or "pitch" in found.draws:
-        raise InputError(
-            f"{path} is of a model that computes the walls, which cannot solve a thousand places; allowed: its "
-            "calibration.toml as --calibration, or a posterior of sbt, rft or slender"
-        )
-    if models and found.model not in models:
-        asked = ", ".join(f"'{name}'" for name in models)
-        raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")
-    return found
-
-
-def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
-    channels = tuple(float(item) for item in json.loads(attributes["channels"]))
-    listed = json.loads(attributes["parameters"])
-    flat = {name: array.reshape(-1) for name, array in values.items()}
-    size = min(array.size for array in flat.values())
-    kept = np.linspace(0, size - 1, min(size, _DRAWS)).round().astype(int)
-    draws: dict[str, Samples] = {}
-    for name in dict.fromkeys(item["parameter"] for item in listed):
-        columns = sorted((item for item in listed if item["parameter"] == name), key=lambda item: item["channel"] or 0)
-        draws[name] = np.stack([flat[item["label"]][kept] for item in columns], axis=1)
-    quantities = json.loads(attributes["quantities"])
-    body = json.loads(attributes["settings"])[0]["body"]
-    if not (draws and channels and all(np.all(np.isfinite(array)) for array in draws.values())):
-        raise InputError(f"{path} holds draws that are no numbers; allowed: {_WHAT}")
-    return PosteriorFile(
-        source=f"{path.name} ({attributes['observations']})",
-        sha256=sha256,
-        model=str(attributes["model"]),
-        observations=str(attributes["observations"]),
-        synthetic=bool(attributes["synthetic"]),
-        channels=channels,
-        body=(float(body["diameter"]), float(body["length"])),
-        draws=draws,
-        discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in quantities},
-        error={name: flat[f"error_{name}"][kept] for name in quantities},
-        friction=tuple(json.loads(attributes["friction"])),
-    )
 
 
 def intervals_of(
@@ -250,8 +96,11 @@ def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile
 
 
 def _known(column: Samples) -> bool:
-    """Whether at least nineteen of twenty draws have an answer."""
-    return bool(np.mean(np.isfinite(column)) >= LEVEL)
+    """Whether at least nineteen of twenty draws have an answer, and the draws differ: else nothing acts on it."""
+    known = column[np.isfinite(column)]
+    if known.size < LEVEL * column.size:
+        return False
+    return bool(np.ptp(known) > 1e-9 * np.max(np.abs(known)))
 
 
 def _drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:

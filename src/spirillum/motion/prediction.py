@@ -15,8 +15,10 @@ from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.band import Band, band_of
 from spirillum.motion.drive_warnings import drive_warnings
+from spirillum.motion.fitted_warnings import fitted_of
 from spirillum.motion.freedom import Motion, motion_of
-from spirillum.motion.intervals import Intervals, intervals_of, read_posterior
+from spirillum.motion.intervals import Intervals, intervals_of
+from spirillum.motion.posterior_file import read_posterior
 from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import (
     calibrated_balance,
@@ -167,11 +169,13 @@ def predict(
         InputError: for wrong input, or a robot outside the model's domain.
     """
     drawn = None
+    robot = load(robot)
+    unset = robot.friction.effective is None
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
         drawn = read_posterior(posterior, model)
-        robot = drawn.central(load(robot))
+        robot = drawn.central(robot)
     ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
     reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate, batch.placement)
@@ -192,7 +196,7 @@ def predict(
         *ready.warnings,
         *(calibration_warnings(ready, chosen.name) if calibrated else ()),
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
-        *drive_warnings(ready, chosen, reading, result, rate),
+        *drive_warnings(_without_fitted_friction(ready) if unset and rate else ready, chosen, reading, result, rate),
     ]
     warnings += _free_warnings(ready, motion)
     applied = calibrated and chosen.name in ready.calibration
@@ -201,13 +205,18 @@ def predict(
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
     known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
-    if drawn is not None and drawn.synthetic:
-        warnings.append(
-            f"{drawn.observations} says that its numbers are synthetic: the intervals rest on nothing measured"
-        )
+    fitted = fitted_of(calibration, drawn)
+    if rate is None:
+        warnings += [*fitted.tail_warnings(ready), *fitted.reading_warnings([reading])]
+    warnings += fitted.origin_warnings()
     return Prediction(
         ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
     )
+
+
+def _without_fitted_friction(robot: Robot) -> Robot:
+    """The robot as its user knows it: nobody set the B_eff that a calibration brought."""
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
 
 
 def prepared(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -35,6 +35,7 @@ __all__ = [
     "Provenance",
     "calibrated_placement",
     "calibrated_robot",
+    "friction_of_tails",
     "read_calibration",
     "with_calibration",
 ]
@@ -114,6 +115,8 @@ class Provenance(Section):
     """Parameters that were free."""
     friction_reading: _Word = ""
     """Reading of the friction under which B_eff was inferred."""
+    synthetic: Annotated[bool, Field(strict=True)] = False
+    """Whether the observations said that a program made them."""
     uncertainty: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
     """Fitted values with their uncertainty, for people."""
     versions: _Word = ""
@@ -175,17 +178,36 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
 def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
 
-    A file without factors leaves the robot its own.
+    A file without factors leaves the robot its own. A tail whose B_eff was not fitted gets the middle of the fitted
+    tails in the nearest channel: they say more about it than the rotor's own B_m, which is a lower bound.
     """
     changed = _with_fitted(robot, file.fitted)
     factors = {
         model: min(entries, key=lambda entry: _distance(robot, entry)) for model, entries in file.calibration.items()
     }
     friction = changed.friction
-    own = [entry.effective for entry in file.friction if _is_of(robot, entry)]
-    if own:
-        friction = friction.model_copy(update={"effective": own[0]})
+    fitted, others = friction_of_tails(robot, file.friction)
+    if fitted is not None:
+        friction = friction.model_copy(update={"effective": fitted})
+    elif others:
+        friction = friction.model_copy(update={"effective": float(np.median(others))})
     return changed.model_copy(update={"calibration": factors or robot.calibration, "friction": friction})
+
+
+def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[float | None, tuple[float, ...]]:
+    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in the nearest channel.
+
+    Args:
+        robot: the robot; open, or without motor, it has none.
+        entries: B_eff, tail by tail.
+    """
+    if robot.channel is None or robot.motor is None or not entries:
+        return None, ()
+    diameter = robot.channel.diameter
+    nearest = min(abs(np.log(diameter / entry.channel_diameter)) for entry in entries)
+    near = [entry for entry in entries if abs(np.log(diameter / entry.channel_diameter)) <= nearest + _SAME]
+    own = [entry.effective for entry in near if _is_of(robot, entry)]
+    return own[0] if own else None, tuple(entry.effective for entry in near)
 
 
 def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:

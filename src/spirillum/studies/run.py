@@ -132,6 +132,10 @@ def _computed(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
+    warnings += loaded.fitted.origin_warnings()
+    warnings += loaded.fitted.reading_warnings(loaded.study.friction)
+    if loaded.friction:
+        warnings += loaded.fitted.tails_warnings([loaded.robot_at(place) for place in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     warnings += uneven_models(loaded.robots, models, factors)

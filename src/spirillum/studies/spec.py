@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -17,7 +17,8 @@ from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
 from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement
 from spirillum.motion.band import left_open
-from spirillum.motion.intervals import PosteriorFile, read_posterior
+from spirillum.motion.fitted_warnings import Fitted, fitted_of
+from spirillum.motion.posterior_file import PosteriorFile, read_posterior
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.calibration_file import (
     CalibrationFile,
@@ -141,10 +142,15 @@ class LoadedStudy:
     """One robot a channel of the grid, or the listed robots."""
     question: Mapping[str, Any]
     """All that decides the answer, for the fingerprint and the dataset's attributes."""
-    friction: tuple[FittedFriction, ...] = ()
-    """B_eff of tails that a calibration knows."""
+    fitted: Fitted = field(default_factory=Fitted)
+    """B_eff of tails that a calibration knows, and what it rests on."""
     posterior: PosteriorFile | None = None
     """Draws over which answers have intervals."""
+
+    @property
+    def friction(self) -> tuple[FittedFriction, ...]:
+        """B_eff of tails that a calibration knows."""
+        return self.fitted.friction
 
     @property
     def fingerprint(self) -> str:
@@ -222,13 +228,14 @@ def load_study(
         raise InputError(f"{name}: {error}") from error
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
-    friction = fitted.friction if fitted else drawn.frictions if drawn else ()
+    known = fitted_of(fitted, drawn)
+    friction = known.friction
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     if friction:
         question["friction"] = [item.model_dump() for item in friction]
     if drawn:
         question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
-    loaded = LoadedStudy(study, robots, question, friction, drawn)
+    loaded = LoadedStudy(study, robots, question, known, drawn)
     if drawn and loaded.count > LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {LARGEST_WITH_INTERVALS}")
     return loaded

@@ -13,7 +13,8 @@ import numpy as np
 from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
-from spirillum.motion.intervals import PosteriorFile, intervals_of
+from spirillum.motion.intervals import intervals_of
+from spirillum.motion.posterior_file import PosteriorFile
 from spirillum.motion.prediction import accuracy_limits
 from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import requirements, speed_difference, swim
