@@ -39,6 +39,7 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER, *GOOD, "40,10,2.5,1,1.0,1.2,0.1"], "row 5, column body_rate_Hz: 0.1; allowed: negative"),
         ([HEADER, *GOOD, "40,10,2.5,1,-1.0,1.2,-0.1"], "row 5, column forward_velocity_mm_s: the mean is backwards"),
         ([HEADER, *(row.rsplit(",", 1)[0] + "," for row in GOOD)], "free = 'body_rotation': nothing observed"),
+        ([HEADER, *GOOD, "40,10,2.5,0.5,1.0,1.2,-0.1"], "row 5, column trial: '0.5'; allowed: a whole number"),
     ],
 )
 def test_wrong_observations_name_row_and_column(
@@ -97,3 +98,9 @@ def test_a_folder_of_other_origin_is_left_alone(tmp_path: Path, made: Callable[.
     with pytest.raises(InputError, match="unknown origin"):
         found.write(tmp_path)
     assert (tmp_path / "calibration.toml").read_text() == "[calibration.sbt]\n"
+
+
+def test_a_robot_in_anothers_channel_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, f"robot,{HEADER}", *(f"{WIDE},{row}" for row in GOOD), f"{WIDE},30,15,2.5,1,.8,1.2,-.14")
+    with pytest.raises(InputError, match="row 5, column robot: 'biorob2012-wide', but its channel of 30 mm"):
+        sp.calibrate(path, [WIDE, "biorob2012-narrow"], method="paper")

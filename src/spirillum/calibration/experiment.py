@@ -135,6 +135,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
                 f"{path}, row {item.row}, column channel_diameter_mm: {item.channel_diameter * 1e3:g}; allowed: the "
                 f"channel of a robot that was given ({', '.join(f'{c * 1e3:g} mm' for c in sorted(by_channel))})"
             )
+        _check_name(path, item, robot, robots)
         _check_row(path, item, robot)
         groups.setdefault(item.tail, []).append(item)
     _check_variety(path, observations)
@@ -183,6 +184,15 @@ def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
                 f"{robot.channel.diameter * 1e3:g} mm, by which rows are matched; allowed: one robot for each channel"
             )
     return found
+
+
+def _check_name(path: Path, item: Observation, robot: Robot, robots: Sequence[Robot]) -> None:
+    """A row that names one of the robots has to lie in its channel; any other name is the user's own."""
+    if item.robot != robot.name and any(item.robot == other.name for other in robots):
+        raise InputError(
+            f"{path}, row {item.row}, column robot: '{item.robot[:40]}', but its channel of "
+            f"{item.channel_diameter * 1e3:g} mm is that of {robot.name}; allowed: a name and a channel that agree"
+        )
 
 
 def _check_row(path: Path, item: Observation, robot: Robot) -> None:

@@ -66,7 +66,7 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
         "versions": versions(),
         "warnings": "\n".join(found.warnings),
     }
-    tree.attrs["checksum"] = posterior_checksum(tree.attrs, values)
+    tree.attrs["checksum"] = posterior_checksum({str(name): item for name, item in tree.attrs.items()}, values)
     return tree
 
 

@@ -25,11 +25,16 @@ def calibration_content(answer: Mapping[str, Any], folder: Path, written: Sequen
     return {**content, "warnings": answer["warnings"]}
 
 
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
 def calibration(answer: Answer, console: Console) -> None:
     """Table of `calibrate`."""
     synthetic = " (synthetic)" if answer["synthetic"] else ""
     title = (
-        f"{answer['observations']}{synthetic}: {answer['rows']} rows of {answer['robots']} robots, model "
+        f"{answer['observations']}{synthetic}: {_counted(answer['rows'], 'row')} of "
+        f"{_counted(answer['robots'], 'robot')}, model "
         f"{answer['model']}, method {answer['method']}"
     )
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)

@@ -26,7 +26,7 @@ _INTERVALS = {f"{name}_ci95": factor for name, factor in RATES.items()}
 COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 """All columns; those after the trial number may be left out or left empty."""
 _NEEDED = tuple(_KEYS)
-_WHAT = "an observations file (CSV)"
+_WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
 _CONTRADICTION = 0.2
 _LARGEST_NUMBER = 1e6
@@ -135,6 +135,7 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
+    _check_trial(place, row.get("trial", ""))
     a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     return Observation(
         row=number,
@@ -150,6 +151,12 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         intervals=(a, b, c, d),
         trial=row.get("trial", ""),
     )
+
+
+def _check_trial(place: str, text: str) -> None:
+    """A trial has a name or a whole number: a fraction has slipped in from another column."""
+    if _NUMBER.fullmatch(text) and not float(text).is_integer():
+        raise InputError(f"{place}, column trial: '{text[:40]}'; allowed: a whole number, or a name")
 
 
 def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
