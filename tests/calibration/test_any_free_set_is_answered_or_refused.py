@@ -61,3 +61,16 @@ def test_an_interruption_while_sampling_prints_nothing(
     with pytest.raises(KeyboardInterrupt):
         sp.calibrate(made(**SMALL), WIDE)
     assert capfd.readouterr() == ("", "")
+
+
+def test_figures_name_tails_and_say_synthetic(made: Callable[..., Path]) -> None:
+    from spirillum.plots.calibration import calibration_figures
+
+    found = sp.calibrate(made(**SMALL), WIDE, model="rft", method="least-squares")
+    figures = calibration_figures(found)
+    names = [label.get_text() for label in figures["residuals"].axes[-1].get_xticklabels()]
+    assert {"15 x 1.5", "25 x 2.5"} <= set(names)
+    words = [text.get_text() for text in figures["profiles"].findobj(lambda item: hasattr(item, "get_text"))]
+    assert any("(synthetic)" in text for text in words)
+    ticks = [tuple(axes.get_xticks()) for axes in figures["observed-40mm"].axes if axes.has_data()]
+    assert len(set(ticks)) == 1

@@ -40,9 +40,9 @@ def test_more_trials_tell_more_up_to_the_discrepancy(fitted: Path) -> None:
 
 
 def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from spirillum.motion import intervals
+    from spirillum.motion import posterior_file
 
-    known = intervals.read_posterior(fitted / "posterior.nc")
+    known = posterior_file.read_posterior(fitted / "posterior.nc")
     certain = replace(known, draws={name: np.full_like(values, 1.5) for name, values in known.draws.items()})
     monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: certain)
     found = sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, "40,20,2.5"))
@@ -53,7 +53,7 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
     fitted: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Narrow normal draws: information and posterior covariance in closed form, with sensitivities of `swim`."""
-    from spirillum.motion import intervals
+    from spirillum.motion import posterior_file
     from spirillum.robot import RobotBatch, load
 
     rng = np.random.default_rng(4)
@@ -63,7 +63,7 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
     draws = {"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]}
     one = np.ones(40_000)
     known = replace(
-        intervals.read_posterior(fitted / "posterior.nc"),
+        posterior_file.read_posterior(fitted / "posterior.nc"),
         draws=draws,
         discrepancy={"advance": tau * one, "turning": tau * one},
         error={"advance": sigma * one, "turning": sigma * one},

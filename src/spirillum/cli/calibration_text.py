@@ -116,10 +116,12 @@ def suggestion(answer: Answer, console: Console, rows: int = 10) -> None:
         f"{answer['posterior']}, model {answer['model']}: what {answer['trials']} trials of one more tail would tell"
     )
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
-    table = grid("", "channel (mm)", "wavelength (mm)", "amplitude (mm)", "information (bit)", "narrows most")
+    table = grid("", "channel (mm)", "tail (mm)", "information (bit)", "narrows most")
     for item in answer["candidates"][: max(rows, 1)]:
         sizes = [f"{1e3 * item[name]['value']:g}" for name in ("channel_diameter", "wavelength", "amplitude")]
         name, share = min(item["narrowing"].items(), key=lambda pair: pair[1]["value"])
         told = f"{name} to {100 * share['value']:.0f} %"
-        table.add_row(*sizes, f"{item['expected_information']['value']:.3f}", escape(told))
+        table.add_row(
+            sizes[0], f"{sizes[1]} x {sizes[2]}", f"{item['expected_information']['value']:.3f}", escape(told)
+        )
     console.print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["calibration_figures", "observed_figure", "residual_figure"]
 
 _MOST_COLUMNS = 5
+_MOST_NAMES = 36
 _OBSERVED = COLOURS["black"]
 _NAMES: dict[Quantity, str] = {
     "advance": r"speed per tail rate $U_x/\omega$",
@@ -113,8 +115,13 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
         for axes in panels[-1]:
             axes.set_xlabel(r"wavelength $\lambda$ (mm)")
-            axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+        _alike_ticks(panels)
         return figure
+
+
+def _alike_ticks(panels: Sequence[Sequence[Axes]]) -> None:
+    for axes in (panel for row in panels for panel in row):
+        axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
 
 
 def _rows(found: Calibrated) -> list[dict[str, Any]]:
@@ -220,7 +227,12 @@ def residual_figure(found: Calibrated) -> Figure:
             axes.set_title(_NAMES[name], fontsize=9)
             axes.set_ylabel("observed/model - 1 (%)")
         last = panels[-1][0]
-        last.set_xlabel("tail")
+        last.set_xlabel("tail: wavelength x amplitude (mm)")
+        shown = spread(len(order), _MOST_NAMES)
+        tails = [experiment.robots[order[n]].tail for n in shown]
+        names_of_tails = [f"{tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g}" for tail in tails]
+        last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=6)
+        last.tick_params(labelbottom=True)
         for start, stop in zip([0, *edges], [*edges, len(order)], strict=True):
             diameter = experiment.channels[int(experiment.channel[order[start]])] * 1e3
             last.text(

@@ -45,6 +45,7 @@ def posterior_figure(found: Calibrated) -> Figure:
         )
         synthetic = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
         words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
+        words += "; contours hold 50 and 95 % of the draws" if count > 1 else ""
         left_out = f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
         figure.text(0.15 / width, 1 - 0.36 / height, words + left_out, va="top", size=9, color="#333")
         for row, below in enumerate(names):
@@ -124,11 +125,12 @@ def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
     """Least misfit against each number, all others fitted anew; the dotted line cuts out the 95 % interval."""
     columns = min(len(profiles), 4)
     rows = -(-len(profiles) // columns)
+    synthetic = " (synthetic)" if found.experiment.synthetic else ""
     with styled():
         sheet = Sheet(
             "Profile likelihood",
-            f"{plain(found.experiment.source, 40)}, model {found.problem.model.name}: least chi squared above the "
-            "best fit",
+            f"{plain(found.experiment.source, 40)}{synthetic}, model {found.problem.model.name}: least chi squared "
+            "above the best fit",
             rows,
             columns,
             panel=(1.72, 1.3),
