@@ -72,8 +72,8 @@ class Fitted:
         sentences = []
         if unknown:
             sentences.append(
-                f"B_eff of {unknown} of {len(robots)} tails was not fitted: the middle of the fitted tails in the "
-                "nearest channel is used, and intervals hold their spread"
+                f"B_eff of {unknown} of {len(robots)} tails was not fitted: the middle of the fitted tails in their "
+                "channel is used, and intervals hold their spread"
             )
         if zero:
             sentences.append(

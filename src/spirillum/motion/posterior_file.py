@@ -97,7 +97,7 @@ class PosteriorFile:
     def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
         """Draws for one robot: those of the nearest channel, and B_eff.
 
-        That of its own tail where it was fitted; else around the middle of the fitted tails of the nearest channel,
+        That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
         with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
         """
         diameter = robot.channel.diameter if robot.channel else np.inf

@@ -179,7 +179,7 @@ def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
 
     A file without factors leaves the robot its own. A tail whose B_eff was not fitted gets the middle of the fitted
-    tails in the nearest channel: they say more about it than the rotor's own B_m, which is a lower bound.
+    tails in its channel: they say more about it than the rotor's own B_m, which is a lower bound.
     """
     changed = _with_fitted(robot, file.fitted)
     factors = {
@@ -195,7 +195,7 @@ def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
 
 
 def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[float | None, tuple[float, ...]]:
-    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in the nearest channel.
+    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in its channel.
 
     Args:
         robot: the robot; open, or without motor, it has none.
@@ -204,8 +204,7 @@ def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[
     if robot.channel is None or robot.motor is None or not entries:
         return None, ()
     diameter = robot.channel.diameter
-    nearest = min(abs(np.log(diameter / entry.channel_diameter)) for entry in entries)
-    near = [entry for entry in entries if abs(np.log(diameter / entry.channel_diameter)) <= nearest + _SAME]
+    near = [entry for entry in entries if _alike(diameter, entry.channel_diameter)]
     own = [entry.effective for entry in near if _is_of(robot, entry)]
     return own[0] if own else None, tuple(entry.effective for entry in near)
 
