@@ -9,6 +9,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from spirillum.calibration.fit import Calibrated, calibrate
+    from spirillum.calibration.ranking import Ranking, rank_models
+    from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
     from spirillum.errors import InputError
     from spirillum.exports.write import Export, export
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Calibrated",
     "Export",
     "Film",
     "Flow",
@@ -36,11 +40,14 @@ __all__ = [
     "ModelComparison",
     "Picture3D",
     "Prediction",
+    "Ranking",
     "Resistance",
     "Robot",
     "RobotBatch",
     "Settling",
+    "Suggestion",
     "Swimming",
+    "calibrate",
     "citation",
     "compare_models",
     "export",
@@ -49,15 +56,18 @@ __all__ = [
     "load",
     "magnetic_sweep",
     "predict",
+    "rank_models",
     "resistance",
     "settle",
     "show",
     "simulate",
     "study",
+    "suggest",
     "swim",
 ]
 
 _HOME = {
+    "Calibrated": "spirillum.calibration.fit",
     "Export": "spirillum.exports.write",
     "Film": "spirillum.render.film",
     "Flow": "spirillum.motion.flow",
@@ -65,11 +75,14 @@ _HOME = {
     "ModelComparison": "spirillum.motion.comparison",
     "Picture3D": "spirillum.render.show",
     "Prediction": "spirillum.motion.prediction",
+    "Ranking": "spirillum.calibration.ranking",
     "Resistance": "spirillum.hydrodynamics.resistance",
     "Robot": "spirillum.robot",
     "RobotBatch": "spirillum.robot",
     "Settling": "spirillum.motion.settling",
+    "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.motion.quantities",
+    "calibrate": "spirillum.calibration.fit",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
     "export": "spirillum.exports.write",
@@ -78,11 +91,13 @@ _HOME = {
     "load": "spirillum.robot",
     "magnetic_sweep": "spirillum.motion.magnetic_sweep",
     "predict": "spirillum.motion.prediction",
+    "rank_models": "spirillum.calibration.ranking",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
     "show": "spirillum.render.show",
     "simulate": "spirillum.motion.simulation",
     "study": "spirillum.studies",
+    "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.motion.swimming",
 }
 

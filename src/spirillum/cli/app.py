@@ -7,10 +7,12 @@ from typing import Annotated
 
 import typer
 
+from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
+from spirillum.cli.observation_commands import observations_app
 from spirillum.cli.options import (
     Accuracy,
     Calibration,
@@ -26,6 +28,7 @@ from spirillum.cli.options import (
     Phases,
     Picture,
     Pitch,
+    Posterior,
     RobotArgument,
     Settings,
     TailDrop,
@@ -51,7 +54,11 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(robot_app, name="robot")
+app.add_typer(observations_app, name="observations")
 app.command()(settle)
+app.command()(calibrate)
+app.command("rank-models")(rank_models)
+app.command()(suggest)
 app.command()(export)
 app.command()(show)
 app.command()(film)
@@ -86,6 +93,7 @@ def predict(
     friction: Friction = None,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
+    posterior: Posterior = None,
     accuracy: Accuracy = None,
     gap: Gap = None,
     eccentricity: Eccentricity = None,
@@ -118,6 +126,7 @@ def predict(
             friction=friction,
             calibrated=not no_calibration,
             calibration=calibration,
+            posterior=posterior,
             accuracy=accuracy,
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
             tolerance=tolerance,
@@ -253,6 +262,8 @@ def study(
             show_default=False,
         ),
     ] = None,
+    calibration: Calibration = None,
+    posterior: Posterior = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -272,6 +283,8 @@ def study(
             overrides=overrides_from(settings),
             models=model,
             band=band,
+            calibration=calibration,
+            posterior=posterior,
             progress=progress,
         )
     text.show(text.study_answer(dataset, output), text.study, json=json)

@@ -23,6 +23,7 @@ __all__ = [
     "Phases",
     "Picture",
     "Pitch",
+    "Posterior",
     "RobotArgument",
     "Settings",
     "TailDrop",
@@ -34,6 +35,7 @@ __all__ = [
     "complete_planes",
     "complete_presets",
     "complete_resistance_models",
+    "complete_robots",
     "complete_schemas",
 ]
 
@@ -48,7 +50,8 @@ def complete_presets(incomplete: str) -> list[str]:
     return _starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
 
 
-def _complete_robots(incomplete: str) -> list[str]:
+def complete_robots(incomplete: str) -> list[str]:
+    """Presets and robot files."""
     folder = Path(incomplete).parent
     files = sorted(str(path) for path in folder.glob("*.toml")) if folder.is_dir() else []
     return complete_presets(incomplete) + [name for name in files if name.startswith(incomplete)]
@@ -100,7 +103,7 @@ def _complete_friction(incomplete: str) -> list[str]:
     return _starting(("body", "none", "paper", "rotor"), incomplete)
 
 
-RobotArgument = Annotated[str, typer.Argument(autocompletion=_complete_robots, help="A preset's name or a TOML file.")]
+RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
 Model = Annotated[
     str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft, slender or tube.")
 ]
@@ -127,6 +130,10 @@ Motion = Annotated[
 NoCalibration = Annotated[bool, typer.Option("--no-calibration", help="Leave the calibration factors out.")]
 Calibration = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Calibration file whose factors replace the robot's.")
+]
+Posterior = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Posterior of a calibration: its middle replaces the robot's values; intervals."),
 ]
 Settings = Annotated[
     list[str] | None,

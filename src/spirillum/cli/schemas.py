@@ -17,7 +17,7 @@ def schema_of(name: str) -> dict[str, Any]:
     Raises:
         InputError: for an unknown name.
     """
-    from spirillum.robot.options import CalibrationFile
+    from spirillum.robot.calibration_file import CalibrationFile
     from spirillum.robot.robot import Robot
     from spirillum.studies.spec import Study
 

@@ -109,7 +109,7 @@ def prediction(answer: Answer, console: Console) -> None:
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
-    if "band" in answer:
+    if "band" in answer or "kind" in answer["forward_velocity"]:
         table = grid(title, "quantity", "value", "low", "high", "unit")
         _add_bands(table, quantities)
     else:
@@ -117,6 +117,9 @@ def prediction(answer: Answer, console: Console) -> None:
         add_quantities(table, quantities)
     console.print(table)
     _show_placement(answer["placement"], console)
+    if answer["forward_velocity"].get("kind") == "interval":
+        level = answer["forward_velocity"]["level"]
+        console.print(f"low and high: {100 * level:g} % interval of the robot's own motion", highlight=False)
     if "band" in answer:
         places = len(answer["band"]["gap"]["value"])
         console.print(

@@ -82,13 +82,33 @@ _SETS = {
 
 
 def local_coefficients(batch: RobotBatch) -> LocalCoefficients:
-    """The set that `model.rft.coefficients` names; meaningless outside `coefficient_domain`."""
+    """The set that `model.rft.coefficients` names, with its factors; meaningless outside `coefficient_domain`."""
+    options = batch.options.rft
     with np.errstate(divide="ignore", invalid="ignore"):
-        return _SETS[batch.options.rft.coefficients](batch)
+        found = _SETS[options.coefficients](batch)
+    floor = None if found.floor_normal is None else options.normal_factor * found.floor_normal
+    return LocalCoefficients(options.tangential_factor * found.tangential, options.normal_factor * found.normal, floor)
 
 
 def coefficient_domain(batch: RobotBatch) -> list[Limit]:
     """Where a set makes sense: 0 < c_t < c_n, else a wire would slip more easily across than along."""
+    return _domain_of_the_set(batch) + _domain_of_the_factors(batch)
+
+
+def _domain_of_the_factors(batch: RobotBatch) -> list[Limit]:
+    """Fitted factors may not turn the order of both coefficients around."""
+    options = batch.options.rft
+    if options.normal_factor == 1.0 and options.tangential_factor == 1.0:
+        return []
+    c = local_coefficients(batch)
+    across = c.normal if c.floor_normal is None else np.minimum(c.normal, c.floor_normal)
+    why = "with these factors c_t exceeds c_n, which reverses the thrust"
+    most = options.tangential_factor * across / c.tangential
+    value = np.full(1, options.tangential_factor)
+    return [Limit.of("model.rft.tangential_factor", value, "less than", most, "1", why, "factors-reverse-thrust")]
+
+
+def _domain_of_the_set(batch: RobotBatch) -> list[Limit]:
     chosen = batch.options.rft.coefficients
     diameter = batch.wire_diameter
     if chosen == "brennen-winet":

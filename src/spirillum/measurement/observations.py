@@ -12,10 +12,11 @@ from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import read_text
+from spirillum.measurement.parquet import parquet_table
 from spirillum.measurement.statistics import Mean, mean_with_interval
 from spirillum.units import Hz
 
-__all__ = ["COLUMNS", "RATES", "Observation", "Observed", "read_observations", "summarised"]
+__all__ = ["COLUMNS", "RATES", "Observation", "Observed", "check_signs", "read_observations", "summarised"]
 
 _MM = 1e-3
 _KEYS = {"channel_diameter_mm": _MM, "wavelength_mm": _MM, "amplitude_mm": _MM}
@@ -25,7 +26,7 @@ _INTERVALS = {f"{name}_ci95": factor for name, factor in RATES.items()}
 COLUMNS = ("robot", *_KEYS, "trial", *RATES, "trials", *_INTERVALS)
 """All columns; those after the trial number may be left out or left empty."""
 _NEEDED = tuple(_KEYS)
-_WHAT = "an observations file (CSV)"
+_WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
 _CONTRADICTION = 0.2
 _LARGEST_NUMBER = 1e6
@@ -76,12 +77,22 @@ def read_observations(path: str | Path) -> list[Observation]:
     """Read and check an observations file.
 
     Args:
-        path: tidy CSV as the contract describes it; `#` starts a comment line.
+        path: tidy CSV, in which `#` starts a comment line, or the same columns in a Parquet file (`.parquet`).
 
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
     path = Path(path)
+    numbered = parquet_table(path, _WHAT) if path.suffix == ".parquet" else _csv_table(path)
+    header = [name.strip() for name in numbered[0][1]]
+    _check_header(path, header)
+    found = [_observation(path, number, header, cells) for number, cells in numbered[1:]]
+    _check_duplicates(path, found)
+    return found
+
+
+def _csv_table(path: Path) -> list[tuple[int, list[str]]]:
+    """Cells of header and rows, each with its line number."""
     text = read_text(path, _WHAT, _LARGEST)
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
@@ -91,12 +102,7 @@ def read_observations(path: str | Path) -> list[Observation]:
         table = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
     except csv.Error as error:
         raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
-    header = [name.strip() for name in table[0]]
-    _check_header(path, header)
-    rows = zip((number for number, _ in lines[1:]), table[1:], strict=False)
-    found = [_observation(path, number, header, cells) for number, cells in rows]
-    _check_duplicates(path, found)
-    return found
+    return list(zip((number for number, _ in lines), table, strict=False))
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
@@ -129,6 +135,7 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
+    _check_trial(place, row.get("trial", ""))
     a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     return Observation(
         row=number,
@@ -144,6 +151,12 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         intervals=(a, b, c, d),
         trial=row.get("trial", ""),
     )
+
+
+def _check_trial(place: str, text: str) -> None:
+    """A trial has a name or a whole number: a fraction has slipped in from another column."""
+    if _NUMBER.fullmatch(text) and not float(text).is_integer():
+        raise InputError(f"{place}, column trial: '{text[:40]}'; allowed: a whole number, or a name")
 
 
 def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
@@ -204,6 +217,27 @@ def _check_duplicates(path: Path, observations: Iterable[Observation]) -> None:
             raise InputError(
                 f"{path}, rows {other.row} and {item.row} are of the same robot and one is a mean; "
                 "allowed: trials, or one mean"
+            )
+
+
+def check_signs(path: str | Path, item: Observation, driven: float, handedness: str) -> None:
+    """A tail turns the way that it is driven.
+
+    Args:
+        path: the file, for the sentence of an error.
+        item: the row.
+        driven: sign of the driven rate about +x.
+        handedness: of the tail, for the sentence.
+
+    Raises:
+        InputError: if a rate's sign contradicts it.
+    """
+    for name in ("tail_rate", "motor_rate"):
+        value = getattr(item, name)
+        if value * driven < 0:
+            raise InputError(
+                f"{path}, row {item.row}, column {name}_Hz: {value / Hz:.4g}; allowed: "
+                f"{'positive' if driven > 0 else 'negative'}, as the {handedness}-handed tail is driven"
             )
 
 

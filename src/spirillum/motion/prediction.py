@@ -14,7 +14,11 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import SwimmerModel, check_placement, find_swimmer_model
 from spirillum.motion.band import Band, band_of
+from spirillum.motion.drive_warnings import drive_warnings
+from spirillum.motion.fitted_warnings import fitted_of
 from spirillum.motion.freedom import Motion, motion_of
+from spirillum.motion.intervals import Intervals, intervals_of
+from spirillum.motion.posterior_file import read_posterior
 from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import (
     calibrated_balance,
@@ -25,6 +29,7 @@ from spirillum.motion.swimming import (
 )
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.calibration_file import calibrated_placement
 from spirillum.robot.limits import Limit, broken
 from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
@@ -59,6 +64,8 @@ class Prediction:
     """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
+    intervals: Intervals | None = field(default=None, repr=False)
+    """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
     """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
     motion: Motion = "held"
@@ -84,8 +91,9 @@ class Prediction:
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum predict --json`."""
         band = self.band
+        over = band or self.intervals
         quantities = {
-            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(band.of(name) if band else {}))
+            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
             for name, (unit, _) in _QUANTITIES.items()
         }
         content = {
@@ -120,6 +128,7 @@ def predict(
     friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
     accuracy: str | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     tolerance: float | None = None,
@@ -143,6 +152,8 @@ def predict(
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
+        posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
+            95 % interval, the model's discrepancy included.
         accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
@@ -157,6 +168,14 @@ def predict(
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
     """
+    drawn = None
+    robot = load(robot)
+    unset = robot.friction.effective is None
+    if posterior is not None:
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        drawn = read_posterior(posterior, model)
+        robot = drawn.central(robot)
     ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
     reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate, batch.placement)
@@ -177,7 +196,7 @@ def predict(
         *ready.warnings,
         *(calibration_warnings(ready, chosen.name) if calibrated else ()),
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
-        *_drive_warnings(ready, chosen, reading, result, rate),
+        *drive_warnings(_without_fitted_friction(ready) if unset and rate else ready, chosen, reading, result, rate),
     ]
     warnings += _free_warnings(ready, motion)
     applied = calibrated and chosen.name in ready.calibration
@@ -185,9 +204,19 @@ def predict(
     error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
+    known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
+    fitted = fitted_of(calibration, drawn)
+    if rate is None:
+        warnings += [*fitted.tail_warnings(ready), *fitted.reading_warnings([reading])]
+    warnings += fitted.origin_warnings()
     return Prediction(
-        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), over, motion_of(motion)
+        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
     )
+
+
+def _without_fitted_friction(robot: Robot) -> Robot:
+    """The robot as its user knows it: nobody set the B_eff that a calibration brought."""
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
 
 
 def prepared(
@@ -207,6 +236,8 @@ def prepared(
     ready = load(robot)
     if calibration is not None:
         ready = with_calibration(ready, calibration)
+        if not placement and find_swimmer_model(model).placed:
+            placement = calibrated_placement(ready, calibration)
     if accuracy is not None:
         ready = with_accuracy(ready, accuracy, model)
     if tolerance is not None:
@@ -325,72 +356,8 @@ def calibration_warnings(robot: Robot, model: str) -> list[str]:
     return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
 
 
-def _drive_warnings(
-    robot: Robot, model: SwimmerModel, reading: FrictionReading, result: Swimming, rate: float | None
-) -> list[str]:
-    motor_driven = robot.drive is not None and robot.drive.kind == "dc-motor"
-    step_out, follows = float(result.step_out_rate[0]), bool(np.isfinite(result.phase_lag[0]))
-    if np.isfinite(step_out) and not follows:
-        return [
-            f"the field turns faster than the step-out rate of {show(step_out, 'Hz')}: the robot slips behind it again "
-            "and again, and rates and speed are averages"
-        ]
-    factors = robot.calibration.get(model.name)
-    found = []
-    if reading == "paper" and factors is not None and factors.body_rotation < 1:
-        found.append(
-            f"calibration.{model.name}.body_rotation = {factors.body_rotation:g} already makes up for friction on "
-            "the body; with friction reading 'paper' it is counted twice"
-        )
-    if not motor_driven:
-        return found
-    if rate is None:
-        return found + _unset_friction_warning(robot, reading)
-    return found + _prescribed_rate_warnings(robot, reading, result)
-
-
 def _free_warnings(robot: Robot, motion: str) -> list[str]:
     """What a free motion leaves out."""
     if motion == "held" or robot.channel is None:
         return []
     return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]
-
-
-def _against_the_drive(robot: Robot, result: Swimming) -> bool:
-    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    return float(result.tail_rotation_rate[0]) * robot.hand * (-1.0 if reverse else 1.0) < 0
-
-
-def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]:
-    if reading == "none":
-        return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
-    if robot.friction.effective is not None or robot.motor is None:
-        return []
-    own = f"the rotor's own B_m = {robot.motor.rotor_friction:g} N m s/rad"
-    if reading == "body":
-        return [f"friction.effective is unset: no wall friction on the body, {own} in the joint"]
-    return [f"friction.effective is unset: {own} alone is used, which makes the rates upper bounds"]
-
-
-def _prescribed_rate_warnings(robot: Robot, reading: FrictionReading, result: Swimming) -> list[str]:
-    found = []
-    if reading in ("rotor", "paper"):
-        if robot.friction.effective is not None:
-            found.append("friction.effective is ignored: with a tail rate it is inferred from (17) and (18)")
-        if _against_the_drive(robot, result):
-            found.append(
-                "the tail turns against the way that its motor drives (motor.polarity, tail.handedness): the inferred "
-                "effective friction has no meaning"
-            )
-        elif result.effective_friction[0] < 0:
-            found.append(
-                "the inferred effective friction is negative: at this rate the model's hydrodynamic torque exceeds "
-                "what the motor gives"
-            )
-    else:
-        found.append(
-            f"friction reading '{reading}' leaves {result.motor_residual_torque[0]:.3g} N m of motor torque unexplained"
-        )
-    if result.electrical_power[0] < 0:
-        found.append("at this rate the tail drives the motor: current and electrical power are negative")
-    return found

@@ -13,8 +13,8 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import parse_toml, read_toml, write_text
+from spirillum.robot.calibration_file import with_calibration
 from spirillum.robot.fields import Section
-from spirillum.robot.options import CalibrationFile
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 
@@ -144,23 +144,6 @@ def parse_setting(text: str) -> tuple[str, Any]:
     except InputError:
         return path, value
     return path, parsed["value"] if set(parsed) == {"value"} else value
-
-
-def with_calibration(robot: Robot, path: str | Path) -> Robot:
-    """The robot with the factors of a calibration file in place of its own.
-
-    Args:
-        robot: a checked robot.
-        path: TOML file with `[calibration.<model>]` tables, as in a robot file.
-
-    Raises:
-        InputError: if the file cannot be read or a field is wrong.
-    """
-    what = "a calibration file (TOML with [calibration.<model>] tables)"
-    checked = problems_in(CalibrationFile, read_toml(Path(path), what))
-    if isinstance(checked, list):
-        raise InputError(f"{path}: {checked[0]}", [f"{path}: {problem}" for problem in checked])
-    return robot.model_copy(update={"calibration": checked.calibration})
 
 
 def with_accuracy(robot: Robot, accuracy: str, model: str = "slender") -> Robot:

@@ -10,7 +10,6 @@ from spirillum.robot.fields import Factor, Length, Section, Text
 
 __all__ = [
     "Calibration",
-    "CalibrationFile",
     "Calibrations",
     "FittedTo",
     "ModelOptions",
@@ -19,6 +18,7 @@ __all__ = [
     "SbtOptions",
     "SlenderOptions",
     "TubeOptions",
+    "known_model",
 ]
 
 
@@ -61,6 +61,10 @@ class RftOptions(Section):
     """Row 4 of the tail's matrix in (15): kept (correct), or zeroed as printed, for comparison."""
     spin: Switch = False
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
+    normal_factor: Factor = 1.0
+    """Fitted factor on the coefficient across the wire, c_n."""
+    tangential_factor: Factor = 1.0
+    """Fitted factor on the coefficient along the wire, c_t."""
 
 
 class SbtOptions(Section):
@@ -127,19 +131,17 @@ class Calibration(Section):
     """Geometry that they were fitted to."""
 
 
-def _known_model(name: str) -> str:
+def known_model(name: str) -> str:
+    """The name of a model that takes factors.
+
+    Raises:
+        ValueError: for any other name.
+    """
     if name not in _CALIBRATED:
         raise ValueError(f"a model that swims: {', '.join(_CALIBRATED)}")
     return name
 
 
 _CALIBRATED = ("sbt", "rft", "slender")
-Calibrations = dict[Annotated[str, AfterValidator(_known_model)], Calibration]
+Calibrations = dict[Annotated[str, AfterValidator(known_model)], Calibration]
 """Calibration factors by model."""
-
-
-class CalibrationFile(Section):
-    """A file of calibration factors: the same tables as in a robot file."""
-
-    calibration: Annotated[Calibrations, Field(min_length=1)]
-    """Factors for each model."""

@@ -33,6 +33,8 @@ _PLACED = {
 }
 _BAND = {
     "_at_place": ("at a place of the band", "places of the band"),
+    "_interval_low": ("lower limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
+    "_interval_high": ("upper limit of the 95 % interval", "posterior of a calibration, discrepancy included"),
     "_low": ("least of the band over gap and pitch", "least of all places, the reference place among them"),
     "_high": ("largest of the band over gap and pitch", "largest of all places, the reference place among them"),
 }

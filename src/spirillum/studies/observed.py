@@ -11,7 +11,13 @@ import numpy as np
 
 from spirillum.arrays import PerRobot
 from spirillum.errors import InputError
-from spirillum.measurement.observations import Observation, Observed, read_observations, summarised
+from spirillum.measurement.observations import (
+    Observation,
+    Observed,
+    check_signs,
+    read_observations,
+    summarised,
+)
 from spirillum.robot.robot import Robot
 from spirillum.studies.spec import LoadedStudy
 
@@ -87,14 +93,7 @@ def _tails(loaded: LoadedStudy) -> dict[tuple[float, float, float], Robot]:
 
 def _check_signs(path: str | Path, item: Observation, robot: Robot) -> None:
     reverse = robot.motor is not None and robot.motor.polarity == "reverse"
-    driven = -robot.hand if reverse else robot.hand
-    for name in ("tail_rate", "motor_rate"):
-        value = getattr(item, name)
-        if value * driven < 0:
-            raise InputError(
-                f"{path}, row {item.row}, column {name}_Hz: {value / (2 * np.pi):.4g}; allowed: "
-                f"{'positive' if driven > 0 else 'negative'}, as the {robot.tail.handedness}-handed tail is driven"
-            )
+    check_signs(path, item, -robot.hand if reverse else robot.hand, robot.tail.handedness)
 
 
 def _column(rows: Sequence[Observed | None], name: str, item: int) -> PerRobot:

@@ -39,6 +39,8 @@ def study(
     overrides: Mapping[str, Any] | None = None,
     models: Sequence[str] | None = None,
     band: bool | None = None,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Run a study of many robots.
@@ -52,6 +54,9 @@ def study(
         models: hydrodynamic models instead of the study's; None: the study's.
         band: compute models that compute the channel's walls over the places that the placement leaves open too
             (many minutes), or not, instead of what the study says; None: what it says.
+        calibration: calibration file, applied to every robot.
+        posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
+            model have 95 % intervals.
         progress: called as the work goes on.
 
     Returns:
@@ -60,7 +65,7 @@ def study(
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
-    loaded = load_study(source, overrides, models=models, band=band)
+    loaded = load_study(source, overrides, models=models, band=band, calibration=calibration, posterior=posterior)
     observed = observed_arrays(observations, loaded) if observations is not None else None
     fingerprint = _fingerprint(loaded, observed)
     tell = progress or (lambda _what, _done, _total: None)
@@ -127,6 +132,10 @@ def _computed(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
+    warnings += loaded.fitted.origin_warnings()
+    warnings += loaded.fitted.reading_warnings(loaded.study.friction)
+    if loaded.friction:
+        warnings += loaded.fitted.tails_warnings([loaded.robot_at(place) for place in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     warnings += uneven_models(loaded.robots, models, factors)

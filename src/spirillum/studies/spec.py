@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -17,7 +17,15 @@ from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
 from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement
 from spirillum.motion.band import left_open
+from spirillum.motion.fitted_warnings import Fitted, fitted_of
+from spirillum.motion.posterior_file import PosteriorFile, read_posterior
 from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.calibration_file import (
+    CalibrationFile,
+    FittedFriction,
+    calibrated_robot,
+    read_calibration,
+)
 from spirillum.robot.fields import Length, Rate, Section, Text
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -29,6 +37,8 @@ __all__ = ["Grid", "LoadedStudy", "Study", "load_study"]
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
+LARGEST_WITH_INTERVALS = 10_000
+"""Most robots of a study with a posterior, each of which swims a thousand times."""
 
 _WHAT = "a study file (TOML, see `spirillum schema study`)"
 _Name = Annotated[Text, Field(min_length=1, max_length=200)]
@@ -132,6 +142,15 @@ class LoadedStudy:
     """One robot a channel of the grid, or the listed robots."""
     question: Mapping[str, Any]
     """All that decides the answer, for the fingerprint and the dataset's attributes."""
+    fitted: Fitted = field(default_factory=Fitted)
+    """B_eff of tails that a calibration knows, and what it rests on."""
+    posterior: PosteriorFile | None = None
+    """Draws over which answers have intervals."""
+
+    @property
+    def friction(self) -> tuple[FittedFriction, ...]:
+        """B_eff of tails that a calibration knows."""
+        return self.fitted.friction
 
     @property
     def fingerprint(self) -> str:
@@ -144,6 +163,17 @@ class LoadedStudy:
         """Number of robots."""
         grid = self.study.grid
         return len(self.robots) * (1 if grid is None else len(grid.wavelengths) * len(grid.amplitudes))
+
+    def robot_at(self, place: int) -> Robot:
+        """The robot at a place in the flat order of the study."""
+        grid = self.study.grid
+        if grid is None:
+            return self.robots[place]
+        robot, tail = divmod(place, len(grid.wavelengths) * len(grid.amplitudes))
+        wavelength, amplitude = divmod(tail, len(grid.amplitudes))
+        own = self.robots[robot]
+        changed = {"wavelength": grid.wavelengths[wavelength], "amplitude": grid.amplitudes[amplitude]}
+        return own.model_copy(update={"tail": own.tail.model_copy(update=changed)})
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -159,6 +189,8 @@ def load_study(
     *,
     models: Sequence[str] | None = None,
     band: bool | None = None,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
 ) -> LoadedStudy:
     """Load a study and its robots.
 
@@ -167,6 +199,8 @@ def load_study(
         overrides: dotted robot fields, applied to every robot.
         models: hydrodynamic models instead of the study's; None: the study's.
         band: whether to compute bands, instead of what the study says; None: what it says.
+        calibration: calibration file, applied to every robot.
+        posterior: file of a calibration's posterior: its middle is applied to every robot.
 
     Raises:
         InputError: if the study or one of its robots is wrong.
@@ -192,8 +226,35 @@ def load_study(
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    fitted, drawn = _fitted(study, calibration, posterior)
+    robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
+    known = fitted_of(fitted, drawn)
+    friction = known.friction
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
-    return LoadedStudy(study, robots, question)
+    if friction:
+        question["friction"] = [item.model_dump() for item in friction]
+    if drawn:
+        question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
+    loaded = LoadedStudy(study, robots, question, known, drawn)
+    if drawn and loaded.count > LARGEST_WITH_INTERVALS:
+        raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {LARGEST_WITH_INTERVALS}")
+    return loaded
+
+
+def _fitted(
+    study: Study, calibration: str | Path | None, posterior: str | Path | None
+) -> tuple[CalibrationFile | None, PosteriorFile | None]:
+    if calibration is not None and posterior is not None:
+        raise InputError("posterior together with a calibration; allowed: one of them")
+    file = None if calibration is None else read_calibration(calibration)
+    return file, None if posterior is None else read_posterior(posterior, *study.models)
+
+
+def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:
+    """The robot with what a calibration or the middle of a posterior says."""
+    if posterior is not None:
+        return posterior.central(robot)
+    return robot if file is None else calibrated_robot(robot, file)
 
 
 def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:

@@ -13,10 +13,13 @@ import numpy as np
 from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
 from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
+from spirillum.motion.intervals import intervals_of
+from spirillum.motion.posterior_file import PosteriorFile
 from spirillum.motion.prediction import accuracy_limits
 from spirillum.motion.quantities import Swimming
 from spirillum.motion.swimming import requirements, speed_difference, swim
 from spirillum.robot.batch import RobotBatch, batches
+from spirillum.robot.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
@@ -25,6 +28,7 @@ __all__ = [
     "AT_RATES",
     "QUANTITIES",
     "REASONS",
+    "WITH_INTERVALS",
     "Caution",
     "Part",
     "Task",
@@ -49,6 +53,16 @@ AT_RATES = (
     "effective_friction",
 )
 """Quantities that are also given at observed and at assumed rates."""
+WITH_INTERVALS = (
+    "forward_velocity",
+    "advance_per_radian",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "tail_torque",
+    "motor_current",
+)
+"""Quantities that have intervals where a posterior is given."""
 REASONS = (
     "answered",
     "body-wider-than-channel",
@@ -120,7 +134,7 @@ class Task:
     @property
     def allowed(self) -> set[str]:
         """Names of the arrays that an answer may have."""
-        endings = ("", "_at_observed_rate", "_at_assumed_rate")
+        endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
         return {"outside", "error_estimate", *(f.name + at for f in QUANTITIES for at in endings)}
 
 
@@ -150,10 +164,20 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
     wavelength, amplitude = (column.ravel() for column in np.meshgrid(grid.wavelengths, grid.amplitudes, indexing="ij"))
     for index, robot in enumerate(loaded.robots):
         tails = {"tail.wavelength": wavelength, "tail.amplitude": amplitude}
+        if loaded.friction:
+            places = range(index * wavelength.size, (index + 1) * wavelength.size)
+            tails["friction.effective"] = np.array([_friction_at(loaded, place) for place in places])
         yield (
             index * wavelength.size + np.arange(wavelength.size),
             RobotBatch.of(robot, loaded.study.placement).with_values(tails),
         )
+
+
+def _friction_at(loaded: LoadedStudy, place: int) -> float:
+    """B_eff of a robot: that which was fitted to its tail, else its own; NaN where unset."""
+    robot = loaded.robot_at(place)
+    own = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction)).friction.effective
+    return float("nan") if own is None else own
 
 
 def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
@@ -170,12 +194,35 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     valid = np.stack([result.valid for result in free], axis=-1)
     reason = _reasons(task.batch, task.model)[:, None]
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
+    if loaded.posterior is not None and task.model == loaded.posterior.model:
+        part |= _intervals(task, loaded, loaded.posterior)
     if observed is not None:
         tail, motor = observed.tail_rate[task.places], observed.motor_rate[task.places]
         found = [swim(task.batch, task.model, tail_rate=tail, motor_rate=motor, friction=r) for r in readings]
         part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
     if study.assumed_motor_rates and task.batch.electrics is not None:
         part |= _at_assumed_rates(task, study.assumed_motor_rates, readings)
+    return part
+
+
+def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Part:
+    """Limits of the intervals of every robot by itself, driven by its own drive; NaN where there is no answer."""
+    readings, model = loaded.study.friction, find_swimmer_model(task.model)
+    shape = (task.size, len(readings))
+    part: Part = {
+        f"{name}_interval_{end}": np.full(shape, np.nan) for name in WITH_INTERVALS for end in ("low", "high")
+    }
+    inside = _reasons(task.batch, task.model) == 0
+    for number, place in enumerate(task.places.tolist()):
+        if not inside[number]:
+            continue
+        robot = loaded.robot_at(place)
+        robot = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction))
+        for column, reading in enumerate(readings):
+            found = intervals_of(robot, model, posterior, tail_rate=None, friction=reading)
+            for name in WITH_INTERVALS:
+                part[f"{name}_interval_low"][number, column] = found.low[name]
+                part[f"{name}_interval_high"][number, column] = found.high[name]
     return part
 
 

@@ -1,0 +1,347 @@
+"""Observations as a fit needs them: ratios of rates, robot by robot, with the scatter of their trials.
+
+Everything that swims in a viscous fluid at rest is proportional to the tail's rate. So a trial says as much about the
+fluid as its ratios do: advance per radian U/omega and turning Omega/omega. Each trial is divided by its own rate; a
+battery that runs down from trial to trial then does no harm.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.strays import stray_trials
+from spirillum.errors import InputError
+from spirillum.measurement.observations import Observation, check_signs, read_observations
+from spirillum.robot.robot import Robot
+
+__all__ = ["Experiment", "Quantity", "Ratio", "read_experiment", "with_tail"]
+
+Quantity = Literal["advance", "turning", "motor_rate"]
+"""U/omega (or U/omega_m), Omega/omega, omega_m."""
+
+_FLOOR = 0.1
+"""Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """One quantity of every robot: mean over the trials, and what their scatter says about the error."""
+
+    mean: Samples
+    """SI; NaN where it was not observed."""
+    trials: Samples
+    """Number of trials in the mean."""
+    scale: Samples
+    """What the error of a trial is relative to: the mean's size."""
+    squares: Samples
+    """Sum of squares of the trials' deviations from the mean, over the scale squared."""
+    freedom: Samples
+    """Degrees of freedom of that sum."""
+
+    @property
+    def seen(self) -> np.ndarray:
+        """Whether it was observed, robot by robot."""
+        return np.isfinite(self.mean)
+
+    @property
+    def pooled_error(self) -> float:
+        """Relative error of one trial, from the scatter of all robots; NaN without repeated trials."""
+        freedom = float(self.freedom.sum())
+        return float(np.sqrt(self.squares.sum() / freedom)) if freedom > 0 else float("nan")
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """The robots of an observations file, and what was seen of each."""
+
+    robots: tuple[Robot, ...]
+    """One for each tail in each channel."""
+    channels: tuple[float, ...]
+    """Channel diameters, m, ascending."""
+    channel: np.ndarray
+    """Place of each robot's channel in `channels`."""
+    rows: tuple[tuple[int, ...], ...]
+    """Rows of the file that belong to each robot."""
+    advance: Ratio
+    """U/omega, m/rad; where the tail's rate was not observed U/omega_m."""
+    by_motor: np.ndarray
+    """Whether the advance is over the motor's rate."""
+    turning: Ratio
+    """Omega/omega."""
+    motor_rate: Ratio
+    """omega_m, rad/s."""
+    tail_rate: Samples
+    """Mean observed tail rate, rad/s; NaN where it was not observed."""
+    correlation: float
+    """Between the errors of advance and turning within a robot's trials, which share their tail rate."""
+    source: str
+    """Name of the file."""
+    sha256: str
+    """Hash of the file."""
+    synthetic: bool
+    """Whether the file says that its numbers were made by a program."""
+    strays: tuple[str, ...] = ()
+    """Trials that are far off the others of their tail, a sentence each."""
+
+    @property
+    def size(self) -> int:
+        """Number of robots."""
+        return len(self.robots)
+
+    def labels(self) -> list[str]:
+        """Each robot in a few words."""
+        return [
+            f"channel {_channel(r) * 1e3:g} mm, tail {r.tail.wavelength * 1e3:g} x {r.tail.amplitude * 1e3:g} mm"
+            for r in self.robots
+        ]
+
+
+def _channel(robot: Robot) -> float:
+    return robot.channel.diameter if robot.channel else float("inf")
+
+
+def with_tail(robot: Robot, wavelength: float, amplitude: float) -> Robot:
+    """The same robot with another tail, m."""
+    tail = robot.tail.model_copy(update={"wavelength": wavelength, "amplitude": amplitude})
+    return robot.model_copy(update={"tail": tail})
+
+
+def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
+    """Read observations and lay them onto robots: by channel diameter; the tail is that of the row.
+
+    Args:
+        path: observations file.
+        robots: one robot for each channel; what of them is not in a row (body, fluid, motor) holds for it.
+
+    Raises:
+        InputError: if the file is wrong, a row belongs to no robot, or a number contradicts the physics; the sentence
+            names row and column.
+    """
+    path = Path(path)
+    observations = read_observations(path)
+    by_channel = _by_channel(robots)
+    groups: dict[tuple[float, float, float], list[Observation]] = {}
+    for item in observations:
+        robot = by_channel.get(round(item.channel_diameter, 9))
+        if robot is None:
+            raise InputError(
+                f"{path}, row {item.row}, column channel_diameter_mm: {item.channel_diameter * 1e3:g}; allowed: the "
+                f"channel of a robot that was given ({', '.join(f'{c * 1e3:g} mm' for c in sorted(by_channel))})"
+            )
+        _check_name(path, item, robot, robots)
+        _check_row(path, item, robot)
+        groups.setdefault(item.tail, []).append(item)
+    _check_variety(path, observations)
+    items = list(groups.values())
+    channels = tuple(sorted({group[0].tail[0] for group in items}))
+    for group in items:
+        _check_direction(path, group)
+    ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
+    content = path.read_bytes()
+    return Experiment(
+        robots=tuple(
+            with_tail(by_channel[group[0].tail[0]], group[0].wavelength, group[0].amplitude) for group in items
+        ),
+        channels=channels,
+        channel=np.array([channels.index(group[0].tail[0]) for group in items]),
+        rows=tuple(tuple(item.row for item in group) for group in items),
+        advance=_ratio([found.advance for found in ratios]),
+        by_motor=np.array([found.by_motor for found in ratios]),
+        turning=_ratio([found.turning for found in ratios]),
+        motor_rate=_ratio([found.motor_rate for found in ratios]),
+        tail_rate=np.array([found.tail_rate for found in ratios]),
+        correlation=_correlation([(found.advance.values, found.turning.values) for found in ratios]),
+        source=path.name,
+        sha256=hashlib.sha256(content).hexdigest(),
+        synthetic=path.suffix != ".parquet" and "synthetic" in _comments(content),
+        strays=stray_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
+    )
+
+
+def _comments(content: bytes) -> str:
+    lines = content.decode("utf-8", "replace").splitlines()
+    return " ".join(line.lower() for line in lines if line.lstrip().startswith("#"))
+
+
+def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
+    found: dict[float, Robot] = {}
+    for robot in robots:
+        if robot.channel is None:
+            raise InputError(
+                f"robot {robot.name} has no channel; allowed: robots with the channels of the observations"
+            )
+        other = found.setdefault(round(robot.channel.diameter, 9), robot)
+        if other is not robot:
+            raise InputError(
+                f"robots {other.name} and {robot.name} have the same channel.diameter = "
+                f"{robot.channel.diameter * 1e3:g} mm, by which rows are matched; allowed: one robot for each channel"
+            )
+    return found
+
+
+def _check_name(path: Path, item: Observation, robot: Robot, robots: Sequence[Robot]) -> None:
+    """A row that names one of the robots has to lie in its channel; any other name is the user's own."""
+    if item.robot != robot.name and any(item.robot == other.name for other in robots):
+        raise InputError(
+            f"{path}, row {item.row}, column robot: '{item.robot[:40]}', but its channel of "
+            f"{item.channel_diameter * 1e3:g} mm is that of {robot.name}; allowed: a name and a channel that agree"
+        )
+
+
+def _check_row(path: Path, item: Observation, robot: Robot) -> None:
+    reverse = robot.motor is not None and robot.motor.polarity == "reverse"
+    driven = -robot.hand if reverse else robot.hand
+    check_signs(path, item, driven, robot.tail.handedness)
+    if item.body_rate * driven > 0:
+        raise InputError(
+            f"{path}, row {item.row}, column body_rate_Hz: {item.body_rate / (2 * np.pi):.4g}; allowed: "
+            f"{'negative' if driven > 0 else 'positive'}, for the body turns against the "
+            f"{robot.tail.handedness}-handed "
+            "tail"
+        )
+
+
+def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
+    """Speeds that are all equal were not measured."""
+    rows = [item for item in observations if np.isfinite(item.forward_velocity)]
+    if len(rows) >= 3 and len({item.forward_velocity for item in rows}) == 1:
+        raise InputError(
+            f"{path}, rows {rows[0].row} to {rows[-1].row}, column forward_velocity_mm_s: all are "
+            f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
+        )
+
+
+def _check_direction(path: Path, items: Sequence[Observation]) -> None:
+    """A trial that swims the other way than all others of its tail, and no less fast, has a wrong sign."""
+    speeds = np.array([item.forward_velocity for item in items])
+    for place, item in enumerate(items):
+        others = np.delete(speeds, place)
+        others = others[np.isfinite(others)]
+        if others.size == 0 or np.ptp(np.sign(others)) > 0:
+            continue
+        typical = float(np.median(others))
+        if speeds[place] * typical < 0 and abs(speeds[place]) > 0.5 * abs(typical):
+            raise InputError(
+                f"{path}, row {item.row}, column forward_velocity_mm_s: {1e3 * speeds[place]:.4g}, while the other "
+                f"trials of its tail swim at {1e3 * typical:.4g}; allowed: the same sign as these"
+            )
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Values of one quantity of one robot, trial by trial, or a mean with its standard error."""
+
+    values: Samples
+    mean: float
+    trials: int
+    squares: float
+    freedom: float
+
+
+@dataclass(frozen=True)
+class _Seen:
+    advance: _Trials
+    by_motor: bool
+    turning: _Trials
+    motor_rate: _Trials
+    tail_rate: float
+
+
+def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
+    velocity, tail, body, motor = (
+        np.array([getattr(item, name) for item in items])
+        for name in ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
+    )
+    tail = np.where(np.isnan(tail), motor + body, tail)
+    body = np.where(np.isnan(body), tail - motor, body)
+    by_motor = not np.any(np.isfinite(tail) & np.isfinite(velocity))
+    if len(items) == 1 and items[0].trials > 1:
+        found = _of_a_mean(items[0], velocity[0], tail[0], body[0], motor[0], by_motor=by_motor)
+    else:
+        found = _Seen(
+            _of_trials(velocity / (motor if by_motor else tail)),
+            by_motor,
+            _of_trials(body / tail),
+            _of_trials(motor),
+            _of_trials(tail).mean,
+        )
+    if found.advance.mean * hand <= 0:
+        rows = ", ".join(str(item.row) for item in items)
+        raise InputError(
+            f"{path}, row {rows}, column forward_velocity_mm_s: the mean is backwards; allowed: a robot that swims the "
+            "way that its tail drives"
+        )
+    return found
+
+
+def _of_trials(values: Samples) -> _Trials:
+    known = values[np.isfinite(values)]
+    if known.size == 0:
+        return _Trials(values, float("nan"), 0, 0.0, 0.0)
+    mean = float(known.mean())
+    return _Trials(values, mean, known.size, float(((known - mean) ** 2).sum()), known.size - 1.0)
+
+
+def _of_a_mean(item: Observation, velocity: float, tail: float, body: float, motor: float, *, by_motor: bool) -> _Seen:
+    """A row that is a mean over trials: its interval gives the trials' scatter back (Student's t)."""
+    from scipy.stats import t
+
+    count = item.trials
+    quantile = float(t.ppf(0.975, count - 1))
+    u, w, b, m = (half * np.sqrt(count) / quantile for half in item.intervals)  # standard deviations of a trial
+    rate, of_rate = (motor, m) if by_motor else (tail, w)
+
+    def trials(value: float, *relative: float) -> _Trials:
+        known = [part for part in relative if np.isfinite(part)]
+        freedom = count - 1.0 if known and np.isfinite(value) else 0.0
+        squares = freedom * value**2 * sum(part**2 for part in known) if freedom else 0.0
+        return _Trials(np.full(1, np.nan), value, count if np.isfinite(value) else 0, squares, freedom)
+
+    return _Seen(
+        trials(velocity / rate, u / abs(velocity), of_rate / abs(rate)),
+        by_motor,
+        trials(body / tail, b / abs(body) if body else np.nan, w / abs(tail)),
+        trials(motor, m / abs(motor)),
+        float(tail),
+    )
+
+
+def _ratio(found: Sequence[_Trials]) -> Ratio:
+    mean = np.array([item.mean for item in found])
+    size = np.abs(mean)
+    least = _FLOOR * float(np.median(size[np.isfinite(size)])) if np.any(np.isfinite(size)) else 1.0
+    scale = np.where(np.isfinite(size), np.maximum(size, least), 1.0)
+    return Ratio(
+        mean=mean,
+        trials=np.array([float(item.trials) for item in found]),
+        scale=scale,
+        squares=np.array([item.squares for item in found]) / scale**2,
+        freedom=np.array([item.freedom for item in found]),
+    )
+
+
+_FEWEST_PAIRS = 10
+
+
+def _correlation(pairs: Sequence[tuple[Samples, Samples]]) -> float:
+    """Correlation of both ratios' relative deviations within robots, pooled; 0 where too few trials have both."""
+    sums = np.zeros(3)
+    freedom = 0
+    for first, second in pairs:
+        both = np.isfinite(first) & np.isfinite(second)
+        if np.count_nonzero(both) < 2:
+            continue
+        a, b = first[both], second[both]
+        x, y = (a - a.mean()) / abs(a.mean()), (b - b.mean()) / abs(b.mean())
+        sums += np.array([np.sum(x * x), np.sum(y * y), np.sum(x * y)])
+        freedom += int(both.sum()) - 1
+    if freedom < _FEWEST_PAIRS or sums[0] <= 0 or sums[1] <= 0:
+        return 0.0
+    return float(np.clip(sums[2] / np.sqrt(sums[0] * sums[1]), -0.95, 0.95))

@@ -1,0 +1,331 @@
+"""`calibrate`: from observations to parameters, with what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import Experiment, Quantity, read_experiment
+from spirillum.calibration.identifiability import Identifiability, identified
+from spirillum.calibration.judgement import (
+    check_believable,
+    common_warnings,
+    far_warnings,
+    misfit_warnings,
+    plain_misfit_warnings,
+    stray_warnings,
+)
+from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
+from spirillum.calibration.paper_method import PaperFit, paper_fit
+from spirillum.calibration.parameters import free_names
+from spirillum.calibration.posterior import Posterior, Sampling, sampled
+from spirillum.calibration.problem import Problem, Progress, posed
+from spirillum.errors import InputError, did_you_mean
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+
+__all__ = ["LEVEL", "METHODS", "Calibrated", "calibrate", "given_robots"]
+
+METHODS = ("posterior", "least-squares", "paper")
+LEVEL = 0.95
+"""Level of all intervals."""
+_READINGS = ("rotor", "paper")
+_FRICTION_DRAWS = 2000
+
+RobotSource = str | Path | Mapping[str, Any] | Robot
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A number with its 95 % interval, SI; NaN where the method gives none."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a calibration found."""
+
+    problem: Problem
+    method: Literal["posterior", "least-squares", "paper"]
+    reading: str
+    """Reading of the friction under which B_eff follows from (18)."""
+    values: dict[str, Fitted]
+    """Free numbers by label."""
+    friction: tuple[Fitted, ...]
+    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed."""
+    predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
+    """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
+    discrepancy: dict[Quantity, Fitted]
+    """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
+    error: dict[Quantity, float]
+    """Relative error of one trial."""
+    paper: PaperFit | None
+    least_squares: LeastSquares | None
+    posterior: Posterior | None
+    identifiability: Identifiability | None
+    warnings: tuple[str, ...]
+
+    @property
+    def experiment(self) -> Experiment:
+        """The observations."""
+        return self.problem.experiment
+
+    @property
+    def converged(self) -> bool:
+        """Whether a posterior may be used; True for the other methods."""
+        return self.posterior is None or self.posterior.converged
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum calibrate --json`."""
+        from spirillum.calibration.answers import calibration_answer
+
+        return calibration_answer(self)
+
+    def write(self, folder: str | Path, *, figures: bool = True, progress: Progress | None = None) -> list[Path]:
+        """Write `calibration.toml`, `predictions.csv`, figures and, for a posterior, `posterior.nc` into a folder.
+
+        Args:
+            folder: where to.
+            figures: whether to draw figures too, which takes some seconds.
+            progress: told what is being done.
+
+        Raises:
+            InputError: if it cannot be written to.
+        """
+        from spirillum.calibration.files import write_calibration
+
+        return write_calibration(self, Path(folder), figures=figures, progress=progress)
+
+
+def given_robots(robots: RobotSource | Sequence[RobotSource]) -> list[Robot]:
+    """One robot or several, loaded."""
+    several = isinstance(robots, Sequence) and not isinstance(robots, str)
+    items: Sequence[Any] = robots if several else [robots]  # type: ignore[assignment]
+    if not items:
+        raise InputError("no robot is given; allowed: a preset or a robot file for each channel")
+    return [load(item) for item in items]
+
+
+def calibrate(
+    observations: str | Path,
+    robots: RobotSource | Sequence[RobotSource],
+    *,
+    model: str = "sbt",
+    free: str | Sequence[str] | None = None,
+    method: str = "posterior",
+    friction: str = "rotor",
+    sampling: Sampling | None = None,
+    progress: Progress | None = None,
+) -> Calibrated:
+    """Fit parameters of a model to observed speeds and rates.
+
+    Args:
+        observations: observations file, see `docs/commands`.
+        robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
+        model: hydrodynamic model.
+        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
+        method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
+        friction: reading under which B_eff follows from (18): `rotor` or `paper`.
+        sampling: how the posterior is sampled.
+        progress: told what is being done.
+
+    Raises:
+        InputError: for wrong input, or observations that cannot tell what is asked.
+    """
+    if method not in METHODS:
+        raise InputError(f"method = {method!r}{did_you_mean(method, METHODS)}; allowed: {', '.join(METHODS)}")
+    if friction not in _READINGS:
+        raise InputError(
+            f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
+        )
+    names = free_names(free, find_swimmer_model(model).name)
+    experiment = read_experiment(observations, given_robots(robots))
+    if free is None and not _has_motor(experiment):
+        names = tuple(name for name in names if name != "friction")
+    problem = posed(experiment, model, names, progress)
+    if method == "paper":
+        return _by_paper(problem, friction)
+    fit = least_squares_fit(problem)
+    check_believable(problem, fit.z)
+    report = identified(problem, fit)
+    if method == "least-squares":
+        return _by_least_squares(problem, fit, report, friction)
+    return _by_posterior(problem, fit, report, friction, sampling, progress)
+
+
+def _has_motor(experiment: Experiment) -> bool:
+    robot = experiment.robots[0]
+    driven = robot.drive is not None and robot.drive.kind == "dc-motor" and robot.drive.joint == "revolute"
+    return driven and robot.motor is not None and bool(np.any(experiment.motor_rate.seen))
+
+
+def _by_paper(problem: Problem, reading: str) -> Calibrated:
+    fit = paper_fit(problem)
+    z = problem.coordinate_of({name: np.array(value) for name, value in fit.values.items()})
+    check_believable(problem, z)
+    nan = float("nan")
+    friction: tuple[Fitted, ...] = ()
+    if "friction" in problem.free:
+        best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
+        friction = tuple(Fitted(float(value), nan, nan) for value in best)
+    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    unknown = np.full(problem.experiment.size, nan)
+    return Calibrated(
+        problem=problem,
+        method="paper",
+        reading=reading,
+        values={name: Fitted(value, nan, nan) for name, value in fit.values.items()},
+        friction=friction,
+        predicted={name: (values, unknown, unknown) for name, values in predicted.items()},
+        discrepancy={},
+        error={name: problem.ratio(name).pooled_error for name in problem.quantities},
+        paper=fit,
+        least_squares=None,
+        posterior=None,
+        identifiability=None,
+        warnings=(
+            "method 'paper' gives no uncertainty",
+            *stray_warnings(problem, z),
+            *far_warnings(problem, z),
+            *plain_misfit_warnings(problem, z),
+            *common_warnings(problem, friction),
+        ),
+    )
+
+
+def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> Calibrated:
+    """Intervals from draws around the best fit, in coordinates."""
+    rng = np.random.default_rng(1)
+    z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
+    best = problem.values(fit.z[None])
+    draws = problem.values(z)
+    values = {name: _fitted(float(best[name][0]), draws[name]) for name in best}
+    friction = _friction(problem, z, fit.z, fit.error, reading, rng)
+    predicted = _predicted(problem, fit.z, z, tau, rng)
+    discrepancy = {name: _fitted(value, tau[name]) for name, value in fit.discrepancy.items()}
+    warnings = [
+        *_of_the_fit(problem, fit, report),
+        *misfit_warnings(problem, discrepancy, fit.left),
+        *common_warnings(problem, friction),
+    ]
+    return Calibrated(
+        problem=problem,
+        method="least-squares",
+        reading=reading,
+        values=values,
+        friction=friction,
+        predicted=predicted,
+        discrepancy=discrepancy,
+        error=fit.error,
+        paper=None,
+        least_squares=fit,
+        posterior=None,
+        identifiability=report,
+        warnings=tuple(warnings),
+    )
+
+
+def _by_posterior(
+    problem: Problem,
+    fit: LeastSquares,
+    report: Identifiability,
+    reading: str,
+    sampling: Sampling | None,
+    progress: Progress | None,
+) -> Calibrated:
+    posterior = sampled(problem, fit, sampling, progress)
+    rng = np.random.default_rng(1)
+    chosen = posterior.flat[rng.permutation(posterior.flat.shape[0])[:_FRICTION_DRAWS]]
+    own = chosen[:, : len(problem.coordinates)]
+    middle = np.median(posterior.flat[:, : len(problem.coordinates)], axis=0)
+    every = {name: values.reshape(-1) for name, values in posterior.values().items()}
+    tau, sigma = posterior.density.nuisances(chosen)
+    discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
+    friction = _friction(problem, own, middle, {name: float(np.median(s)) for name, s in sigma.items()}, reading, rng)
+    wrong = [f"the posterior may not be used: {problem_found}" for problem_found in posterior.problems()]
+    warnings = [
+        *wrong,
+        *_of_the_fit(problem, fit, report),
+        *misfit_warnings(problem, discrepancy, fit.left),
+        *common_warnings(problem, friction),
+    ]
+    return Calibrated(
+        problem=problem,
+        method="posterior",
+        reading=reading,
+        values={item.label: _middle(every[item.label]) for item in problem.coordinates},
+        friction=friction,
+        predicted=_predicted(problem, middle, own, tau, rng),
+        discrepancy=discrepancy,
+        error={name: float(np.median(every[f"error_{name}"])) for name in problem.quantities},
+        paper=None,
+        least_squares=fit,
+        posterior=posterior,
+        identifiability=report,
+        warnings=tuple(warnings),
+    )
+
+
+def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability) -> list[str]:
+    return [*stray_warnings(problem, fit.z), *report.warnings, *far_warnings(problem, fit.z)]
+
+
+def limits(draws: Samples) -> tuple[Samples, Samples]:
+    """Limits of the 95 % interval along the first axis."""
+    low, high = np.quantile(draws, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
+    return low, high
+
+
+def _fitted(value: float, draws: Samples) -> Fitted:
+    low, high = limits(draws)
+    return Fitted(value, float(low), float(high))
+
+
+def _middle(draws: Samples) -> Fitted:
+    return _fitted(float(np.median(draws)), draws)
+
+
+def _friction(
+    problem: Problem,
+    z: Samples,
+    best: Samples,
+    error: Mapping[Quantity, float],
+    reading: str,
+    rng: np.random.Generator,
+) -> tuple[Fitted, ...]:
+    """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it."""
+    if "friction" not in problem.free:
+        return ()
+    ratio = problem.experiment.motor_rate
+    own_error = error.get("motor_rate", ratio.pooled_error)
+    relative = np.nan_to_num(own_error) / np.sqrt(np.maximum(ratio.trials, 1.0))
+    rates = ratio.mean * (1.0 + relative * rng.normal(size=(z.shape[0], problem.experiment.size)))
+    draws = problem.friction(z, rates, reading)
+    middle = problem.friction(best[None], ratio.mean[None], reading)[0]
+    low, high = limits(draws)
+    return tuple(Fitted(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))
+
+
+def _predicted(
+    problem: Problem,
+    best: Samples,
+    z: Samples,
+    discrepancy: Mapping[Quantity, float | Samples],
+    rng: np.random.Generator,
+) -> dict[Quantity, tuple[Samples, Samples, Samples]]:
+    draws, middle = problem.predicted(z), problem.predicted(best[None])
+    found: dict[Quantity, tuple[Samples, Samples, Samples]] = {}
+    for name, values in draws.items():
+        tau = np.reshape(np.asarray(discrepancy[name], dtype=float), (-1, 1))
+        spread = values * (1.0 + tau * rng.normal(size=values.shape))
+        found[name] = (middle[name][0], *limits(spread))
+    return found

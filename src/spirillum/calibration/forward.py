@@ -1,0 +1,292 @@
+"""From parameters to what is observed: the force balance for many draws and many robots at once.
+
+The resistance of every robot is computed once. What is left for a draw of the parameters is a 3x3 balance for each
+robot, in closed form. Over parameters that change the geometry (wire, gap, pitch) resistances are interpolated by
+polynomials through Chebyshev points, whose error is measured at points in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.hydrodynamics.perrin import body_axial
+from spirillum.motion.balance import force_free, friction_torques, rates_per_torque
+from spirillum.motion.motor import steady_current
+from spirillum.robot.batch import Electrics, RobotBatch
+
+__all__ = ["Draws", "Forward", "Predicted", "Table", "axis_points", "kinematics", "tabulated"]
+
+Draws = Mapping[str, Samples]
+"""Parameter to values, (draws, robots) or (draws, 1)."""
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What draws of the parameters predict, (draws, robots)."""
+
+    advance: Samples
+    """U/omega, m/rad."""
+    turning: Samples
+    """Omega/omega."""
+    load: Samples
+    """T_h/omega: torque that turns the rotor against the fluid, N m s."""
+
+    def over_motor(self) -> Samples:
+        """U/omega_m, m/rad."""
+        return self.advance / (1.0 - self.turning)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Balance matrices over tabulated parameters; with none of them a single point.
+
+    `parts` are summands: the first with factor one, the others with those of RFT's coefficients.
+    """
+
+    names: tuple[str, ...]
+    """Tabulated parameters."""
+    nodes: tuple[Samples, ...]
+    """The points of each axis, as `axis_points` gives them."""
+    parts: tuple[Samples, ...]
+    """(points..., robots, 3, 3): rows force on the whole, torque on body, on rotor; columns U, Omega, omega."""
+    drag: Samples
+    """D_x of each robot, N s/m."""
+    rotation: Samples
+    """E_x of each robot, N m s."""
+
+
+def _three(axial: Samples) -> Samples:
+    """The 4x4 of both parts as a 3x3: both share U, and their forces are added."""
+    rows = np.stack([axial[..., 0, :] + axial[..., 2, :], axial[..., 1, :], axial[..., 3, :]], axis=-2)
+    return np.stack([rows[..., 0] + rows[..., 2], rows[..., 1], rows[..., 3]], axis=-1)
+
+
+def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tuple[Samples, ...]:
+    """Summands of the balance matrix; RFT is linear in both of its coefficients."""
+    whole = np.broadcast_to(_three(model.axial(batch)), (batch.size, 3, 3))
+    if not coefficients:
+        return (whole,)
+    own = batch.options.rft
+    found = []
+    for name in ("normal_factor", "tangential_factor"):
+        value = getattr(own, name)
+        doubled = own.model_copy(update={name: 2.0 * value})
+        other = replace(batch, options=batch.options.model_copy(update={"rft": doubled}))
+        found.append((_three(model.axial(other)) - whole) / value)
+    rest = whole - own.normal_factor * found[0] - own.tangential_factor * found[1]
+    return rest, found[0], found[1]
+
+
+def axis_points(name: str, count: int, low: float, high: float) -> tuple[Samples, Samples]:
+    """Chebyshev points of the first kind along a parameter: along its logarithm for lengths, and its values there."""
+    ends = _along(name, np.array([low, high]))
+    angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
+    points = 0.5 * (ends[0] + ends[1]) - 0.5 * (ends[1] - ends[0]) * np.cos(angle)
+    return points, points if name in _LINEAR else np.exp(points)
+
+
+_LINEAR = ("pitch",)
+"""Tabulated parameters that may be zero."""
+
+
+def _along(name: str, values: Samples) -> Samples:
+    return values if name in _LINEAR else np.log(values)
+
+
+def tabulated(
+    batches: Iterable[RobotBatch],
+    model: SwimmerModel,
+    names: Sequence[str] = (),
+    nodes: Sequence[Samples] = (),
+    *,
+    coefficients: bool = False,
+) -> Table:
+    """Compute the resistances at every point of the table.
+
+    Args:
+        batches: the robots at each point, the last axis fastest; one batch where nothing is tabulated.
+        model: the hydrodynamic model.
+        names: tabulated parameters.
+        nodes: points of each axis.
+        coefficients: whether RFT's coefficients are free.
+    """
+    shape = tuple(axis.size for axis in nodes)
+    found, first = [], None
+    for batch in batches:
+        first = first or batch
+        found.append(_parts(batch, model, coefficients=coefficients))
+    assert first is not None  # noqa: S101 - a table has a point
+    size = first.size
+    drag, rotation = body_axial(first)
+    return Table(
+        names=tuple(names),
+        nodes=tuple(nodes),
+        parts=tuple(np.stack(part).reshape(*shape, size, 3, 3) for part in zip(*found, strict=True)),
+        drag=np.broadcast_to(drag, (size,)),
+        rotation=np.broadcast_to(rotation, (size,)),
+    )
+
+
+def _weights(nodes: Samples, at: Samples) -> Samples:
+    """Weights of the points for polynomial interpolation (barycentric form), with one more axis at the end."""
+    count = nodes.size
+    angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
+    signs = (-1.0) ** np.arange(count) * np.sin(angle)
+    distance = at[..., None] - nodes
+    hit = np.abs(distance) < 1e-14 * np.ptp(nodes)
+    raw = signs / np.where(hit, 1.0, distance)
+    raw = np.where(np.any(hit, axis=-1, keepdims=True), hit, raw)
+    found: Samples = raw / raw.sum(axis=-1, keepdims=True)
+    return found
+
+
+@dataclass(frozen=True)
+class Forward:
+    """The robots of an experiment, ready to be asked."""
+
+    table: Table
+    electrics: Electrics | None
+    """Motor and battery of the robots."""
+    viscosity: Samples
+    """The robots' own, to which the table belongs, Pa s."""
+    factors: Mapping[str, Samples] = field(default_factory=dict)
+    """The robots' own factors, where they are not free; 1 where they have none."""
+
+    def matrices(self, draws: Draws) -> Samples:
+        """Balance matrices, (draws, robots, 3, 3), with all factors in them."""
+        table = self.table
+        parts = [self._at(part, draws) for part in table.parts]
+        m = parts[0]
+        for part, name in zip(parts[1:], ("normal_factor", "tangential_factor"), strict=False):
+            m = m + np.asarray(draws.get(name, self.factors.get(name, 1.0)))[..., None, None] * part
+        drag = (np.asarray(draws.get("body_drag", self.factors.get("body_drag", 1.0))) - 1.0) * table.drag
+        rotation = (
+            np.asarray(draws.get("body_rotation", self.factors.get("body_rotation", 1.0))) - 1.0
+        ) * table.rotation
+        shape = np.broadcast_shapes(m.shape[:2], np.shape(drag), np.shape(rotation))
+        full = np.array(np.broadcast_to(m, (*shape, 3, 3)))
+        full[..., 0, 0] += drag
+        full[..., 1, 1] += rotation
+        if "viscosity" in draws:
+            full = full * (np.asarray(draws["viscosity"]) / self.viscosity)[..., None, None]
+        return full
+
+    def _at(self, part: Samples, draws: Draws) -> Samples:
+        """Interpolate a part at the draws, (draws, robots, 3, 3)."""
+        if not self.table.names:
+            return part[None]
+        robots = part.shape[-3]
+        weights = [
+            _weights(nodes, _along(name, np.broadcast_to(draws[name], (draws[name].shape[0], robots))))
+            for name, nodes in zip(self.table.names, self.table.nodes, strict=True)
+        ]
+        if len(weights) == 1:
+            along: Samples = np.einsum("wja,ajkl->wjkl", weights[0], part)
+            return along
+        both: Samples = np.einsum("wja,wjb,abjkl->wjkl", weights[0], weights[1], part, optimize=True)
+        return both
+
+    def predict(self, draws: Draws) -> Predicted:
+        """Kinematics (15): what every turn of the tail gives, from zero force and zero torque on the whole."""
+        return kinematics(self.matrices(draws))
+
+    def motor_rate(self, draws: Draws, friction: Samples) -> Samples:
+        """omega_m at full throttle with B_eff in the joint, from (15), (17) and (18), rad/s, (draws, robots).
+
+        Args:
+            draws: parameters.
+            friction: B_eff, N m s/rad.
+        """
+        motor = self._motor(draws)
+        m = self.matrices(draws)
+        shape = np.broadcast_shapes(m.shape[:2], np.shape(friction), *_motor_shapes(motor))
+        flat = np.broadcast_to(m, (*shape, 3, 3)).reshape(-1, 3, 3)
+        four = np.zeros((flat.shape[0], 4, 4))
+        pick = np.array([0, 1, 3])
+        four[:, pick[:, None], pick] = flat
+        balance = force_free(four, np.zeros((1, 4)))
+        joint = np.broadcast_to(friction, shape).reshape(-1)
+        body, tail = rates_per_torque(balance, friction_torques("rotor", joint, joint))
+        flat_motor, slip = _flat(motor, shape), tail - body
+        per_current = flat_motor.torque_constant * slip
+        current = steady_current(flat_motor, np.zeros(1), flat_motor.back_emf_constant * per_current)
+        found: Samples = (flat_motor.polarity * per_current * current).reshape(shape)
+        return found
+
+    def friction(
+        self, draws: Draws, motor_rate: Samples, tail_share: Samples | None = None, reading: str = "rotor"
+    ) -> Samples:
+        """B_eff of (18) at given motor rates, N m s/rad, (draws, robots).
+
+        Args:
+            draws: parameters.
+            motor_rate: omega_m, rad/s.
+            tail_share: observed omega/omega_m of each robot; None or NaN: as the model turns the body.
+            reading: `rotor`, or `paper`, in which the body's torque row holds -K_m I.
+        """
+        motor, m = self._motor(draws), self.matrices(draws)
+        found = kinematics(m)
+        own = 1.0 / (1.0 - found.turning)
+        share = own if tail_share is None else np.where(np.isnan(tail_share), own, tail_share)
+        shape = np.broadcast_shapes(share.shape, np.shape(motor_rate), *_motor_shapes(motor))
+        rate = np.broadcast_to(np.abs(motor_rate), shape)
+        flat_motor = _flat(motor, shape)
+        emf = flat_motor.back_emf_constant * rate.reshape(-1)
+        torque = motor.torque_constant * steady_current(flat_motor, emf, np.zeros(1)).reshape(shape)
+        tail = share * rate
+        if reading == "rotor":
+            joint: Samples = (torque - found.load * tail) / rate
+            return joint
+        body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
+        body = -(torque + (m[..., 1, 2] + m[..., 1, 0] * rotor_u) * tail) / (m[..., 1, 1] + m[..., 1, 0] * body_u)
+        load = (m[..., 2, 1] + m[..., 2, 0] * body_u) * body + (m[..., 2, 2] + m[..., 2, 0] * rotor_u) * tail
+        printed: Samples = (torque - load) / rate
+        return printed
+
+    def _motor(self, draws: Draws) -> Electrics:
+        if self.electrics is None:
+            raise InputError("the robots have no dc-motor; allowed: robots with [motor], [battery] and drive.kind")
+        changed = {
+            name: np.asarray(draws[name], dtype=float)
+            for name in ("torque_constant", "back_emf_constant")
+            if name in draws
+        }
+        return replace(self.electrics, **changed)
+
+    def interpolation_error(self, other: Forward, draws: Draws) -> float:
+        """Largest relative difference of advance and turning from resistances that were computed at the draws."""
+        ours, theirs = self.predict(draws), other.predict({k: v for k, v in draws.items() if k not in self.table.names})
+        pairs = ((ours.advance, theirs.advance), (ours.turning, theirs.turning), (ours.load, theirs.load))
+        return max(float(np.max(np.abs(a / b - 1.0))) for a, b in pairs)
+
+
+def kinematics(m: Samples) -> Predicted:
+    """The balance of force and torque on the whole, per rate of the tail.
+
+    Args:
+        m: balance matrices, (..., 3, 3), as in `Table`.
+    """
+    force = m[..., 0, :]
+    torque = m[..., 1, :] + m[..., 2, :]
+    determinant = force[..., 0] * torque[..., 1] - force[..., 1] * torque[..., 0]
+    advance = (force[..., 1] * torque[..., 2] - force[..., 2] * torque[..., 1]) / determinant
+    turning = (force[..., 2] * torque[..., 0] - force[..., 0] * torque[..., 2]) / determinant
+    load = m[..., 2, 0] * advance + m[..., 2, 1] * turning + m[..., 2, 2]
+    return Predicted(advance, turning, load)
+
+
+def _motor_shapes(motor: Electrics) -> list[tuple[int, ...]]:
+    """Shapes of what may be free in a motor."""
+    return [motor.torque_constant.shape, motor.back_emf_constant.shape]
+
+
+def _flat(motor: Electrics, shape: tuple[int, ...]) -> Electrics:
+    """Every column laid out over draws and robots, as one axis."""
+    columns = {f.name: np.broadcast_to(getattr(motor, f.name), shape).reshape(-1) for f in fields(motor)}
+    return replace(motor, **columns)

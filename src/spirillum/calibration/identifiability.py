@@ -1,0 +1,183 @@
+"""What the observations can and cannot tell: sensitivities, their singular directions, and profiles.
+
+The Jacobian of all predictions, over their standard errors, maps the coordinates of the fit to what is seen. A singular
+value s of it says that the observations know the direction to 1/s standard deviations of the prior. Where s is below 1
+they say less than the prior does, and the direction is named: which numbers trade off against each other, and how.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.least_squares import LeastSquares, sensitivities, standard_errors, weighted_residuals
+from spirillum.calibration.problem import Problem
+
+__all__ = ["Identifiability", "Profile", "identified", "profiles"]
+
+_UNKNOWN = 1.0
+"""Singular value below which the prior says more than the observations."""
+_POOR = 3.0
+_MEMBER = 0.25
+"""Least share of a direction, over that of the first, at which a number is named."""
+_LEAST_ERROR = 1e-3
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """Directions of the free numbers, from the best known to the least."""
+
+    labels: tuple[str, ...]
+    sensitivity: Samples
+    """Root mean square relative change of all predictions per relative change of each number."""
+    singular: Samples
+    """Singular values: how many times narrower than the prior the observations make each direction."""
+    directions: Samples
+    """(directions, numbers), unit vectors in coordinates of the prior."""
+    correlation: Samples
+    """Between the numbers, from the observations alone."""
+    warnings: tuple[str, ...]
+    """What is not identifiable, in words."""
+
+    @property
+    def unknown(self) -> int:
+        """Number of directions of which the observations say less than the prior."""
+        return int(np.count_nonzero(self.singular < _UNKNOWN))
+
+
+def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
+    """Judge a fit's directions at its optimum.
+
+    Args:
+        problem: the fit.
+        fit: its least squares.
+    """
+    predicted = {name: values[0] for name, values in problem.predicted(fit.z[None]).items()}
+    error = {name: max(np.nan_to_num(value), _LEAST_ERROR) for name, value in fit.error.items()}
+    errors = standard_errors(problem, predicted, error, fit.discrepancy)
+    rows, plain = [], []
+    for name, column in sensitivities(problem, fit.z).items():
+        seen = problem.ratio(name).seen
+        rows.append((column * (predicted[name] / errors[name])[:, None])[seen])
+        plain.append(column[seen])
+    jacobian, relative = np.concatenate(rows), np.concatenate(plain)
+    _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
+    labels = tuple(item.label for item in problem.coordinates)
+    slope = _slopes(problem, fit.z)
+    information = jacobian.T @ jacobian
+    covariance = np.linalg.pinv(information, rcond=1e-14)
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return Identifiability(
+        labels=labels,
+        sensitivity=np.sqrt(np.mean(relative**2, axis=0)) / np.maximum(np.abs(slope), 1e-12),
+        singular=singular,
+        directions=directions,
+        correlation=covariance / np.outer(size, size),
+        warnings=tuple(_words(problem, fit.z, s, d) for s, d in zip(singular, directions, strict=True) if s < _POOR),
+    )
+
+
+def _slopes(problem: Problem, z: Samples) -> Samples:
+    """D log(value)/dz of each number."""
+    step = 1e-5
+    up, down = problem.values((z + step)[None]), problem.values((z - step)[None])
+    at = problem.values(z[None])
+    return np.array(
+        [
+            (up[item.label][0] - down[item.label][0]) / (2.0 * step * max(abs(at[item.label][0]), 1e-300))
+            for item in problem.coordinates
+        ]
+    )
+
+
+def _words(problem: Problem, z: Samples, singular: float, direction: Samples) -> str:
+    """A poorly known direction in plain words."""
+    # By the change of the numbers themselves, and of their coordinates: a wide prior makes a large change small there.
+    relative = np.abs(direction * _slopes(problem, z))
+    share = np.maximum(np.abs(direction), relative / max(float(relative.max()), 1e-300))
+    named = [int(place) for place in np.argsort(-relative) if share[place] >= _MEMBER]
+    labels = [problem.coordinates[place].label for place in named]
+    known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
+    if len(named) == 1:
+        return (
+            f"{labels[0]} is hardly identifiable: the observations say {known} about it, for they hardly change "
+            "with it, "
+            "or as they do with others"
+        )
+    moved = z + 0.5 * direction * np.sign(direction[named[0]])
+    before, after = problem.values(z[None]), problem.values(moved[None])
+    changes = [f"{label} by {_change(before[label][0], after[label][0])}" for label in labels]
+    effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
+    return (
+        f"{_listed(labels)} trade off: changing {_listed(changes)} together moves all predictions by {effect} "
+        f"standard errors in all; the observations say {known} about that"
+    )
+
+
+def _listed(items: list[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def _change(before: float, after: float) -> str:
+    return f"{100 * (after / before - 1.0):+.2g} %"
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Least misfit with one number held."""
+
+    label: str
+    values: Samples
+    """Held values."""
+    misfit: Samples
+    """Sum of squared residuals above its least; 3.84 is the limit of the 95 % interval."""
+
+
+def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[Profile]:
+    """Profile likelihood of every free number: the others are fitted anew at each held value.
+
+    Args:
+        problem: the fit.
+        fit: its least squares.
+        count: number of held values.
+    """
+
+    def residuals(z: Samples) -> Samples:
+        return weighted_residuals(problem, z, fit.error, fit.discrepancy)
+
+    spread = np.clip(np.sqrt(np.diag(fit.covariance)), 1e-6, 2.0)
+    least = float(np.sum(residuals(fit.z) ** 2))
+    found = []
+    for place, item in enumerate(problem.coordinates):
+        held = fit.z[place] + spread[place] * np.linspace(-3.0, 3.0, count)
+        misfit = np.empty(count)
+        middle = count // 2
+        for side in (range(middle, count), range(middle, -1, -1)):
+            start = fit.z
+            for n in side:
+                start, misfit[n] = _others_fitted(residuals, start, place, float(held[n]))
+        found.append(Profile(item.label, item.prior.value(held), np.maximum(misfit - least, 0.0)))
+    return found
+
+
+def _others_fitted(
+    residuals: Callable[[Samples], Samples], start: Samples, place: int, held: float
+) -> tuple[Samples, float]:
+    """Fit all coordinates but one that is held; the coordinates, and the sum of squares."""
+    from scipy.optimize import least_squares
+
+    others = np.arange(start.size) != place
+
+    def whole(rest: Samples) -> Samples:
+        z = np.empty(start.size)
+        z[others], z[place] = rest, held
+        return z
+
+    if start.size == 1:
+        return whole(start[others]), float(np.sum(residuals(whole(start[others])) ** 2))
+    first = np.clip(start[others], -11.9, 11.9)
+    solved = least_squares(lambda rest: residuals(whole(rest)), first, bounds=(-12.0, 12.0), max_nfev=60)
+    return whole(solved.x), 2.0 * float(solved.cost)

@@ -1,0 +1,171 @@
+"""What a fit is worth, in words: misfit, outliers, numbers far from their prior, and what may not be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import Quantity
+from spirillum.calibration.least_squares import FEWEST_LEFT
+from spirillum.calibration.problem import Problem
+from spirillum.errors import InputError
+
+if TYPE_CHECKING:
+    from spirillum.calibration.fit import Fitted
+
+__all__ = [
+    "check_believable",
+    "common_warnings",
+    "far_warnings",
+    "misfit_warnings",
+    "percent",
+    "plain_misfit_warnings",
+    "stray_warnings",
+]
+
+_WORDS: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
+_LARGE_MISFIT = 0.03
+_SENSELESS = 10.0
+"""Factor of a typical misfit beyond which observations and model differ in robot or units."""
+_FAR = 3.0
+_SENSELESSLY_FAR = 5.0
+_WIDE = 0.5
+"""Spread of a prior so wide that nothing true lies many times as far away."""
+_STRAY, _LEAST_STRAY = 6.0, 0.2
+
+
+def percent(share: float) -> str:
+    """A share in per cent, with two digits and no power of ten where it is a plain number."""
+    value = 100.0 * share
+    return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
+
+
+def check_believable(problem: Problem, z: Samples) -> None:
+    """Refuse a fit that no reading of the observations explains: most often they are in other units.
+
+    Args:
+        problem: the fit.
+        z: coordinates of the best fit.
+
+    Raises:
+        InputError: if a prediction typically misses by more than what was observed, or is missed by it, or a factor
+            lies where no prior knowledge allows it.
+    """
+    source, model = problem.experiment.source, problem.model.name
+    for name, values in problem.predicted(z[None]).items():
+        ratio = problem.ratio(name)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            off = np.abs(np.log(np.abs(ratio.mean / values[0])))[ratio.seen]
+        if float(np.median(off)) > np.log(_SENSELESS):
+            factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values[0]))[ratio.seen])))
+            raise InputError(
+                f"{source}: the observed {_WORDS[name]} is typically {factor:.3g} times what model '{model}' can "
+                "explain; allowed: within a factor of ten (are the columns in mm, mm/s and Hz?)"
+            )
+    for item, place in zip(problem.coordinates, z, strict=True):
+        if abs(place) > _SENSELESSLY_FAR and getattr(item.prior, "spread", 0.0) >= _WIDE:
+            value = float(problem.values(z[None])[item.label][0])
+            raise InputError(
+                f"{source}: {item.label} comes out as {value:.3g}; allowed: observations that a number nearer to its "
+                f"prior explains ({item.prior.words(item.parameter.unit)}; are the columns in mm, mm/s and Hz?)"
+            )
+
+
+def far_warnings(problem: Problem, z: Samples) -> list[str]:
+    """Numbers that lie where their prior hardly allows them."""
+    values = problem.values(z[None])
+    return [
+        f"{item.label} = {float(values[item.label][0]):.3g} lies {abs(place):.1f} standard deviations from the middle "
+        f"of its prior ({item.prior.words(item.parameter.unit)}): the model, a unit or the robot may be wrong"
+        for item, place in zip(problem.coordinates, z, strict=True)
+        if abs(place) > _FAR
+    ]
+
+
+def stray_warnings(problem: Problem, z: Samples) -> list[str]:
+    """Rows whose trial, or whose robot, is far off all others."""
+    experiment = problem.experiment
+    found = list(experiment.strays)
+    for name, values in problem.predicted(z[None]).items():
+        ratio = problem.ratio(name)
+        relative = np.where(ratio.seen, ratio.mean / values[0] - 1.0, np.nan)
+        if np.count_nonzero(ratio.seen) < 5:
+            continue
+        off = np.abs(relative - np.nanmedian(relative))
+        limit = max(_STRAY * 1.4826 * float(np.nanmedian(off)), _LEAST_STRAY)
+        for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
+            rows = ", ".join(str(row) for row in experiment.rows[place])
+            found.append(
+                f"row {rows}: the {_WORDS[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
+                "off the fit, far more than that of other tails: an outlier?"
+            )
+    return found
+
+
+def misfit_warnings(
+    problem: Problem, discrepancy: Mapping[Quantity, Fitted], left: Mapping[Quantity, float] | None = None
+) -> list[str]:
+    """A wrong model must not look certain: say by how much it misses.
+
+    Args:
+        problem: the fit.
+        discrepancy: relative misfit by quantity.
+        left: degrees of freedom that the fit leaves each quantity; None: enough.
+    """
+    found = []
+    for name, size in discrepancy.items():
+        if left is not None and left[name] < FEWEST_LEFT:
+            found.append(
+                f"the fit has as many free numbers as the {_WORDS[name]} has means: nothing is left to tell by how "
+                f"much model '{problem.model.name}' misses, and the intervals take what models of this kind miss by"
+            )
+        elif not problem.ratio(name).freedom.sum() > 0:
+            found.append(
+                f"the {_WORDS[name]} was observed once for each tail: the errors of trials and of the model "
+                "cannot be told apart, and the discrepancy holds both"
+            )
+        elif size.value > _LARGE_MISFIT:
+            found.append(
+                f"model '{problem.model.name}' misses the {_WORDS[name]} by {percent(size.value)} from tail to tail, "
+                "beyond the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for "
+                "these tails"
+            )
+    return found
+
+
+def plain_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
+    """By how much a fit without statistics misses the means."""
+    found = []
+    for name, values in problem.predicted(z[None]).items():
+        ratio = problem.ratio(name)
+        size = float(np.sqrt(np.mean((ratio.mean / values[0] - 1.0)[ratio.seen] ** 2)))
+        if size > _LARGE_MISFIT:
+            found.append(
+                f"model '{problem.model.name}' with these factors misses the {_WORDS[name]} by {percent(size)} (root "
+                "mean square over the tails), errors of the trials included"
+            )
+    return found
+
+
+def common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
+    """What has to be said of any method's answer."""
+    experiment = problem.experiment
+    found = []
+    if experiment.synthetic:
+        found.append(f"{experiment.source} says that its numbers are synthetic: nothing here is measured")
+    negative = [n for n, item in enumerate(friction) if item.value < 0]
+    if negative:
+        found.append(
+            f"B_eff comes out negative for {len(negative)} of {len(friction)} robots, the first: "
+            f"{experiment.labels()[negative[0]]}: the model's torque exceeds what the motor gives; a prediction of "
+            "these tails takes zero"
+        )
+    if problem.interpolation_error > 0:
+        found.append(
+            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction, "
+            "checked between the points of the table"
+        )
+    return found

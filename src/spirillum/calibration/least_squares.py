@@ -1,0 +1,353 @@
+"""Weighted nonlinear least squares from several starts: the fast answer, with honest errors.
+
+Residuals are means less predictions over their standard errors. Where the model misses the means by more than the
+trials scatter, a standard error alone would make a wrong model look certain. The excess is then estimated as a relative
+discrepancy from robot to robot, for each quantity (method of moments), and goes into weights and errors. It is known no
+better than the residuals that are left tell: intervals are over draws of it, and where a fit leaves no residual, over
+its prior alone. The prior of the numbers is a residual too, so that what the observations do not see stays there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import Quantity
+from spirillum.calibration.likelihood import DISCREPANCY_SCALE
+from spirillum.calibration.problem import Problem
+from spirillum.errors import InputError
+
+__all__ = [
+    "FEWEST_LEFT",
+    "LeastSquares",
+    "drawn_fit",
+    "least_squares_fit",
+    "sensitivities",
+    "standard_errors",
+    "weighted_residuals",
+]
+
+_STARTS = 6
+_STEP = 1e-4
+_BLIND = 1e-8
+_LARGEST = 12.0
+_BREATH = 1e-2
+FEWEST_LEFT = 0.5
+"""Degrees of freedom below which a fit leaves no residual to judge the model by."""
+_MIDDLE = 0.6745
+"""Median of a half-normal number over its scale."""
+_SHARP = 0.01
+_LEAST_ERROR = 1e-3
+"""Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """The best fit and what it leaves."""
+
+    z: Samples
+    """Coordinates."""
+    covariance: Samples
+    """Of the coordinates."""
+    discrepancy: dict[Quantity, float]
+    """Relative misfit from robot to robot beyond the trials' scatter."""
+    error: dict[Quantity, float]
+    """Relative error of one trial; NaN without repeated trials."""
+    chi2: float
+    """Sum of squared residuals with the trials' scatter alone; NaN without repeated trials."""
+    freedom: int
+    """Observed means less free numbers."""
+    left: dict[Quantity, float]
+    """Degrees of freedom that the fit leaves each quantity."""
+    residuals: dict[Quantity, Samples]
+    """Observed over predicted less one, robot by robot."""
+
+
+def sensitivities(problem: Problem, z: Samples) -> dict[Quantity, Samples]:
+    """Relative change of every prediction per unit of each coordinate, (robots, free numbers), by central differences.
+
+    Args:
+        problem: the fit.
+        z: coordinates, (free numbers,).
+    """
+    count = z.size
+    steps = _STEP * np.eye(count)
+    points = np.concatenate([z + steps, z - steps, z[None]])
+    found = problem.predicted(points)
+    return {
+        name: (values[:count] - values[count : 2 * count]).T / (2.0 * _STEP * values[-1][:, None])
+        for name, values in found.items()
+    }
+
+
+def standard_errors(
+    problem: Problem,
+    predicted: dict[Quantity, Samples],
+    error: dict[Quantity, float],
+    discrepancy: dict[Quantity, float],
+) -> dict[Quantity, Samples]:
+    """Standard error of each mean against its prediction, in the quantity's unit.
+
+    Args:
+        problem: the fit.
+        predicted: predictions, to which the discrepancy is relative.
+        error: relative error of one trial, by quantity.
+        discrepancy: relative misfit from robot to robot, by quantity.
+    """
+    found: dict[Quantity, Samples] = {}
+    for name, values in predicted.items():
+        ratio = problem.ratio(name)
+        trial = np.nan_to_num(error[name]) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+        floor = max(_LEAST_ERROR, problem.interpolation_error) * ratio.scale
+        found[name] = np.sqrt(trial**2 + (discrepancy[name] * values) ** 2 + floor**2)
+    return found
+
+
+def least_squares_fit(problem: Problem) -> LeastSquares:
+    """Fit the free numbers.
+
+    Raises:
+        InputError: if there are fewer means than free numbers, or one on which nothing observed depends.
+    """
+    _check_count(problem)
+    error = {name: problem.ratio(name).pooled_error for name in problem.quantities}
+    scattered = {name: bool(np.isfinite(value) and value > 0) for name, value in error.items()}
+    # Without scatter all means count alike, by their relative deviation.
+    discrepancy = {name: 0.0 if scattered[name] else 1.0 for name in problem.quantities}
+    z = _best(problem, problem.start, error, discrepancy, starts=_STARTS, prior=_BREATH)
+    _check_blind(problem, z)
+    chi2 = float("nan")
+    if all(scattered.values()):
+        chi2 = float(np.sum(weighted_residuals(problem, z, error, discrepancy, prior=0.0) ** 2))
+    left = _left(problem, z, error, discrepancy)
+    for turn in range(8):
+        found = _discrepancy(problem, z, error, left)
+        change = max(abs(found[name] - discrepancy[name]) for name in found)
+        discrepancy = found
+        if change < 1e-4 and turn:
+            break
+        z = _best(problem, z, error, discrepancy, starts=1, prior=1.0)
+        left = _left(problem, z, error, discrepancy)
+    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    return LeastSquares(
+        z=z,
+        covariance=_covariance(problem, z, error, discrepancy),
+        discrepancy=discrepancy,
+        error=error,
+        chi2=chi2,
+        freedom=_count(problem) - z.size,
+        left=left,
+        residuals={name: problem.ratio(name).mean / predicted[name] - 1.0 for name in predicted},
+    )
+
+
+def _count(problem: Problem) -> int:
+    return sum(int(np.count_nonzero(problem.ratio(name).seen)) for name in problem.quantities)
+
+
+def _check_count(problem: Problem) -> None:
+    if not problem.coordinates:
+        raise InputError(
+            f"free = '{', '.join(problem.free)}': nothing to fit; allowed: also body_drag or another parameter, "
+            "or method "
+            "'paper'"
+        )
+    count = _count(problem)
+    if count < len(problem.coordinates):
+        raise InputError(
+            f"{problem.experiment.source} has {count} means of {problem.experiment.size} robots, fewer than the "
+            f"{len(problem.coordinates)} free numbers ({', '.join(c.label for c in problem.coordinates)}); "
+            "allowed: more "
+            "observations, or fewer free parameters"
+        )
+
+
+def _check_blind(problem: Problem, z: Samples) -> None:
+    """Refuse a free number on which nothing that was observed depends."""
+    columns = sensitivities(problem, z)
+    for place, item in enumerate(problem.coordinates):
+        felt = max(float(np.max(np.abs(s[problem.ratio(n).seen, place]))) for n, s in columns.items())
+        if felt < _BLIND:
+            need = "rotation rates of body and tail" if item.parameter.name == "body_rotation" else "other quantities"
+            raise InputError(
+                f"free = '{item.label}': nothing observed in {problem.experiment.source} depends on it; allowed: "
+                f"observations of {need}, or without it"
+            )
+
+
+def weighted_residuals(
+    problem: Problem,
+    z: Samples,
+    error: dict[Quantity, float],
+    discrepancy: dict[Quantity, float],
+    *,
+    prior: float = 1.0,
+) -> Samples:
+    """What least squares make small: means less predictions over their standard errors, and the prior's share.
+
+    Args:
+        problem: the fit.
+        z: coordinates, (free numbers,).
+        error: relative error of one trial, by quantity.
+        discrepancy: relative misfit from robot to robot, by quantity.
+        prior: weight of the distance from the middle of the prior.
+    """
+    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    # A discrepancy is relative to the size of the mean here: else a large prediction would excuse itself.
+    sized = {name: problem.ratio(name).scale for name in predicted}
+    errors = standard_errors(problem, sized, error, discrepancy)
+    parts = []
+    for name, values in predicted.items():
+        ratio = problem.ratio(name)
+        parts.append(((ratio.mean - values) / errors[name])[ratio.seen])
+    found: Samples = np.nan_to_num(np.concatenate([*parts, prior * z]), nan=1e6, posinf=1e6, neginf=-1e6)
+    return found
+
+
+def _best(
+    problem: Problem,
+    start: Samples,
+    error: dict[Quantity, float],
+    discrepancy: dict[Quantity, float],
+    *,
+    starts: int,
+    prior: float,
+) -> Samples:
+    """The best of several local fits; the first starts where it is told, the others are spread over the prior."""
+    from scipy.optimize import least_squares
+
+    spread = np.random.default_rng(20120624).normal(size=(starts - 1, start.size))
+    best, cost = start, np.inf
+    for first in (start, *spread):
+        found = least_squares(
+            lambda z: weighted_residuals(problem, z, error, discrepancy, prior=prior),
+            np.clip(first, -3.0, 3.0) if first is not start else first,
+            bounds=(-_LARGEST, _LARGEST),
+            xtol=1e-13,
+            ftol=1e-13,
+            gtol=1e-13,
+            max_nfev=200,
+        )
+        if found.cost < cost * (1.0 - 1e-9):
+            best, cost = found.x, found.cost
+    return np.asarray(best, dtype=float)
+
+
+def _weighted(
+    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
+) -> dict[Quantity, Samples]:
+    """Change of each seen mean over its standard error per unit of each coordinate."""
+    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    errors = standard_errors(problem, predicted, error, discrepancy)
+    found: dict[Quantity, Samples] = {}
+    for name, column in sensitivities(problem, z).items():
+        ratio = problem.ratio(name)
+        sized = np.maximum(errors[name], 1e-12 * ratio.scale)
+        found[name] = (column * (predicted[name] / sized)[:, None])[ratio.seen]
+    return found
+
+
+def _left(
+    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
+) -> dict[Quantity, float]:
+    """Degrees of freedom that the fit leaves each quantity: its means less its share in fitting the numbers."""
+    rows = _weighted(problem, z, error, discrepancy)
+    # As if the errors were a per cent: what not even that sees takes nothing away.
+    sizes = [
+        np.median(np.maximum(np.nan_to_num(error[name]), _LEAST_ERROR) + discrepancy[name])
+        for name in problem.quantities
+    ]
+    sharp = float(np.mean(sizes)) / _SHARP
+    whole = sharp * np.concatenate(list(rows.values()))
+    inverse = np.linalg.inv(whole.T @ whole + np.eye(z.size))
+    shares = {name: float(np.sum((sharp * own) @ inverse * (sharp * own))) for name, own in rows.items()}
+    return {name: max(rows[name].shape[0] - shares[name], 0.0) for name in rows}
+
+
+def _squares(problem: Problem, z: Samples, error: dict[Quantity, float]) -> dict[Quantity, tuple[float, float]]:
+    """Mean squares of the relative residuals, and of what the trials' errors explain of them, by quantity."""
+    found: dict[Quantity, tuple[float, float]] = {}
+    for name, values in problem.predicted(z[None]).items():
+        ratio = problem.ratio(name)
+        seen = ratio.seen
+        relative = (ratio.mean[seen] - values[0][seen]) / values[0][seen]
+        trial = np.nan_to_num(error[name]) * ratio.scale[seen] / values[0][seen]
+        found[name] = float(np.mean(relative**2)), float(np.mean(trial**2 / ratio.trials[seen]))
+    return found
+
+
+def _discrepancy(
+    problem: Problem, z: Samples, error: dict[Quantity, float], left: dict[Quantity, float]
+) -> dict[Quantity, float]:
+    """Relative misfit from robot to robot beyond the scatter of the trials; its prior's middle where none is left."""
+    found: dict[Quantity, float] = {}
+    for name, (square, expected) in _squares(problem, z, error).items():
+        if left[name] < FEWEST_LEFT:
+            found[name] = _MIDDLE * DISCREPANCY_SCALE
+            continue
+        count = np.count_nonzero(problem.ratio(name).seen)
+        found[name] = float(np.sqrt(max(square * count / left[name] - expected, 0.0)))
+        if found[name] < 1e-9:
+            found[name] = 0.0
+    return found
+
+
+def drawn_fit(
+    problem: Problem, fit: LeastSquares, count: int, rng: np.random.Generator
+) -> tuple[Samples, dict[Quantity, Samples]]:
+    """Draws around a fit: discrepancies from what the residuals tell of them, then the numbers given each.
+
+    Args:
+        problem: the fit.
+        fit: its least squares.
+        count: number of draws.
+        rng: source of chance.
+
+    Returns:
+        Coordinates, (draws, free numbers), and discrepancies by quantity, (draws,).
+    """
+    squares = _squares(problem, fit.z, fit.error)
+    predicted = {name: values[0] for name, values in problem.predicted(fit.z[None]).items()}
+    columns = sensitivities(problem, fit.z)
+    information = np.broadcast_to(np.eye(fit.z.size), (count, fit.z.size, fit.z.size))
+    taus: dict[Quantity, Samples] = {}
+    for name, (square, expected) in squares.items():
+        ratio = problem.ratio(name)
+        seen = ratio.seen
+        total = square * np.count_nonzero(seen)
+        taus[name] = _drawn_discrepancy(total, expected, fit.left[name], count, rng)
+        trial = np.nan_to_num(fit.error[name]) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+        floor = max(_LEAST_ERROR, problem.interpolation_error) * ratio.scale
+        noise = ((trial**2 + floor**2) / predicted[name] ** 2)[seen]
+        weights = 1.0 / (noise + taus[name][:, None] ** 2)
+        information = information + np.einsum("dn,nj,nk->djk", weights, columns[name][seen], columns[name][seen])
+    root = np.linalg.cholesky(np.linalg.inv(information))
+    z = fit.z + np.einsum("djk,dk->dj", root, rng.normal(size=(count, fit.z.size)))
+    return z, taus
+
+
+def _drawn_discrepancy(total: float, expected: float, left: float, count: int, rng: np.random.Generator) -> Samples:
+    """Draws of a discrepancy given the sum of squares that a fit leaves, and its half-normal prior."""
+    grid = np.concatenate([[0.0], np.geomspace(1e-5, 4.0 * DISCREPANCY_SCALE, 600)])
+    variance = grid**2 + expected + _LEAST_ERROR**2
+    freedom = left if left >= FEWEST_LEFT else 0.0
+    seen = total if freedom else 0.0
+    log = -0.5 * (grid / DISCREPANCY_SCALE) ** 2 - 0.5 * freedom * np.log(variance) - 0.5 * seen / variance
+    density = np.exp(log - log.max())
+    cumulated = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(grid))])
+    found: Samples = np.interp(rng.random(count) * cumulated[-1], cumulated, grid)
+    return found
+
+
+def _covariance(
+    problem: Problem,
+    z: Samples,
+    error: dict[Quantity, float],
+    discrepancy: dict[Quantity, float],
+) -> Samples:
+    """Inverse of the information of means and prior."""
+    jacobian = np.concatenate(list(_weighted(problem, z, error, discrepancy).values()))
+    found: Samples = np.linalg.inv(jacobian.T @ jacobian + np.eye(z.size))
+    return found

@@ -1,0 +1,282 @@
+"""What may be fitted: parameters with their units, their weak priors, and the reasons for these.
+
+Every parameter is a smooth function of a coordinate z whose prior is the standard normal. Fits and samplers move in z:
+all directions have the same scale there, and no bound is ever hit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError, did_you_mean
+
+__all__ = ["DEFAULT_FREE", "PARAMETERS", "Coordinate", "LogNormal", "LogUniform", "Parameter", "Uniform", "free_names"]
+
+
+class Prior(Protocol):
+    """A prior as a map from a standard normal coordinate."""
+
+    def value(self, z: Samples) -> Samples:
+        """The parameter at a coordinate."""
+
+    def coordinate(self, value: float) -> float:
+        """The coordinate of a parameter's value."""
+
+    def words(self, unit: str) -> str:
+        """The prior in words."""
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """A positive number around a median; `spread` is the standard deviation of its logarithm."""
+
+    median: float
+    spread: float
+
+    def value(self, z: Samples) -> Samples:
+        """See `Prior.value`."""
+        return self.median * np.exp(self.spread * np.clip(z, -30.0, 30.0))
+
+    def coordinate(self, value: float) -> float:
+        """See `Prior.coordinate`."""
+        return float(np.log(value / self.median) / self.spread)
+
+    def words(self, unit: str) -> str:
+        """See `Prior.words`."""
+        low, high = (self.median * np.exp(sign * 1.96 * self.spread) for sign in (-1, 1))
+        return f"log-normal, 95 % from {low:.3g} to {high:.3g} {unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class LogUniform:
+    """A positive number whose logarithm is anywhere between two ends."""
+
+    low: float
+    high: float
+
+    def value(self, z: Samples) -> Samples:
+        """See `Prior.value`."""
+        from scipy.special import ndtr
+
+        found: Samples = self.low * (self.high / self.low) ** ndtr(z)
+        return found
+
+    def coordinate(self, value: float) -> float:
+        """See `Prior.coordinate`."""
+        from scipy.special import ndtri
+
+        share = np.log(value / self.low) / np.log(self.high / self.low)
+        return float(ndtri(np.clip(share, 1e-6, 1.0 - 1e-6)))
+
+    def words(self, unit: str) -> str:
+        """See `Prior.words`."""
+        return f"log-uniform from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """A number anywhere between two ends."""
+
+    low: float
+    high: float
+
+    def value(self, z: Samples) -> Samples:
+        """See `Prior.value`."""
+        from scipy.special import ndtr
+
+        found: Samples = self.low + (self.high - self.low) * ndtr(z)
+        return found
+
+    def coordinate(self, value: float) -> float:
+        """See `Prior.coordinate`."""
+        from scipy.special import ndtri
+
+        share = (value - self.low) / (self.high - self.low)
+        return float(ndtri(np.clip(share, 1e-6, 1.0 - 1e-6)))
+
+    def words(self, unit: str) -> str:
+        """See `Prior.words`."""
+        return f"uniform from {self.low:.3g} to {self.high:.3g} {unit}".rstrip()
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Something that a fit may free."""
+
+    name: str
+    meaning: str
+    unit: str
+    scope: Literal["channel", "all", "tail"]
+    """One value for each channel, one for all, or (friction only) one for each tail."""
+    models: tuple[str, ...]
+    """Models that have it."""
+    reason: str
+    """Why its prior is as it is."""
+    needs_motor: bool = False
+    """Whether it acts on the motor's rate, so that the motor has to be predicted."""
+    tabulated: bool = False
+    """Whether resistances are interpolated over it."""
+
+
+_ALL = ("sbt", "rft", "slender", "tube")
+_FACTORED = ("sbt", "rft", "slender")
+_LISTED = (
+    Parameter(
+        "body_drag",
+        "factor on the body's axial drag D_x, one for each channel (Table III)",
+        "",
+        "channel",
+        _FACTORED,
+        "a body in a tube drags as much as alone or several times more: from a third to fourteen times",
+    ),
+    Parameter(
+        "body_rotation",
+        "factor on the body's rotational drag E_x, one for each channel (Table III)",
+        "",
+        "channel",
+        _FACTORED,
+        "walls raise it, and the paper found 0.6: from a seventh to seven times",
+    ),
+    Parameter(
+        "friction",
+        "effective friction B_eff of eq. (18), one for each tail; from the observed motor rate",
+        "N m s/rad",
+        "tail",
+        _ALL,
+        "none of its own: it follows from (17) and (18), and its uncertainty from the rates and the other parameters",
+    ),
+    Parameter(
+        "shared_friction",
+        "effective friction B_eff, one for all tails",
+        "N m s/rad",
+        "all",
+        _ALL,
+        "around the value that takes half of the motor's torque at the observed rates, a factor of 19 either way",
+        needs_motor=True,
+    ),
+    Parameter(
+        "normal_factor",
+        "factor on RFT's coefficient across the wire, c_n",
+        "",
+        "all",
+        ("rft",),
+        "published sets of coefficients differ by a factor of two",
+    ),
+    Parameter(
+        "tangential_factor",
+        "factor on RFT's coefficient along the wire, c_t",
+        "",
+        "all",
+        ("rft",),
+        "published sets of coefficients differ by a factor of two",
+    ),
+    Parameter(
+        "wire_diameter",
+        "diameter of the tail's wire",
+        "m",
+        "all",
+        ("sbt", "rft", "slender"),
+        "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
+        tabulated=True,
+    ),
+    Parameter(
+        "viscosity",
+        "viscosity of the fluid",
+        "Pa s",
+        "all",
+        _ALL,
+        "around the robot's own value, 95 % within 20 %: silicone oil changes by 2 % a kelvin",
+        needs_motor=True,
+    ),
+    Parameter(
+        "torque_constant",
+        "the motor's torque constant K_m",
+        "N m/A",
+        "all",
+        _ALL,
+        "around the robot's own value, 95 % within 20 %, as small motors scatter",
+        needs_motor=True,
+    ),
+    Parameter(
+        "back_emf_constant",
+        "the motor's back-emf constant K_b",
+        "V s/rad",
+        "all",
+        _ALL,
+        "around the robot's own value, 95 % within 20 %, as small motors scatter",
+        needs_motor=True,
+    ),
+    Parameter(
+        "gap",
+        "gap under the body, one for each channel",
+        "m",
+        "channel",
+        ("tube",),
+        "anywhere in the band of `predict`, from a ninetieth to a ninth of the body's radius",
+        tabulated=True,
+    ),
+    Parameter(
+        "pitch",
+        "angle by which the nose is raised, one for each channel",
+        "rad",
+        "channel",
+        ("tube",),
+        "anywhere from level to the steepest that every tail of the channel allows",
+        tabulated=True,
+    ),
+)
+PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _LISTED}
+"""All parameters by name."""
+
+DEFAULT_FREE = {
+    "sbt": ("body_drag", "body_rotation", "friction"),
+    "rft": ("body_drag", "friction"),
+    "slender": ("body_drag", "body_rotation", "friction"),
+    "tube": ("gap", "friction"),
+}
+"""What is free if nothing is said: what the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One free number of a fit."""
+
+    parameter: Parameter
+    channel: int | None
+    """Place of its channel; None for all."""
+    label: str
+    """Name, with the channel where there are several."""
+    prior: Prior
+
+
+def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
+    """Names of the free parameters.
+
+    Args:
+        free: names, or one text with commas; None: those that the paper fitted.
+        model: name of the model.
+
+    Raises:
+        InputError: for an unknown name, one given twice, or one that the model does not have.
+    """
+    if free is None:
+        return DEFAULT_FREE[model]
+    names = tuple(name.strip() for name in (free.split(",") if isinstance(free, str) else free))
+    for name in names:
+        if name not in PARAMETERS:
+            raise InputError(f"free = '{name[:40]}'{did_you_mean(name, PARAMETERS)}; allowed: {', '.join(PARAMETERS)}")
+        if names.count(name) > 1:
+            raise InputError(f"free = '{name}' stands twice; allowed: once")
+        if model not in PARAMETERS[name].models:
+            raise InputError(
+                f"free = '{name}' with model '{model}'; allowed: "
+                f"{', '.join(other for other, item in PARAMETERS.items() if model in item.models)}"
+            )
+    if "friction" in names and "shared_friction" in names:
+        raise InputError("free = 'friction' together with 'shared_friction'; allowed: one of them")
+    return names

@@ -1,0 +1,288 @@
+"""A fit set up: the experiment, the model, and the free numbers, from coordinates to what is predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import Experiment, Quantity, Ratio
+from spirillum.calibration.forward import Draws, Forward, axis_points, tabulated
+from spirillum.calibration.parameters import PARAMETERS, Coordinate, LogNormal, LogUniform, Parameter, Uniform
+from spirillum.errors import InputError
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.motion.swimming import requirements
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+
+__all__ = ["Problem", "Progress", "posed"]
+
+Progress = Callable[[str, int, int], None]
+
+_FACTOR_SPREADS = {"body_drag": (2.0, 1.0), "body_rotation": (1.0, 1.0)}
+_COEFFICIENT_SPREAD = 0.5
+_TOLERANCE_SPREAD = 0.1
+_FRICTION_SPREAD = 1.5
+_WIRE_POINTS = 9
+_WIRE_RANGE = 5.0  # standard deviations that the table reaches to either side
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An experiment, a model, and the free coordinates."""
+
+    experiment: Experiment
+    model: SwimmerModel
+    free: tuple[str, ...]
+    """Names of the free parameters."""
+    coordinates: tuple[Coordinate, ...]
+    """Free numbers; friction tail by tail is none, for it follows from the others."""
+    forward: Forward
+    interpolation_error: float
+    """Largest relative error of tabulated resistances in what they predict; 0 without a table."""
+    fixed_friction: Samples
+    """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
+
+    @cached_property
+    def by_motor_rate(self) -> bool:
+        """Whether the motor's rate is predicted and compared too."""
+        return any(PARAMETERS[name].needs_motor for name in self.free)
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """What is compared with the observations."""
+        names: tuple[Quantity, ...] = ("advance", "turning", "motor_rate")
+        kept = names if self.by_motor_rate else names[:2]
+        return tuple(name for name in kept if np.any(self.ratio(name).seen))
+
+    def ratio(self, quantity: Quantity) -> Ratio:
+        """What was observed of a quantity."""
+        found: Ratio = getattr(self.experiment, quantity)
+        return found
+
+    def draws(self, z: Samples) -> dict[str, Samples]:
+        """Parameters at coordinates.
+
+        Args:
+            z: coordinates, (draws, free numbers).
+
+        Returns:
+            Parameter to (draws, robots), or (draws, 1) where all robots share it.
+        """
+        values = self._all_values(z)
+        return {name: values[:, places] for name, places in self._places.items()}
+
+    @cached_property
+    def _places(self) -> dict[str, np.ndarray]:
+        """Parameter to the column of each robot's number; one column where all robots share it."""
+        found = {}
+        for name in dict.fromkeys(item.parameter.name for item in self.coordinates):
+            places = np.array([n for n, item in enumerate(self.coordinates) if item.parameter.name == name])
+            by_channel = self.coordinates[int(places[0])].channel is not None
+            found[name] = places[self.experiment.channel] if by_channel else places
+        return found
+
+    def _all_values(self, z: Samples) -> Samples:
+        """Every free number, (draws, free numbers); log-normal ones at once, for that is asked thousands of times."""
+        medians, spreads = self._log_normal
+        found: Samples = medians * np.exp(spreads * np.clip(z[:, : medians.size], -30.0, 30.0))
+        for place, item in enumerate(self.coordinates):
+            if not isinstance(item.prior, LogNormal):
+                found[:, place] = item.prior.value(z[:, place])
+        return found
+
+    @cached_property
+    def _log_normal(self) -> tuple[Samples, Samples]:
+        """Medians and spreads of the log-normal priors; 1 and 0 for others."""
+        pairs = [
+            (item.prior.median, item.prior.spread) if isinstance(item.prior, LogNormal) else (1.0, 0.0)
+            for item in self.coordinates
+        ]
+        table = np.array(pairs, dtype=float).reshape(-1, 2)
+        return table[:, 0], table[:, 1]
+
+    def values(self, z: Samples) -> dict[str, Samples]:
+        """Free numbers by label at coordinates, (draws,) each."""
+        found = self._all_values(z)
+        return {item.label: found[:, n] for n, item in enumerate(self.coordinates)}
+
+    def predicted(self, z: Samples) -> dict[Quantity, Samples]:
+        """What is compared, (draws, robots)."""
+        draws = self.draws(z)
+        found = self.forward.predict(draws)
+        answer: dict[Quantity, Samples] = {
+            "advance": np.where(self.experiment.by_motor, found.over_motor(), found.advance),
+            "turning": found.turning,
+        }
+        if self.by_motor_rate:
+            friction = draws.get("shared_friction", self.fixed_friction[None])
+            answer["motor_rate"] = self.forward.motor_rate(draws, friction)
+        # What does not depend on any free number comes back once for all draws.
+        shape = (z.shape[0], self.experiment.size)
+        return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
+
+    def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor") -> Samples:
+        """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
+        seen = self.experiment
+        with np.errstate(invalid="ignore"):
+            share = seen.tail_rate / seen.motor_rate.mean
+            return self.forward.friction(self.draws(z), motor_rate, share, reading)
+
+    @property
+    def start(self) -> Samples:
+        """Coordinates at the middle of every prior."""
+        return np.zeros(len(self.coordinates))
+
+    def coordinate_of(self, values: Draws) -> Samples:
+        """Coordinates of given values by label: the inverse of `values`."""
+        return np.array([item.prior.coordinate(float(values[item.label])) for item in self.coordinates])
+
+
+def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Progress | None = None) -> Problem:
+    """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers.
+
+    Args:
+        experiment: the observations.
+        model: name of the hydrodynamic model.
+        free: names of the free parameters.
+        progress: told what is being computed.
+
+    Raises:
+        InputError: if a robot is outside the model's domain, or has not what a parameter needs.
+    """
+    chosen = find_swimmer_model(model)
+    batch = RobotBatch.of(experiment.robots)
+    _check_domain(experiment, chosen, batch)
+    _check_motor(experiment, free, batch)
+    parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
+    forward, ranges, error = _forward(experiment, chosen, batch, parameters, progress or (lambda _w, _d, _t: None))
+    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    friction = np.where(np.isnan(batch.effective_friction), rotor, batch.effective_friction)
+    problem = Problem(
+        experiment=experiment,
+        model=chosen,
+        free=tuple(free),
+        coordinates=(),
+        forward=forward,
+        interpolation_error=error,
+        fixed_friction=np.broadcast_to(friction, (experiment.size,)),
+    )
+    laid: dict[str, list[Coordinate]] = {}
+    for parameter in sorted(parameters, key=lambda item: item.name == "shared_friction"):
+        # The prior of B_eff rests on the torque at the middle of all other priors: they come first.
+        before = replace(problem, coordinates=tuple(item for items in laid.values() for item in items))
+        laid[parameter.name] = _coordinates(before, parameter, batch, ranges)
+    return replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
+
+
+def _check_domain(experiment: Experiment, model: SwimmerModel, batch: RobotBatch) -> None:
+    for place, rows in enumerate(experiment.rows):
+        one = batch if batch.size == 1 else next(b for cut, b in batch.blocks(1) if cut.start == place)
+        outside = broken(requirements(one, model))
+        if outside:
+            raise InputError(
+                f"{experiment.source}, row {rows[0]}: no robot has this tail with model '{model.name}': "
+                f"{outside[0].sentence()}"
+            )
+
+
+def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch) -> None:
+    needing = [name for name in free if PARAMETERS[name].needs_motor or name == "friction"]
+    if not needing:
+        return
+    if batch.electrics is None or batch.drive != "dc-motor" or batch.joint != "revolute":
+        raise InputError(
+            f"free = '{needing[0]}', but robot {experiment.robots[0].name} has no dc-motor; allowed: a robot with "
+            "drive.kind = 'dc-motor', [motor] and [battery]"
+        )
+    if not np.any(experiment.motor_rate.seen):
+        raise InputError(
+            f"{experiment.source} has no motor rates, which free = '{needing[0]}' needs; allowed: a column "
+            "motor_rate_Hz, or tail_rate_Hz and body_rate_Hz"
+        )
+
+
+def _forward(
+    experiment: Experiment,
+    model: SwimmerModel,
+    batch: RobotBatch,
+    parameters: Sequence[Parameter],
+    tell: Progress,
+) -> tuple[Forward, dict[str, tuple[float, float]], float]:
+    """Resistances, over a table where the geometry is free; the table's ranges, and its error."""
+    coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
+    names = [item.name for item in parameters if item.tabulated]
+    viscosity = batch.viscosity
+    own_factors = batch.calibration.get(model.name)
+    factors = {name: getattr(own_factors, name) for name in _FACTOR_SPREADS} if own_factors else {}
+    factors |= {name: np.full(1, getattr(batch.options.rft, name)) for name in ("normal_factor", "tangential_factor")}
+    if not model.closed_form:
+        tell(f"{model.name}, {experiment.size} robots", 0, 1)
+    if not names and not model.placed:
+        table = tabulated([batch], model, coefficients=coefficients)
+        return Forward(table, batch.electrics, viscosity, factors), {}, 0.0
+    if model.placed:
+        from spirillum.calibration.tube_table import tube_forward
+
+        return tube_forward(model, batch, names, tell)
+    own = float(batch.wire_diameter[0])
+    reach = np.exp(_WIRE_RANGE * _TOLERANCE_SPREAD)
+    points, values = axis_points("wire_diameter", _WIRE_POINTS, own / reach, own * reach)
+
+    def at(diameter: float) -> RobotBatch:
+        return batch.with_values({"tail.wire_diameter": diameter})
+
+    batches = []
+    for done, value in enumerate(values.tolist()):
+        tell(f"{model.name}, wire of {value * 1e3:.3g} mm", done, values.size + 1)
+        batches.append(at(value))
+    table = tabulated(batches, model, names, [points], coefficients=coefficients)
+    forward = Forward(table, batch.electrics, viscosity, factors)
+    between = own * float(np.exp(0.31 * np.log(reach)))
+    alone = tabulated([at(between)], model, coefficients=coefficients)
+    exact = Forward(alone, batch.electrics, viscosity, factors)
+    error = forward.interpolation_error(exact, {"wire_diameter": np.full((1, 1), between)})
+    return forward, {"wire_diameter": (own / reach, own * reach)}, error
+
+
+def _coordinates(
+    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: dict[str, tuple[float, float]]
+) -> list[Coordinate]:
+    prior = _prior(problem, parameter, batch, ranges)
+    if parameter.scope == "all":
+        return [Coordinate(parameter, None, parameter.name, prior)]
+    channels = problem.experiment.channels
+    names = [parameter.name if len(channels) == 1 else f"{parameter.name}[{c * 1e3:g} mm]" for c in channels]
+    return [Coordinate(parameter, place, name, prior) for place, name in enumerate(names)]
+
+
+def _prior(
+    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: dict[str, tuple[float, float]]
+) -> LogNormal | LogUniform | Uniform:
+    name = parameter.name
+    if name in _FACTOR_SPREADS:
+        return LogNormal(*_FACTOR_SPREADS[name])
+    if name in ("normal_factor", "tangential_factor"):
+        return LogNormal(float(getattr(batch.options.rft, name)), _COEFFICIENT_SPREAD)
+    if name == "gap":
+        return LogUniform(*ranges[name])
+    if name == "pitch":
+        return Uniform(*ranges[name])
+    if name == "shared_friction":
+        return LogNormal(_middle_friction(problem), _FRICTION_SPREAD)
+    source = batch if name in ("viscosity", "wire_diameter") else batch.electrics
+    return LogNormal(float(getattr(source, name)[0]), _TOLERANCE_SPREAD)
+
+
+def _middle_friction(problem: Problem) -> float:
+    """B_eff that takes half of the motor's torque at the observed rates, N m s/rad."""
+    ratio = problem.experiment.motor_rate
+    middle = problem.draws(problem.start[None])
+    found = problem.forward.predict(middle)
+    with_load = problem.forward.friction(middle, ratio.mean)[0]
+    all_of_it = with_load + found.load[0] / (1.0 - found.turning[0])
+    return float(0.5 * np.median(all_of_it[ratio.seen]))

@@ -1,0 +1,223 @@
+"""Which model explains the observations best, by how well it predicts tails that it was not fitted to.
+
+Every model is fitted to the same observations. Leave-one-out accuracy asks for the log density of one robot's means
+given all others (Vehtari, Gelman and Gabry, Stat. Comput. 27:1413, 2017): Pareto-smoothed importance sampling takes it
+from one posterior, without fitting anew, and says where that fails. One robot is one point, since the model's
+discrepancy is a robot's own.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.calibration.fit import Calibrated, RobotSource, calibrate
+from spirillum.calibration.netcdf import posterior_tree
+from spirillum.calibration.posterior import Sampling
+from spirillum.calibration.problem import Progress
+from spirillum.errors import InputError
+
+__all__ = ["Ranked", "Ranking", "rank_models"]
+
+_CLEAR = 4.0
+"""Difference of the expected log density, over its standard error, from which one model is better without doubt."""
+_PARETO = 0.7
+"""Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
+_WORST = 3
+_MODELS = ("sbt", "rft")
+
+
+def _size(row: dict[str, Any]) -> float:
+    """Largest misfit first."""
+    return -abs(float(row["standard_deviations"]["value"]))
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """One model's place."""
+
+    model: str
+    elpd: float
+    """Expected log density of one left-out robot after another, summed."""
+    standard_error: float
+    difference: float
+    """Of elpd to the best model; 0 for it."""
+    difference_error: float
+    """Standard error of the difference, over the robots."""
+    pareto: Samples
+    """Shape of the importance weights' tail, robot by robot."""
+    pointwise: Samples
+    """Contribution of each robot."""
+    fit: Calibrated
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Models from the best to the worst."""
+
+    ranked: tuple[Ranked, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def best(self) -> Ranked:
+        """The model that predicts left-out robots best."""
+        return self.ranked[0]
+
+    @property
+    def clear(self) -> bool:
+        """Whether the best is better than the second beyond doubt."""
+        second = self.ranked[1] if len(self.ranked) > 1 else None
+        return second is not None and -second.difference > _CLEAR * second.difference_error
+
+    def verdict(self) -> str:
+        """The ranking in a sentence."""
+        names = [item.model for item in self.ranked]
+        if len(names) == 1:
+            return f"only {names[0]} was fitted"
+        second = self.ranked[1]
+        how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
+        if self.clear:
+            return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
+        return f"{names[0]} and {names[1]} cannot be told apart: {how} in favour of {names[0]}"
+
+    def failures(self, item: Ranked) -> list[dict[str, Any]]:
+        """Where a model fails: robots with the largest misfit, relative to what the fit expects of a robot."""
+        experiment = item.fit.experiment
+        found = []
+        for name, (values, low, high) in item.fit.predicted.items():
+            seen = item.fit.problem.ratio(name).mean
+            spread = np.abs(high - low) / (2.0 * 1.96)
+            off = (seen - values) / spread
+            found += [
+                {
+                    "tail": experiment.labels()[place],
+                    "quantity": name,
+                    "observed_over_predicted": quantity(float(seen[place] / values[place]), "1"),
+                    "standard_deviations": quantity(float(off[place]), "1"),
+                }
+                for place in range(experiment.size)
+                if np.isfinite(off[place])
+            ]
+        return sorted(found, key=_size)[:_WORST]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum rank-models --json`."""
+        experiment = self.best.fit.experiment
+        models = [
+            {
+                "model": item.model,
+                "expected_log_density": quantity(item.elpd, "1", standard_error=item.standard_error),
+                "difference": quantity(item.difference, "1", standard_error=item.difference_error),
+                "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
+                "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
+                "parameters": {
+                    name: quantity(v.value, "1", low=v.low, high=v.high, kind="interval", level=0.95)
+                    for name, v in item.fit.values.items()
+                },
+                "fails_most_at": self.failures(item),
+            }
+            for item in self.ranked
+        ]
+        content = {
+            "observations": experiment.source,
+            "synthetic": experiment.synthetic,
+            "robots": experiment.size,
+            "models": models,
+            "verdict": self.verdict(),
+            "clear": self.clear,
+        }
+        return envelope("model-ranking", content, self.warnings)
+
+
+def rank_models(
+    observations: str | Path,
+    robots: RobotSource | Sequence[RobotSource] = ("biorob2012-wide", "biorob2012-narrow"),
+    *,
+    models: Sequence[str] | None = None,
+    free: str | Sequence[str] | None = None,
+    sampling: Sampling | None = None,
+    progress: Progress | None = None,
+) -> Ranking:
+    """Fit several models to the same observations and rank them by leave-one-out accuracy.
+
+    Args:
+        observations: observations file.
+        robots: a robot for each channel; without them the paper's.
+        models: hydrodynamic models; None: `sbt` and `rft`, the paper's own question.
+        free: free parameters of every model; None: body drag and rotation, the same for all.
+        sampling: how the posteriors are sampled.
+        progress: told what is being done.
+
+    Raises:
+        InputError: for wrong input, or a single model.
+    """
+    names = list(dict.fromkeys(models or _MODELS))
+    if len(names) < 2:
+        raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
+    # Every model with the same free factors: else one would be praised for its freedom in what another was denied.
+    chosen = free or "body_drag,body_rotation"
+    fits = {}
+    for name in names:
+        fits[name] = calibrate(
+            observations, robots, model=name, free=chosen, method="posterior", sampling=sampling, progress=progress
+        )
+    return ranked_fits(fits)
+
+
+def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
+    """Rank models whose posteriors are of the same observations.
+
+    Args:
+        fits: model to its calibration.
+    """
+    from arviz_stats import compare, loo
+
+    found = {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what they warn of is said below, in our words
+        for name, fit in fits.items():
+            found[name] = loo(posterior_tree(fit), pointwise=True, var_name="robot")
+        table = compare(found)
+    best = np.asarray(found[str(table.index[0])].elpd_i).reshape(-1)
+    ranked = []
+    for name in (str(index) for index in table.index):
+        each = np.asarray(found[name].elpd_i).reshape(-1)
+        gap = each - best
+        ranked.append(
+            Ranked(
+                model=name,
+                elpd=float(found[name].elpd),
+                standard_error=float(found[name].se),
+                difference=float(gap.sum()),
+                difference_error=float(np.sqrt(gap.size * np.var(gap))),
+                pareto=np.asarray(found[name].pareto_k).reshape(-1),
+                pointwise=each,
+                fit=fits[name],
+            )
+        )
+    return Ranking(tuple(ranked), tuple(_cautions(ranked)))
+
+
+def _cautions(ranked: Sequence[Ranked]) -> list[str]:
+    said = []
+    for item in ranked:
+        bad = int(np.count_nonzero(item.pareto > _PARETO))
+        if bad:
+            said.append(
+                f"{item.model}: leaving out {bad} of {item.pareto.size} robots by importance sampling cannot be "
+                "trusted "
+                f"(Pareto k above {_PARETO:g}): each of them decides its own fit"
+            )
+        said += [f"{item.model}: {sentence}" for sentence in item.fit.warnings if "may not be used" in sentence]
+    if ranked[0].fit.experiment.size < 10:
+        said.append(f"only {ranked[0].fit.experiment.size} robots: differences of their log density are hardly known")
+    if ranked[0].fit.experiment.synthetic:
+        said.append(f"{ranked[0].fit.experiment.source} says that its numbers are synthetic: nothing here is measured")
+    return said

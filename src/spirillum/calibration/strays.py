@@ -1,0 +1,52 @@
+"""Trials that are far off the others of their tail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.measurement.observations import Observation
+
+__all__ = ["stray_trials"]
+
+_LIMIT = 8.0
+"""Robust standard deviations, of all trials together, beyond which a trial is named."""
+_LEAST = 0.15
+"""Relative deviation below which none is."""
+_FEWEST = 3
+_COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
+
+
+def stray_trials(groups: Sequence[Sequence[Observation]], ratios: Sequence[tuple[Samples, Samples]]) -> tuple[str, ...]:
+    """Name the rows whose advance or turning is far off the median of their tail's trials.
+
+    Args:
+        groups: rows of each robot.
+        ratios: advance and turning of each row of each robot.
+    """
+    found: list[str] = []
+    for number, column in enumerate(_COLUMNS):
+        deviations = [_deviations(own[number]) for own in ratios]
+        known = np.concatenate([own[np.isfinite(own)] for own in deviations]) if deviations else np.empty(0)
+        if known.size == 0:
+            continue
+        scale = 1.4826 * float(np.median(np.abs(known)))
+        for group, own in zip(groups, deviations, strict=True):
+            for item, off in zip(group, own.tolist(), strict=False):
+                if np.isfinite(off) and abs(off) > max(_LIMIT * scale, _LEAST):
+                    found.append(
+                        f"row {item.row}, column {column}: {1.0 + off:.3g} times the median of its tail's trials, each "
+                        "over its own rate: an outlier, or a slip of the pen?"
+                    )
+    return tuple(found)
+
+
+def _deviations(values: Samples) -> Samples:
+    """Relative deviation of each trial from the median; NaN where there are too few."""
+    known = values[np.isfinite(values)]
+    if known.size < _FEWEST or np.median(known) == 0:
+        return np.full(values.shape, np.nan)
+    found: Samples = values / np.median(known) - 1.0
+    return found

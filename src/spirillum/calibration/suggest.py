@@ -1,0 +1,230 @@
+"""Which tail or channel to measure next: the expected information gain of each candidate.
+
+Given the draws of a posterior, a new robot's means would be seen with the model's discrepancy and the errors of its
+trials. What they would tell about the fitted numbers is their mutual information. Where draws of the predictions are
+close to normal, as they are once some robots have been observed, it is
+
+    I = 1/2 log det(C + N) - 1/2 log det(N)
+
+with the covariance C of the predicted means over the draws and N of discrepancy and errors (a linear-Gaussian design;
+Chaloner and Verdinelli, Stat. Sci. 10:273, 1995). It is given in bits: one bit halves the volume of what is uncertain.
+A discrepancy caps it: a model that misses every tail by 10 % learns little from one more.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.calibration.experiment import with_tail
+from spirillum.calibration.fit import RobotSource, given_robots
+from spirillum.errors import InputError
+from spirillum.files import read_text
+from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.motion.intervals import drawn_kinematics
+from spirillum.motion.posterior_file import PosteriorFile, read_posterior
+from spirillum.motion.swimming import requirements
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.robot import Robot
+
+__all__ = ["Candidate", "Suggestion", "suggest"]
+
+_WHAT = "a file of candidates (CSV with channel_diameter_mm, wavelength_mm, amplitude_mm)"
+_COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
+_DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
+_DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
+_MOST = 2000
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A robot that might be measured."""
+
+    channel_diameter: float
+    wavelength: float
+    amplitude: float
+    gain: float
+    """Expected information about the fitted numbers, bits."""
+    narrowing: Mapping[str, float]
+    """Expected standard deviation of each number after the measurement over that before."""
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Candidates from the most to the least telling."""
+
+    posterior: PosteriorFile
+    trials: int
+    candidates: tuple[Candidate, ...]
+    warnings: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum suggest --json`."""
+        rows = [
+            {
+                "channel_diameter": quantity(item.channel_diameter, "m"),
+                "wavelength": quantity(item.wavelength, "m"),
+                "amplitude": quantity(item.amplitude, "m"),
+                "expected_information": quantity(item.gain, "bit"),
+                "narrowing": {name: quantity(value, "1") for name, value in item.narrowing.items()},
+            }
+            for item in self.candidates
+        ]
+        content = {
+            "posterior": self.posterior.source,
+            "synthetic": self.posterior.synthetic,
+            "model": self.posterior.model,
+            "trials": self.trials,
+            "candidates": rows,
+        }
+        return envelope("suggestion", content, self.warnings)
+
+
+def suggest(
+    posterior: str | Path,
+    robots: RobotSource | Sequence[RobotSource] = ("biorob2012-wide", "biorob2012-narrow"),
+    *,
+    candidates: str | Path | None = None,
+    trials: int = 5,
+) -> Suggestion:
+    """Rank robots that might be measured next by what they would tell.
+
+    Args:
+        posterior: file of a calibration's posterior.
+        robots: a robot for each channel that might be used.
+        candidates: file of channels and tails (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm amplitude
+            in every robot's channel.
+        trials: of each candidate.
+
+    Raises:
+        InputError: for wrong input.
+    """
+    if not 1 <= trials <= 10**6:
+        raise InputError(f"trials = {trials}; allowed: 1 to 1000000")
+    known = read_posterior(posterior)
+    loaded = [known.central(robot) for robot in given_robots(robots)]
+    listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
+    found, left_out = [], []
+    numbers, names = _numbers(known)
+    for robot in listed:
+        outside = broken(requirements(RobotBatch.of(robot), find_swimmer_model(known.model)))
+        if outside:
+            left_out.append(f"{_words(robot)} is left out: {outside[0].sentence()}")
+            continue
+        found.append(_candidate(known, robot, trials, numbers, names))
+    if not found:
+        raise InputError(f"no candidate can be built: {left_out[0]}")
+    return Suggestion(
+        known,
+        trials,
+        tuple(sorted(found, key=lambda item: -item.gain)),
+        (*_cautions(known), *left_out[:5]),
+    )
+
+
+def _cautions(known: PosteriorFile) -> list[str]:
+    said = []
+    if known.synthetic:
+        said.append(f"{known.observations} says that its numbers are synthetic: nothing here is measured")
+    return said
+
+
+def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
+    """Logarithms of all fitted numbers, (draws, numbers), with their names."""
+    columns, names = [], []
+    for name, values in known.draws.items():
+        for place in range(values.shape[1]):
+            columns.append(np.log(np.maximum(values[:, place], 1e-300)))
+            several = values.shape[1] > 1
+            names.append(f"{name}[{known.channels[place] * 1e3:g} mm]" if several else name)
+    return np.stack(columns, axis=1), names
+
+
+def _candidate(known: PosteriorFile, robot: Robot, trials: int, numbers: Samples, names: list[str]) -> Candidate:
+    predicted = drawn_kinematics(robot, find_swimmer_model(known.model), known)
+    rows, noise = [], []
+    for quantity_name, values in predicted.items():
+        tau = known.discrepancy.get(quantity_name)
+        sigma = known.error.get(quantity_name)
+        if tau is None or sigma is None:
+            continue
+        middle = float(np.median(values))
+        rows.append(values / middle - 1.0)
+        noise.append(float(np.mean(tau**2) + np.mean(sigma**2) / trials))
+    seen, errors = np.stack(rows), np.diag(noise)
+    spread = np.cov(seen).reshape(len(rows), len(rows))
+    gain = 0.5 * (np.linalg.slogdet(spread + errors)[1] - np.linalg.slogdet(errors)[1]) / np.log(2.0)
+    deviations = numbers - numbers.mean(axis=0)
+    shared = deviations.T @ (seen - seen.mean(axis=1, keepdims=True)).T / (numbers.shape[0] - 1.0)
+    variance = deviations.var(axis=0, ddof=1)
+    told = np.einsum("ij,jk,ik->i", shared, np.linalg.inv(spread + errors), shared)
+    narrowing = np.sqrt(np.clip(1.0 - told / np.maximum(variance, 1e-300), 0.0, 1.0))
+    diameter = robot.channel.diameter if robot.channel else float("inf")
+    return Candidate(
+        diameter,
+        robot.tail.wavelength,
+        robot.tail.amplitude,
+        float(gain),
+        {name: float(value) for name, value in zip(names, narrowing, strict=True)},
+    )
+
+
+def _words(robot: Robot) -> str:
+    diameter = robot.channel.diameter * 1e3 if robot.channel else float("inf")
+    return f"channel {diameter:g} mm, tail {robot.tail.wavelength * 1e3:g} x {robot.tail.amplitude * 1e3:g} mm"
+
+
+def _default(robots: Sequence[Robot]) -> list[Robot]:
+    tails = product(_DEFAULT_WAVELENGTHS, _DEFAULT_AMPLITUDES)
+    return [with_tail(robot, 1e-3 * w, 1e-3 * a) for (w, a), robot in product(tails, robots)]
+
+
+def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
+    """Candidates of a file; comments and empty lines are skipped."""
+    numbered = [
+        (number, line)
+        for number, line in enumerate(read_text(path, _WHAT).splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    table = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered))))
+    header = [name.strip() for name in table[0]]
+    missing = [name for name in _COLUMNS if name not in header]
+    if missing:
+        raise InputError(f"{path}: column '{missing[0]}' is missing; needed: {', '.join(_COLUMNS)}")
+    if not 2 <= len(table) <= _MOST + 1:
+        raise InputError(f"{path} holds {len(table) - 1} candidates; allowed: 1 to {_MOST}")
+    by_channel = {round(robot.channel.diameter, 9): robot for robot in robots if robot.channel}
+    found = []
+    for (number, _), cells in zip(numbered[1:], table[1:], strict=True):
+        if len(cells) != len(header):
+            raise InputError(f"{path}, row {number}: {len(cells)} cells; allowed: {len(header)}, one for each column")
+        row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+        channel, wavelength, amplitude = (_length(path, number, name, row[name]) for name in _COLUMNS)
+        robot = by_channel.get(round(channel, 9))
+        if robot is None:
+            allowed = ", ".join(f"{diameter * 1e3:g} mm" for diameter in sorted(by_channel))
+            raise InputError(
+                f"{path}, row {number}, column channel_diameter_mm: {row[_COLUMNS[0]]}; allowed: {allowed}"
+            )
+        found.append(with_tail(robot, wavelength, amplitude))
+    return found
+
+
+def _length(path: Path, number: int, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not 1e-6 <= value <= 1e6:
+        raise InputError(f"{path}, row {number}, column {name}: '{text[:40]}'; allowed: a length of 1e-06 to 1e+06 mm")
+    return 1e-3 * value

@@ -1,0 +1,145 @@
+"""The commands `spirillum calibrate`, `rank-models` and `suggest`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.options import Json, Model, Settings, complete_models, complete_robots
+
+__all__ = ["calibrate", "rank_models", "suggest"]
+
+_Observations = Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")]
+_Robots = Annotated[
+    list[str],
+    typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel."),
+]
+_METHODS = ("posterior", "least-squares", "paper")
+
+
+def _complete_methods(incomplete: str) -> list[str]:
+    return [name for name in _METHODS if name.startswith(incomplete)]
+
+
+def calibrate(
+    observations: _Observations,
+    robot: _Robots,
+    model: Model = "sbt",
+    free: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="Free parameters; else those that the paper fitted with this model."),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(autocompletion=_complete_methods, help="posterior, least-squares or paper (its own inversion)."),
+    ] = "posterior",
+    friction: Annotated[
+        str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
+    ] = "rotor",
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "spirillum-calibration"
+    ),
+    no_figures: Annotated[
+        bool, typer.Option("--no-figures", help="Draw no figures, which takes some seconds.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Fit parameters of a model to observed speeds and rates, with their uncertainty.
+
+    Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
+    """
+    from spirillum.calibration.files import check_folder
+    from spirillum.calibration.fit import calibrate as answer
+    from spirillum.calibration.posterior import Sampling
+    from spirillum.cli import calibration_text, text
+
+    check_folder(output)
+    robots = [loaded_robot(name, settings) for name in robot]
+    with text.progress_bar(quiet=json) as progress:
+        found = answer(
+            observations,
+            robots,
+            model=model,
+            free=free,
+            method=method,
+            friction=friction,
+            sampling=Sampling(seed=seed),
+            progress=progress,
+        )
+        written = found.write(output, figures=not no_figures, progress=progress)
+    content = calibration_text.calibration_content(found.to_dict(), output, written)
+    text.show(content, calibration_text.calibration, json=json)
+    if not found.converged:
+        raise typer.Exit(1)
+
+
+def rank_models(
+    observations: _Observations,
+    robot: Annotated[
+        list[str] | None,
+        typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
+    ] = None,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(autocompletion=complete_models, help="A model to rank; repeatable. Without it, sbt and rft."),
+    ] = None,
+    free: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="Free parameters of every model; else body_drag,body_rotation."),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Rank models by how well they predict tails that they were not fitted to, and say where each fails.
+
+    Example: `spirillum rank-models observations.csv --model sbt --model rft --model slender`
+    """
+    from spirillum.calibration.posterior import Sampling
+    from spirillum.calibration.ranking import rank_models as answer
+    from spirillum.cli import calibration_text, text
+
+    names = robot or ["biorob2012-wide", "biorob2012-narrow"]
+    with text.progress_bar(quiet=json) as progress:
+        found = answer(
+            observations,
+            [loaded_robot(name, settings) for name in names],
+            models=model,
+            free=free,
+            sampling=Sampling(seed=seed),
+            progress=progress,
+        )
+    text.show(found.to_dict(), calibration_text.ranking, json=json)
+    if not all(item.fit.converged for item in found.ranked):
+        raise typer.Exit(1)
+
+
+def suggest(
+    posterior: Annotated[Path, typer.Argument(help="Posterior of a calibration (posterior.nc).")],
+    robot: Annotated[
+        list[str] | None,
+        typer.Argument(autocompletion=complete_robots, help="A robot for each channel; without, the paper's two."),
+    ] = None,
+    candidates: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Channels and tails to choose from (CSV); else a grid of tails.")
+    ] = None,
+    trials: Annotated[int, typer.Option(help="Trials of each candidate.")] = 5,
+    rows: Annotated[int, typer.Option(help="Candidates in the table.")] = 10,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Suggest which tail or channel to measure next: the expected information of each candidate.
+
+    Example: `spirillum suggest my-calibration/posterior.nc --candidates tails.csv`
+    """
+    from spirillum.calibration.suggest import suggest as answer
+    from spirillum.cli import calibration_text, text
+
+    names = robot or ["biorob2012-wide", "biorob2012-narrow"]
+    found = answer(posterior, [loaded_robot(name, settings) for name in names], candidates=candidates, trials=trials)
+    text.show(found.to_dict(), lambda content, console: calibration_text.suggestion(content, console, rows), json=json)

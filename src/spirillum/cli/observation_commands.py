@@ -1,0 +1,60 @@
+"""The commands `spirillum observations new` and `observations check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from spirillum.cli.options import Json
+
+__all__ = ["observations_app"]
+
+observations_app = typer.Typer(name="observations", help="Files of observed speeds and rates.", no_args_is_help=True)
+
+
+@observations_app.command("new")
+def new(
+    file: Annotated[Path, typer.Argument(help="File to write (.csv).")],
+    force: Annotated[bool, typer.Option("--force", help="Overwrite a file that is there.")] = False,
+) -> None:
+    """Write an empty observations file to fill in.
+
+    Example: `spirillum observations new observations.csv`
+    """
+    from spirillum.measurement.template import new_observations_file
+
+    new_observations_file(file, overwrite=force)
+    typer.echo(f"{file}: columns and their units are explained in its comments")
+
+
+@observations_app.command("check")
+def check(
+    file: Annotated[Path, typer.Argument(help="Observations file (CSV or Parquet).")],
+    json: Json = False,
+) -> None:
+    """Check an observations file and count what is in it.
+
+    Example: `spirillum observations check observations.csv`
+    """
+    from spirillum.cli import text
+    from spirillum.measurement.template import observations_answer
+
+    text.show(observations_answer(file), _table, json=json)
+
+
+def _table(answer: object, console: object) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+
+    assert isinstance(answer, dict)  # noqa: S101 - `show` hands its answer on
+    assert isinstance(console, Console)  # noqa: S101
+    seen = ", ".join(f"{name} {count}" for name, count in answer["measured"].items())
+    console.print(
+        f"{escape(answer['file'])}: valid, {answer['rows']} rows of {answer['tails']} tails in "
+        f"{answer['channels']} channels",
+        highlight=False,
+        soft_wrap=True,
+    )
+    console.print(f"measured: {seen}", highlight=False, soft_wrap=True)

@@ -1,0 +1,60 @@
+"""A template of an observations file, and what a filled one holds."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from spirillum.answer import envelope
+from spirillum.errors import InputError
+from spirillum.files import output_target, write_text
+from spirillum.measurement.observations import COLUMNS, read_observations
+
+__all__ = ["new_observations_file", "observations_answer"]
+
+_TEMPLATE = """\
+# Observed speeds and rates, one row for each trial. Lines that start with # are comments.
+# robot: its name, for people. The channel, wavelength and amplitude of the tail say which robot a row belongs to.
+# channel_diameter_mm, wavelength_mm, amplitude_mm: needed. amplitude is the radius of the wire's centreline.
+# trial: its number; a trial of a tail stands once.
+# forward_velocity_mm_s, tail_rate_Hz, body_rate_Hz, motor_rate_Hz: what was measured; leave empty what was not.
+#   All are signed about the swimming direction, in the lab; 1 Hz is one turn a second. A right-handed tail drives
+#   with a positive rate, the body turns against it, and the motor's rate is the tail's less the body's.
+# trials and the columns *_ci95: only for a row that is a mean over trials, with half widths of 95 % intervals.
+"""
+
+
+def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
+    """Write an empty observations file: comments and the header.
+
+    Args:
+        path: file to write, `.csv`.
+        overwrite: replace a file that is there.
+
+    Raises:
+        InputError: if the file is there or cannot be written.
+    """
+    target = output_target(path, {".csv": "an observations file"}, "observations.csv")
+    if target.exists() and not overwrite:
+        raise InputError(f"{target} exists; allowed: a new file, or --force to overwrite one")
+    write_text(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n")
+
+
+def observations_answer(path: str | Path) -> dict[str, Any]:
+    """The answer of `spirillum observations check`.
+
+    Raises:
+        InputError: if the file is wrong.
+    """
+    items = read_observations(path)
+    names = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
+    content = {
+        "file": str(path),
+        "valid": True,
+        "rows": len(items),
+        "tails": len({item.tail for item in items}),
+        "channels": len({item.tail[0] for item in items}),
+        "measured": {name: sum(math.isfinite(getattr(item, name)) for item in items) for name in names},
+    }
+    return envelope("observations", content, ())

@@ -1,0 +1,216 @@
+"""Swimming with what a calibration does not know: a posterior's draws, each swum, and the intervals over them.
+
+A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
+discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
+discrepancy then goes onto speed and body rate, independently for each draw, for a tail that was not observed may be
+missed by as much as those that were. An interval is of the robot's own motion, not of a single measured trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Axial, PerRobot, Samples
+from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.motion.posterior_file import PosteriorFile
+from spirillum.motion.quantities import Swimming
+from spirillum.motion.swimming import swim
+from spirillum.robot.batch import CalibrationFactors, RobotBatch
+from spirillum.robot.robot import Robot
+
+__all__ = ["LEVEL", "Intervals", "drawn_kinematics", "intervals_of"]
+
+LEVEL = 0.95
+"""Level of the intervals."""
+_ELECTRIC = ("torque_constant", "back_emf_constant")
+_COEFFICIENTS = ("normal_factor", "tangential_factor")
+_WIRE_POINTS = 7
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Limits of the intervals of every quantity of one robot."""
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
+        if not np.isfinite(self.low[name]):
+            return {}
+        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
+
+
+def intervals_of(
+    robot: Robot,
+    model: SwimmerModel,
+    posterior: PosteriorFile,
+    *,
+    tail_rate: float | None,
+    friction: str,
+) -> Intervals:
+    """Swim every draw of a posterior and take the limits of 95 % intervals.
+
+    Args:
+        robot: the robot, as `PosteriorFile.central` gives it.
+        model: the hydrodynamic model of the posterior.
+        posterior: its draws.
+        tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
+        friction: reading of the friction.
+    """
+    rng = np.random.default_rng(1)
+    draws = posterior.of(robot, rng)
+    size = next(iter(draws.values())).size
+    batch = _drawn_batch(robot, posterior.model, draws, size)
+    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    rates = None if tail_rate is None else np.full(size, tail_rate)
+    swum = swim(batch, drawn, tail_rate=rates, friction=friction)
+    values = _with_discrepancy(swum, posterior, rng, own_drive=tail_rate is None)
+    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
+    limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
+    nan = float("nan")
+    return Intervals(
+        {name: float(limits[name][0]) if name in limits else nan for name in values},
+        {name: float(limits[name][1]) if name in limits else nan for name in values},
+    )
+
+
+def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
+    """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,).
+
+    Args:
+        robot: the robot, as `PosteriorFile.central` gives it.
+        model: the hydrodynamic model of the posterior.
+        posterior: its draws.
+    """
+    draws = posterior.of(robot, np.random.default_rng(1))
+    size = next(iter(draws.values())).size
+    batch = _drawn_batch(robot, posterior.model, draws, size)
+    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    swum = swim(batch, drawn, tail_rate=np.full(size, robot.hand), friction="none")
+    return {"advance": swum.advance_per_radian, "turning": swum.body_rotation_rate / swum.tail_rotation_rate}
+
+
+def _known(column: Samples) -> bool:
+    """Whether at least nineteen of twenty draws have an answer, and the draws differ: else nothing acts on it."""
+    known = column[np.isfinite(column)]
+    if known.size < LEVEL * column.size:
+        return False
+    return bool(np.ptp(known) > 1e-9 * np.max(np.abs(known)))
+
+
+def _drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
+    """A robot for each draw."""
+    one = np.ones(size)
+    columns: dict[str, np.ndarray] = {}
+    own = robot.friction.effective
+    columns["friction.effective"] = np.full(size, np.nan if own is None else own)
+    for name, path in (
+        ("wire_diameter", "tail.wire_diameter"),
+        ("viscosity", "fluid.viscosity"),
+        ("shared_friction", "friction.effective"),
+        ("friction", "friction.effective"),
+    ):
+        if name in draws:
+            columns[path] = draws[name]
+    batch = RobotBatch.of(robot).with_values(columns)
+    if batch.electrics is not None:
+        motor = {name: draws[name] for name in _ELECTRIC if name in draws}
+        batch = replace(batch, electrics=replace(batch.electrics, **motor))
+    entry = robot.calibration.get(model)
+    if entry is not None:
+        factors = CalibrationFactors(
+            body_drag=draws.get("body_drag", entry.body_drag * one),
+            body_rotation=draws.get("body_rotation", entry.body_rotation * one),
+            channel_diameter=entry.fitted_to.channel_diameter * one,
+            body_diameter=entry.fitted_to.body_diameter * one,
+            body_length=entry.fitted_to.body_length * one,
+        )
+        batch = replace(batch, calibration={model: factors})
+    return batch
+
+
+def _drawn_axial(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples], size: int) -> Axial:
+    """Resistances of all draws, (draws, 4, 4), or (1, 4, 4) where they share it."""
+    batch = RobotBatch.of(robot)
+    if "wire_diameter" not in draws:
+        found = _with_coefficients(batch, model, draws)
+    elif model.closed_form:
+        found = _with_coefficients(batch.with_values({"tail.wire_diameter": draws["wire_diameter"]}), model, draws)
+    else:
+        wires = np.log(draws["wire_diameter"])
+        angle = (2.0 * np.arange(_WIRE_POINTS) + 1.0) * np.pi / (2.0 * _WIRE_POINTS)
+        nodes = 0.5 * (wires.min() + wires.max()) + 0.5 * (wires.max() - wires.min()) * np.cos(angle)
+        known = model.axial(batch.with_values({"tail.wire_diameter": np.exp(nodes)}))
+        fit = np.polynomial.chebyshev.chebfit(np.cos(angle), known.reshape(_WIRE_POINTS, 16), _WIRE_POINTS - 1)
+        at = (2.0 * wires - wires.min() - wires.max()) / (wires.max() - wires.min())
+        found = np.polynomial.chebyshev.chebval(at, fit).T.reshape(size, 4, 4)
+    if "viscosity" in draws:
+        found = found * (draws["viscosity"] / robot.fluid.viscosity)[:, None, None]
+    return found
+
+
+def _with_coefficients(batch: RobotBatch, model: SwimmerModel, draws: Mapping[str, Samples]) -> Axial:
+    """RFT is linear in both of its coefficients: what a factor adds is what doubling it adds, in proportion."""
+    found = model.axial(batch)
+    whole, own = found, batch.options.rft
+    for name in _COEFFICIENTS:
+        if name in draws:
+            value = getattr(own, name)
+            doubled = batch.options.model_copy(update={"rft": own.model_copy(update={name: 2.0 * value})})
+            more = model.axial(replace(batch, options=doubled)) - whole
+            found = found + (draws[name] / value - 1.0)[:, None, None] * more
+    return found
+
+
+class _Drawn(SwimmerModel):
+    """A model whose resistances are known beforehand, one for each draw."""
+
+    parts = ()
+
+    def __init__(self, model: SwimmerModel, axial: Axial) -> None:
+        self.name = model.name  # type: ignore[misc]
+        self._model, self._axial = model, axial
+
+    def domain(self, batch: RobotBatch) -> list[Any]:
+        return self._model.domain(batch)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Any:
+        return self._model.part_matrix(batch, part, phase)
+
+    def axial(self, batch: RobotBatch) -> Axial:  # noqa: ARG002 - one interface for all models
+        return self._axial
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Any:
+        return self._model.resistance(batch, phase)
+
+
+def _with_discrepancy(
+    swum: Swimming, posterior: PosteriorFile, rng: np.random.Generator, *, own_drive: bool
+) -> dict[str, Samples]:
+    """All quantities, (draws,), with the model's discrepancy on speed and rates."""
+    values = {f.name: getattr(swum, f.name) for f in fields(Swimming) if f.name != "valid"}
+
+    def off(name: str) -> Samples:
+        tau = posterior.discrepancy.get(name)
+        size = swum.forward_velocity.size
+        return np.ones(size) if tau is None else 1.0 + tau * rng.normal(size=size)
+
+    advance, turning, motor = off("advance"), off("turning"), off("motor_rate")
+    pace = motor if own_drive else np.ones(motor.size)
+    tail = values["tail_rotation_rate"] * pace
+    body = values["body_rotation_rate"] * turning * pace
+    values |= {
+        "forward_velocity": values["forward_velocity"] * advance * pace,
+        "advance_per_radian": values["advance_per_radian"] * advance,
+        "reynolds_number": values["reynolds_number"] * np.abs(advance * pace),
+        "hydrodynamic_efficiency": values["hydrodynamic_efficiency"] * advance**2,
+        "tail_rotation_rate": tail,
+        "body_rotation_rate": body,
+        "motor_rotation_rate": tail - body,
+    }
+    return values

@@ -1,0 +1,275 @@
+"""A file of fitted parameters: drag factors for each channel, friction for each tail, and what they rest on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from spirillum.errors import InputError
+from spirillum.files import read_toml
+from spirillum.robot.fields import (
+    BackEmfConstant,
+    Factor,
+    Length,
+    RotaryFriction,
+    Section,
+    Text,
+    TorqueConstant,
+    Viscosity,
+)
+from spirillum.robot.options import Calibration, known_model
+from spirillum.robot.placement import Placement
+from spirillum.robot.problems import problems_in
+from spirillum.robot.robot import Robot
+
+__all__ = [
+    "CalibrationFile",
+    "FittedFriction",
+    "FittedPlace",
+    "FittedValues",
+    "Provenance",
+    "calibrated_placement",
+    "calibrated_robot",
+    "friction_of_tails",
+    "read_calibration",
+    "with_calibration",
+]
+
+_WHAT = "a calibration file (TOML with [calibration.<model>] tables)"
+_SAME = 1e-6
+"""Relative difference up to which two geometries are the same."""
+
+_Word = Annotated[Text, Field(max_length=500)]
+
+
+def _as_list(value: Any) -> Any:
+    """A single table, as in a robot file, is a list of one."""
+    return [value] if isinstance(value, Mapping) else value
+
+
+_Entries = Annotated[tuple[Calibration, ...], BeforeValidator(_as_list), Field(min_length=1, max_length=1000)]
+
+
+class FittedValues(Section):
+    """Fitted fields of the robot itself; what is not given stays as the robot has it."""
+
+    wire_diameter: Length | None = None
+    """`tail.wire_diameter`."""
+    viscosity: Viscosity | None = None
+    """`fluid.viscosity`."""
+    torque_constant: TorqueConstant | None = None
+    """`motor.torque_constant`."""
+    back_emf_constant: BackEmfConstant | None = None
+    """`motor.back_emf_constant`."""
+    normal_factor: Factor | None = None
+    """`model.rft.normal_factor`."""
+    tangential_factor: Factor | None = None
+    """`model.rft.tangential_factor`."""
+    friction: RotaryFriction | None = None
+    """`friction.effective`, one for all tails."""
+
+
+class FittedFriction(Section):
+    """B_eff of one tail in one channel."""
+
+    channel_diameter: Length
+    """Channel diameter."""
+    wavelength: Length
+    """Wavelength of the tail."""
+    amplitude: Length
+    """Amplitude of the tail."""
+    effective: RotaryFriction
+    """`friction.effective`."""
+
+
+class FittedPlace(Section):
+    """Where in a channel the robot lies, for a model that computes the walls."""
+
+    channel_diameter: Length
+    """Channel diameter."""
+    placement: Placement
+    """The fitted fields of the placement."""
+
+
+class Provenance(Section):
+    """What the fitted values rest on."""
+
+    observations: _Word = ""
+    """Name of the observations file."""
+    sha256: _Word = ""
+    """Hash of that file."""
+    rows: Annotated[int, Field(strict=True, ge=0)] = 0
+    """Rows that were used."""
+    robots: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
+    """Robots that the rows belong to."""
+    model: _Word = ""
+    """Hydrodynamic model that was fitted."""
+    method: _Word = ""
+    """Method of the fit."""
+    free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
+    """Parameters that were free."""
+    friction_reading: _Word = ""
+    """Reading of the friction under which B_eff was inferred."""
+    synthetic: Annotated[bool, Field(strict=True)] = False
+    """Whether the observations said that a program made them."""
+    uncertainty: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
+    """Fitted values with their uncertainty, for people."""
+    versions: _Word = ""
+    """Versions of the programs."""
+
+
+class CalibrationFile(Section):
+    """A file of fitted parameters; a table `[calibration.<model>]` is the same as in a robot file."""
+
+    calibration: dict[Annotated[str, AfterValidator(known_model)], _Entries] = Field(default_factory=dict)
+    """Factors for each model: one table, or a list of tables, one for each geometry that they were fitted to."""
+    fitted: FittedValues = FittedValues()
+    """Fitted fields of the robot itself."""
+    friction: Annotated[tuple[FittedFriction, ...], Field(max_length=100_000)] = ()
+    """B_eff, tail by tail."""
+    placement: Annotated[tuple[FittedPlace, ...], Field(max_length=1000)] = ()
+    """Where the robot lies, channel by channel."""
+    provenance: Provenance = Provenance()
+    """What the values rest on."""
+
+    @model_validator(mode="after")
+    def _something(self) -> Self:
+        if not (self.calibration or self.friction or self.placement or self.fitted != FittedValues()):
+            sentence = "nothing is calibrated; allowed: at least one [calibration.<model>] table"
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+        return self
+
+
+def read_calibration(path: str | Path) -> CalibrationFile:
+    """Read and check a calibration file.
+
+    Raises:
+        InputError: if it cannot be read or a field is wrong.
+    """
+    table = read_toml(Path(path), _WHAT)
+    checked = problems_in(CalibrationFile, table)
+    if not isinstance(checked, list):
+        return checked
+    tables = table.get("calibration")
+    single = [name for name, entry in tables.items() if isinstance(entry, Mapping)] if isinstance(tables, dict) else []
+    for name in single:  # the file says [calibration.sbt], not the first of a list
+        checked = [problem.replace(f"calibration.{name}.0.", f"calibration.{name}.") for problem in checked]
+    raise InputError(f"{path}: {checked[0]}", [f"{path}: {problem}" for problem in checked])
+
+
+def with_calibration(robot: Robot, path: str | Path) -> Robot:
+    """The robot with what a calibration file holds in place of its own.
+
+    Args:
+        robot: a checked robot.
+        path: TOML file with `[calibration.<model>]` tables, as in a robot file, or as `spirillum calibrate` writes it.
+
+    Raises:
+        InputError: if the file cannot be read or a field is wrong.
+    """
+    return calibrated_robot(robot, read_calibration(path))
+
+
+def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
+    """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
+
+    A file without factors leaves the robot its own. A tail whose B_eff was not fitted gets the middle of the fitted
+    tails in its channel: they say more about it than the rotor's own B_m, which is a lower bound.
+    """
+    changed = _with_fitted(robot, file.fitted)
+    factors = {
+        model: min(entries, key=lambda entry: _distance(robot, entry)) for model, entries in file.calibration.items()
+    }
+    friction = changed.friction
+    fitted, others = friction_of_tails(robot, file.friction)
+    if fitted is not None:
+        friction = friction.model_copy(update={"effective": fitted})
+    elif others:
+        friction = friction.model_copy(update={"effective": float(np.median(others))})
+    return changed.model_copy(update={"calibration": factors or robot.calibration, "friction": friction})
+
+
+def friction_of_tails(robot: Robot, entries: Sequence[FittedFriction]) -> tuple[float | None, tuple[float, ...]]:
+    """B_eff that was fitted to a robot's own tail, None where none was, and those of all tails in its channel.
+
+    Args:
+        robot: the robot; open, or without motor, it has none.
+        entries: B_eff, tail by tail.
+    """
+    if robot.channel is None or robot.motor is None or not entries:
+        return None, ()
+    diameter = robot.channel.diameter
+    near = [entry for entry in entries if _alike(diameter, entry.channel_diameter)]
+    own = [entry.effective for entry in near if _is_of(robot, entry)]
+    return own[0] if own else None, tuple(entry.effective for entry in near)
+
+
+def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
+    """Where a calibration file places a robot in its channel; None where it says nothing of that channel.
+
+    Raises:
+        InputError: as `read_calibration`.
+    """
+    diameter = robot.channel.diameter if robot.channel else float("inf")
+    own = [place.placement for place in read_calibration(path).placement if _alike(diameter, place.channel_diameter)]
+    return own[0] if own else None
+
+
+def _alike(value: float, fitted: float) -> bool:
+    return abs(value - fitted) <= _SAME * fitted
+
+
+def _distance(robot: Robot, entry: Calibration) -> float:
+    """How far a robot is from the geometry that factors were fitted to; an open robot is far from every channel."""
+    fitted = entry.fitted_to
+    channel = robot.channel.diameter if robot.channel else 1e3
+    pairs = (
+        (channel, fitted.channel_diameter),
+        (robot.body.diameter, fitted.body_diameter),
+        (robot.body.length, fitted.body_length),
+    )
+    return float(sum(abs(np.log(value / fit)) for value, fit in pairs))
+
+
+def _is_of(robot: Robot, entry: FittedFriction) -> bool:
+    if robot.channel is None:
+        return False
+    pairs = (
+        (robot.channel.diameter, entry.channel_diameter),
+        (robot.tail.wavelength, entry.wavelength),
+        (robot.tail.amplitude, entry.amplitude),
+    )
+    return all(_alike(value, fit) for value, fit in pairs)
+
+
+_FIELDS = {
+    "wire_diameter": ("tail", "wire_diameter"),
+    "viscosity": ("fluid", "viscosity"),
+    "torque_constant": ("motor", "torque_constant"),
+    "back_emf_constant": ("motor", "back_emf_constant"),
+    "normal_factor": ("model", "rft", "normal_factor"),
+    "tangential_factor": ("model", "rft", "tangential_factor"),
+    "friction": ("friction", "effective"),
+}
+"""Field of `FittedValues` to the place in a robot."""
+
+
+def _with_fitted(robot: Robot, fitted: FittedValues) -> Robot:
+    for name, place in _FIELDS.items():
+        value = getattr(fitted, name)
+        if value is not None:
+            robot = _replaced(robot, place, value)
+    return robot
+
+
+def _replaced(section: Any, place: tuple[str, ...], value: float) -> Any:
+    """A frozen section with one field within it replaced; a part that the robot lacks stays away."""
+    below = getattr(section, place[0])
+    if len(place) == 1:
+        return section.model_copy(update={place[0]: value})
+    return section if below is None else section.model_copy(update={place[0]: _replaced(below, place[1:], value)})

@@ -1,0 +1,127 @@
+"""Little data gives wide intervals, and what cannot be true is refused or named by its row."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+
+WIDE = "biorob2012-wide"
+PRESETS = (WIDE, "biorob2012-narrow")
+HEADER = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
+FOUR = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}
+BOTH = "body_drag,body_rotation"
+
+
+def scaled(path: Path, out: Path, column: str, factor: float, rows: slice = slice(None)) -> Path:
+    """The same file with some cells of a column times a factor; rows count from the first trial."""
+    lines = path.read_text().splitlines()
+    place = lines[1].split(",").index(column)
+    for number in range(2, len(lines))[rows]:
+        cells = lines[number].split(",")
+        cells[place] = repr(float(cells[place]) * factor)
+        lines[number] = ",".join(cells)
+    out.write_text("\n".join(lines) + "\n")
+    return out
+
+
+@pytest.mark.parametrize(
+    "rows", [["40,15,2.5,1,1.0,1.2,-0.12"], ["40,15,2.5,1,1.0,1.2,-0.12", "30,15,2.5,1,.7,1.2,-.12"]]
+)
+def test_as_many_numbers_as_means_give_wide_intervals_and_a_sentence(tmp_path: Path, rows: list[str]) -> None:
+    path = tmp_path / "o.csv"
+    path.write_text("\n".join([HEADER, *rows]) + "\n")
+    found = sp.calibrate(path, PRESETS, free=BOTH, method="least-squares")
+    assert all(item.high / item.low > 2.0 for item in found.values.values())
+    assert any("as many free numbers as the speed has means" in warning for warning in found.warnings)
+
+
+def test_few_tails_widen_the_intervals_as_students_distribution_does(made: Callable[..., Path]) -> None:
+    """Two tails leave the discrepancy all but unknown."""
+    inside = []
+    for seed in range(24):
+        path = made(
+            **FOUR | {"amplitudes": (2.5,)}, seed=300 + seed, discrepancy=0.06, error=0.01, trials=3, drag=(2.0,)
+        )
+        found = sp.calibrate(path, WIDE, model="sbt", free=BOTH, method="least-squares")
+        for name, truth in (("body_drag", 2.0), ("body_rotation", 0.6)):
+            inside.append(found.values[name].low <= truth <= found.values[name].high)
+    # 45.6 of 48 are expected, 42 is two and a half standard deviations less.
+    assert sum(inside) >= 42
+
+
+def test_the_spread_of_a_discrepancy_follows_its_degrees_of_freedom() -> None:
+    from spirillum.calibration.least_squares import _drawn_discrepancy
+
+    rng = np.random.default_rng(1)
+    # Far below the prior's scale, total/tau^2 is chi-squared (density of tau flat: one degree of freedom fewer).
+    draws = _drawn_discrepancy(1e-2 * 31, 0.0, 31.0, 200_000, rng)
+    assert np.mean(1e-2 * 31 / draws**2) == pytest.approx(30.0, rel=0.05)
+    unseen = _drawn_discrepancy(0.0, 0.0, 0.0, 200_000, rng)
+    assert np.median(unseen) == pytest.approx(0.3 * 0.6745, rel=0.02)
+
+
+def test_what_no_observation_tells_stays_at_its_prior(made: Callable[..., Path], tmp_path: Path) -> None:
+    lines = made(**FOUR, seed=5).read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    place = rows[0].index("forward_velocity_mm_s")
+    kept = [",".join(cells[:place] + cells[place + 1 :]) for cells in rows]
+    path = tmp_path / "o.csv"
+    path.write_text("\n".join(kept) + "\n")
+    found = sp.calibrate(path, WIDE, free=BOTH, method="least-squares")
+    drag = found.values["body_drag"]
+    assert 0.28 < drag.value < 14.0
+    assert drag.high / drag.low > 10.0
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("method", ["least-squares", "paper"])
+def test_a_slip_of_units_is_refused(made: Callable[..., Path], tmp_path: Path, factor: float, method: str) -> None:
+    path = scaled(made(**FOUR, seed=5), tmp_path / "o.csv", "forward_velocity_mm_s", factor)
+    with pytest.raises(InputError, match="allowed"):
+        sp.calibrate(path, WIDE, method=method)
+
+
+def test_a_trial_that_swims_against_the_others_is_refused(made: Callable[..., Path], tmp_path: Path) -> None:
+    path = scaled(made(**FOUR, seed=5), tmp_path / "o.csv", "forward_velocity_mm_s", -1.0, slice(6, 7))
+    with pytest.raises(InputError, match=r"row 9, column forward_velocity_mm_s: .* allowed: the same sign"):
+        sp.calibrate(path, WIDE, method="least-squares")
+
+
+@pytest.mark.parametrize("method", ["least-squares", "paper"])
+def test_an_outlying_trial_is_named_by_its_row(made: Callable[..., Path], tmp_path: Path, method: str) -> None:
+    path = made(**FOUR, seed=5)
+    assert not sp.calibrate(path, WIDE, method=method).experiment.strays
+    wrong = scaled(path, tmp_path / "o.csv", "forward_velocity_mm_s", 10.0, slice(6, 7))
+    found = sp.calibrate(wrong, WIDE, method=method)
+    assert any(w.startswith("row 9, column forward_velocity_mm_s: ") and "an outlier" in w for w in found.warnings)
+
+
+def test_a_tail_that_is_off_all_others_is_named_by_its_rows(made: Callable[..., Path], tmp_path: Path) -> None:
+    path = made(**FOUR | {"amplitudes": (1.5, 2.0, 2.5, 3.0)}, seed=5)
+    wrong = scaled(path, tmp_path / "o.csv", "forward_velocity_mm_s", 3.0, slice(5, 10))
+    found = sp.calibrate(wrong, WIDE, method="least-squares")
+    assert any(w.startswith("row 8, 9, 10, 11, 12: the speed of channel 40 mm") for w in found.warnings)
+
+
+def test_the_papers_method_says_by_how_much_it_misses(made: Callable[..., Path]) -> None:
+    path = made(model="slender", drag=(3.0,), rotation=(1.5,), **FOUR, seed=6)
+    found = sp.calibrate(path, WIDE, model="rft", method="paper")
+    assert any("misses the body rate by" in warning for warning in found.warnings)
+
+
+def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:
+    found = sp.calibrate(made(**FOUR, seed=5, drag=(60.0,)), WIDE, method="least-squares")
+    assert any(w.startswith("body_drag = ") and "from the middle of its prior" in w for w in found.warnings)
+    with pytest.raises(InputError, match="body_drag comes out as"):
+        sp.calibrate(made(**FOUR, seed=5, drag=(600.0,)), WIDE, method="paper")
+
+
+@pytest.mark.parametrize(("share", "words"), [(0.0372, "3.7 %"), (1.0, "100 %"), (0.123, "12 %"), (-0.5, "-50 %")])
+def test_shares_are_written_without_powers_of_ten(share: float, words: str) -> None:
+    from spirillum.calibration.judgement import percent
+
+    assert percent(share) == words

@@ -1,0 +1,141 @@
+"""B_eff of a tail that was not fitted: one rule for `predict` and `study`, with the spread from tail to tail."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+from spirillum.calibration.posterior import Sampling
+from spirillum.motion.posterior_file import read_posterior
+from spirillum.robot import load
+
+WIDE = "biorob2012-wide"
+FITTED = (8e-6, 1e-5, 1.6e-5)
+SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=500, doublings=2)
+
+
+@pytest.fixture
+def calibration(tmp_path: Path) -> Path:
+    """B_eff of three tails, one of them that of the preset."""
+    tail = load(WIDE).tail
+    lines = ["[provenance]", 'observations = "o.csv"', 'friction_reading = "rotor"', "synthetic = true"]
+    for wavelength, effective in zip((tail.wavelength, 0.011, 0.024), FITTED, strict=True):
+        lines += ["[[friction]]", 'channel_diameter = "40 mm"', f'wavelength = "{wavelength!r} m"']
+        lines += [f'amplitude = "{tail.amplitude!r} m"', f'effective = "{effective} N m s/rad"']
+    path = tmp_path / "calibration.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_a_tail_that_was_not_fitted_has_the_middle_in_predict_and_in_study(calibration: Path) -> None:
+    study = {
+        "title": "t",
+        "models": ["rft"],
+        "friction": ["rotor", "paper"],
+        "grid": {
+            "channels": {"wide": WIDE},
+            "wavelengths": ["13 mm", "11 mm"],
+            "amplitudes": [f"{load(WIDE).tail.amplitude} m"],
+        },
+    }
+    dataset = sp.study(study, calibration=calibration)
+    for wavelength, effective in ((0.013, 1e-5), (0.011, 1e-5)):
+        alone = sp.predict(load(WIDE, **{"tail.wavelength": f"{wavelength} m"}), model="rft", calibration=calibration)
+        assert alone.robot.friction.effective == pytest.approx(effective)
+        found = dataset["motor_rotation_rate"].sel(friction="rotor").sel(wavelength=wavelength, method="nearest")
+        assert float(found.squeeze()) == pytest.approx(alone.motor_rotation_rate, rel=1e-12)
+    assert "B_eff of 1 of 2 tails was not fitted" in dataset.attrs["warnings"]
+    assert "inferred under friction reading 'rotor' and is used under 'paper'" in dataset.attrs["warnings"]
+    assert "o.csv says that its numbers are synthetic" in dataset.attrs["warnings"]
+
+
+def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibration: Path) -> None:
+    other = load(WIDE, **{"tail.wavelength": "13 mm"})
+    found = sp.predict(other, model="rft", calibration=calibration, friction="paper").warnings
+    assert any("the middle of 3 fitted tails" in words and "8e-06 to 1.6e-05" in words for words in found)
+    assert any("and is used under 'paper'" in words for words in found)
+    assert any("o.csv says that its numbers are synthetic" in words for words in found)
+    own = sp.predict(WIDE, model="rft", calibration=calibration)
+    assert own.robot.friction.effective == pytest.approx(8e-6)
+    assert not any("B_eff" in words for words in own.warnings)
+    driven = sp.predict(WIDE, model="rft", calibration=calibration, tail_rate="1 Hz").warnings
+    assert not any("friction.effective is ignored" in words for words in driven)
+
+
+def test_a_negative_friction_is_zero_and_said(calibration: Path) -> None:
+    calibration.write_text(calibration.read_text().replace("8e-06", "0.0"))
+    found = sp.predict(WIDE, model="rft", calibration=calibration)
+    assert any("came out negative in the calibration: zero is used" in words for words in found.warnings)
+    assert not any("unset" in words for words in found.warnings)
+
+
+@pytest.fixture(scope="module")
+def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
+    folder = tmp_path_factory.mktemp("fitted")
+    sp.calibrate(made(**small, seed=4), WIDE, model="rft", free="body_drag,friction", sampling=SHORT).write(
+        folder, figures=False
+    )
+    return folder
+
+
+def test_the_spread_from_tail_to_tail_is_in_the_interval(fitted: Path) -> None:
+    posterior = read_posterior(fitted / "posterior.nc")
+    known = load(WIDE, **{"tail.wavelength": "15 mm", "tail.amplitude": "1.5 mm"})
+    other = load(WIDE, **{"tail.wavelength": "18 mm", "tail.amplitude": "1.5 mm"})
+    draws = {name: posterior.of(robot, np.random.default_rng(1)) for name, robot in (("own", known), ("other", other))}
+    logs = {name: np.log(found["friction"]) for name, found in draws.items()}
+    between = np.std(np.log([item.effective for item in posterior.frictions]), ddof=1)
+    assert np.quantile(logs["other"], 0.84) - np.quantile(logs["other"], 0.16) > 2 * between
+    assert np.std(logs["own"]) < np.std(logs["other"])
+    width = []
+    for robot in (known, other):
+        found = sp.predict(robot, model="rft", posterior=fitted / "posterior.nc").intervals
+        assert found is not None
+        width.append(found.high["motor_rotation_rate"] - found.low["motor_rotation_rate"])
+    assert width[1] > width[0]
+
+
+def test_a_quantity_on_which_nothing_acts_has_no_interval(fitted: Path) -> None:
+    found = sp.predict(WIDE, model="rft", posterior=fitted / "posterior.nc", tail_rate="1 Hz").intervals
+    assert found is not None
+    for name, low in found.low.items():
+        assert not np.isfinite(low) or low < found.high[name], name
+    assert not found.of("tail_rotation_rate")
+    assert found.of("forward_velocity")
+
+
+def test_a_damaged_posterior_is_refused(fitted: Path, tmp_path: Path) -> None:
+    import xarray as xr
+
+    with xr.open_datatree(fitted / "posterior.nc", engine="h5netcdf") as tree:
+        tree.load()
+    tree["posterior"]["body_drag"][3, 7] *= -1.0
+    tree.to_netcdf(tmp_path / "negative.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"allowed: posterior\.nc"):
+        read_posterior(tmp_path / "negative.nc")
+    tree["posterior"]["body_drag"][3, 7] *= -1.001
+    tree.to_netcdf(tmp_path / "changed.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="its checksum is another"):
+        read_posterior(tmp_path / "changed.nc")
+    with pytest.raises(InputError, match="is a folder"):
+        read_posterior(tmp_path)
+
+
+def test_a_second_calibration_leaves_nothing_of_the_first(
+    made: Callable[..., Path], fitted: Path, tmp_path: Path
+) -> None:
+    import shutil
+
+    folder = tmp_path / "results"
+    shutil.copytree(fitted, folder)
+    (folder / "figures").mkdir()
+    (folder / "figures" / "posterior.png").write_bytes(b"old")
+    (folder / "figures" / "my-own.png").write_bytes(b"mine")
+    small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
+    sp.calibrate(made(**small, seed=4), WIDE, model="rft", method="least-squares").write(folder, figures=False)
+    found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert found == {"calibration.toml", "predictions.csv", "figures/my-own.png"}

@@ -1,0 +1,124 @@
+"""`suggest`: no information from certainty, more trials tell more, and the promised narrowing comes true."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+from spirillum.calibration.posterior import Sampling
+
+WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
+SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=500, doublings=2)
+FEW = {"wavelengths": (15.0, 25.0), "amplitudes": (2.0, 3.0), "discrepancy": 0.03, "seed": 9}
+
+
+@pytest.fixture(scope="module")
+def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A posterior from four tails in the wide channel."""
+    found = sp.calibrate(made(presets=(WIDE,), **FEW), WIDE, free="body_drag,body_rotation", sampling=SHORT)
+    folder = tmp_path_factory.mktemp("suggest")
+    found.write(folder, figures=False)
+    return folder
+
+
+def candidates(folder: Path, *rows: str) -> Path:
+    path = folder / "candidates.csv"
+    path.write_text("\n".join(["# tails in stock", "channel_diameter_mm,wavelength_mm,amplitude_mm", *rows]) + "\n")
+    return path
+
+
+def test_more_trials_tell_more_up_to_the_discrepancy(fitted: Path) -> None:
+    path = candidates(fitted, "40,20,2.5")
+    gains = [
+        sp.suggest(fitted / "posterior.nc", WIDE, candidates=path, trials=n).candidates[0].gain for n in (1, 5, 10**6)
+    ]
+    assert 0 < gains[0] < gains[1] < gains[2] < 2 * gains[1]
+
+
+def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from spirillum.motion import posterior_file
+
+    known = posterior_file.read_posterior(fitted / "posterior.nc")
+    certain = replace(known, draws={name: np.full_like(values, 1.5) for name, values in known.draws.items()})
+    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: certain)
+    found = sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, "40,20,2.5"))
+    assert found.candidates[0].gain == pytest.approx(0.0, abs=1e-9)
+
+
+def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
+    fitted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Narrow normal draws: information and posterior covariance in closed form, with sensitivities of `swim`."""
+    from spirillum.motion import posterior_file
+    from spirillum.robot import RobotBatch, load
+
+    rng = np.random.default_rng(4)
+    spread, tau, sigma, trials = np.array([0.03, 0.02]), 0.01, 0.02, 5
+    middle = np.array([2.5, 0.8])
+    drawn = middle * np.exp(spread * rng.normal(size=(40_000, 2)))
+    draws = {"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]}
+    one = np.ones(40_000)
+    known = replace(
+        posterior_file.read_posterior(fitted / "posterior.nc"),
+        draws=draws,
+        discrepancy={"advance": tau * one, "turning": tau * one},
+        error={"advance": sigma * one, "turning": sigma * one},
+    )
+    monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path: known)
+    found = sp.suggest("any", WIDE, candidates=candidates(fitted, "40,20,2.5"), trials=trials).candidates[0]
+
+    robot = load(WIDE, **{"tail.wavelength": "20 mm", "tail.amplitude": "2.5 mm"})
+
+    def seen(factors: np.ndarray) -> np.ndarray:
+        entry = robot.calibration["sbt"].model_copy(
+            update={"body_drag": float(factors[0]), "body_rotation": float(factors[1])}
+        )
+        swum = sp.swim(RobotBatch.of(robot.model_copy(update={"calibration": {"sbt": entry}})))
+        return np.log([swum.advance_per_radian[0], -swum.body_rotation_rate[0] / swum.tail_rotation_rate[0]])
+
+    steps = 1e-4 * np.eye(2)
+    jacobian = np.stack([(seen(middle * np.exp(s)) - seen(middle * np.exp(-s))) / 2e-4 for s in steps], axis=1)
+    noise = (tau**2 + sigma**2 / trials) * np.eye(2)
+    before = np.diag(spread**2)
+    after = np.linalg.inv(np.linalg.inv(before) + jacobian.T @ np.linalg.inv(noise) @ jacobian)
+    gain = 0.5 * np.log2(np.linalg.det(before) / np.linalg.det(after))
+    assert found.gain == pytest.approx(gain, rel=0.02)
+    for place, name in enumerate(("body_drag", "body_rotation")):
+        assert found.narrowing[name] == pytest.approx(np.sqrt(after[place, place]) / spread[place], rel=0.02)
+
+
+def test_a_grid_is_ranked_and_what_cannot_be_built_is_said(fitted: Path) -> None:
+    found = sp.suggest(fitted / "posterior.nc", [WIDE, NARROW])
+    gains = [item.gain for item in found.candidates]
+    assert gains == sorted(gains, reverse=True)
+    assert len(gains) == 50
+    path = candidates(fitted, "40,20,2.5", "40,20,30")
+    assert any(
+        "is left out" in warning for warning in sp.suggest(fitted / "posterior.nc", WIDE, candidates=path).warnings
+    )
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (["40,20"], "row 3: 2 cells"),
+        (["40,20,x"], "row 3, column amplitude_mm: 'x'"),
+        (["40,20,-1"], "row 3, column amplitude_mm: '-1'"),
+        (["30,20,2"], "row 3, column channel_diameter_mm: 30; allowed: 40 mm"),
+        (["40,20,30"], "no candidate can be built"),
+        ([], "holds 0 candidates"),
+    ],
+)
+def test_wrong_candidates_are_refused_with_row_and_column(fitted: Path, rows: list[str], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        sp.suggest(fitted / "posterior.nc", WIDE, candidates=candidates(fitted, *rows))
+    assert words in str(caught.value)
+
+
+def test_trials_have_to_be_some(fitted: Path) -> None:
+    with pytest.raises(InputError, match="trials = 0"):
+        sp.suggest(fitted / "posterior.nc", WIDE, trials=0)

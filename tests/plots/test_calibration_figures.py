@@ -1,0 +1,69 @@
+"""Figures of a calibration show what was observed and fitted, and say what is synthetic."""
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.calibration.posterior import Sampling
+
+WIDE = "biorob2012-wide"
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A posterior of a small synthetic experiment."""
+    place = Path(__file__).parent.parent / "calibration" / "conftest.py"
+    spec = importlib.util.spec_from_file_location("synthetic_experiments", place)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("figures")
+    path = module.synthetic(folder / "o.csv", presets=(WIDE,), wavelengths=(15.0, 25.0), amplitudes=(1.5, 2.5))
+    few = Sampling(ensembles=2, walkers=24, warm_up=100, steps=100, doublings=0)
+    return sp.calibrate(path, WIDE, sampling=few)
+
+
+def _texts(figure: Any) -> str:
+    return " ".join(text.get_text() for text in figure.texts)
+
+
+def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any, tmp_path: Path) -> None:
+    written = {path.name for path in found.write(tmp_path)}
+    names = ("observed-40mm", "residuals", "posterior", "profiles")
+    assert written >= {f"{name}.png" for name in names} | {"calibration.toml", "predictions.csv", "posterior.nc"}
+    from spirillum.plots.calibration import observed_figure, residual_figure
+
+    for figure in (observed_figure(found, 0), residual_figure(found)):
+        assert "synthetic, nothing is measured" in _texts(figure)
+
+
+def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
+    from spirillum.plots.calibration import observed_figure
+
+    figure = observed_figure(found, 0)
+    first = figure.axes[0]
+    model, seen = first.lines[0], first.containers[0].lines[0]
+    experiment = found.experiment
+    here = [n for n, robot in enumerate(experiment.robots) if abs(robot.tail.amplitude - 1.5e-3) < 1e-9]
+    speed = (experiment.tail_rate * experiment.advance.mean)[here]
+    predicted = (experiment.tail_rate * found.predicted["advance"][0])[here]
+    assert model.get_xdata() == pytest.approx([15.0, 25.0])
+    factor = np.asarray(seen.get_ydata()) / speed
+    assert factor == pytest.approx([1e3, 1e3])
+    assert np.asarray(model.get_ydata()) == pytest.approx(1e3 * predicted)
+    # Every figure has a row for speed, motor rate and friction, and a column for each amplitude.
+    assert len(figure.axes) == 6
+
+
+def test_residuals_are_observed_over_predicted(found: Any) -> None:
+    from spirillum.plots.calibration import residual_figure
+
+    axes = residual_figure(found).axes[0]
+    drawn = np.sort(axes.containers[0].lines[0].get_ydata())
+    expected = 100 * (found.experiment.advance.mean / found.predicted["advance"][0] - 1)
+    assert drawn == pytest.approx(np.sort(expected))

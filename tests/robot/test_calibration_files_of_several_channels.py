@@ -1,0 +1,88 @@
+"""Calibration files: a robot takes the table of its own channel, its own tail's friction, and fitted fields."""
+
+from pathlib import Path
+
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+from spirillum.robot import load
+from spirillum.robot.calibration_file import with_calibration
+
+TABLES = """
+[[calibration.sbt]]
+body_drag = 2.5
+body_rotation = 0.7
+source = "made up"
+[calibration.sbt.fitted_to]
+channel_diameter = "40 mm"
+body_diameter = "18 mm"
+body_length = "35 mm"
+
+[[calibration.sbt]]
+body_drag = 4.5
+source = "made up"
+[calibration.sbt.fitted_to]
+channel_diameter = "30 mm"
+body_diameter = "18 mm"
+body_length = "35 mm"
+
+[fitted]
+wire_diameter = "1.1 mm"
+torque_constant = "0.0005 N m/A"
+normal_factor = 1.2
+
+[[friction]]
+channel_diameter = "30 mm"
+wavelength = "25 mm"
+amplitude = "2.5 mm"
+effective = "9e-6 N m s/rad"
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "calibration.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_each_channel_takes_its_own(tmp_path: Path) -> None:
+    path = written(tmp_path, TABLES)
+    wide = with_calibration(load("biorob2012-wide"), path)
+    narrow = with_calibration(load("biorob2012-narrow"), path)
+    assert (wide.calibration["sbt"].body_drag, narrow.calibration["sbt"].body_drag) == (2.5, 4.5)
+    assert (wide.friction.effective, narrow.friction.effective) == (None, 9e-6)
+    assert set(wide.calibration) == {"sbt"}
+    assert wide.tail.wire_diameter == 1.1e-3
+    assert wide.motor is not None
+    assert wide.motor.torque_constant == 5e-4
+    assert wide.model.rft.normal_factor == 1.2
+    other = with_calibration(load("biorob2012-wide", **{"channel.diameter": "33 mm"}), path)
+    assert other.calibration["sbt"].body_drag == 4.5
+    answer = sp.predict(load("biorob2012-wide", **{"channel.diameter": "33 mm"}), calibration=path)
+    assert any("outside its geometry" in warning for warning in answer.warnings)
+
+
+def test_a_file_without_factors_leaves_the_robot_its_own(tmp_path: Path) -> None:
+    path = written(tmp_path, '[fitted]\nviscosity = "3 Pa s"\n')
+    robot = with_calibration(load("biorob2012-wide"), path)
+    assert robot.fluid.viscosity == 3.0
+    assert robot.calibration["sbt"].body_drag == 1.95
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[provenance]\nrows = 3\n", "nothing is calibrated"),
+        ('[calibration.sbt]\nbody_drag = 2.0\nsource = "x"\n', "calibration.sbt.fitted_to is missing"),
+        ("[calibration.tube]\n", "calibration.tube"),
+        ('[fitted]\nwire = "1 mm"\n', "fitted.wire is not a known field"),
+        ('[fitted]\nviscosity = "3 mm"\n', '"mm" is not a unit of viscosity'),
+        ("[calibration]\nsbt = 3\n", "calibration.sbt"),
+    ],
+)
+def test_wrong_files_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        with_calibration(load("biorob2012-wide"), written(tmp_path, text))
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)

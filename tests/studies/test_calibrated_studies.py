@@ -1,0 +1,83 @@
+"""A study with a calibration or its posterior: every robot is predicted as `predict` does it alone."""
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+from spirillum.calibration.posterior import Sampling
+from spirillum.robot import load
+
+WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
+GRID = {
+    "channels": {"wide": WIDE, "narrow": NARROW},
+    "wavelengths": ["15 mm", "20 mm"],
+    "amplitudes": ["2.5 mm", "3 mm"],
+}
+STUDY: dict[str, Any] = {"title": "calibrated", "models": ["sbt"], "friction": ["rotor"], "grid": GRID}
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A posterior of a synthetic experiment in both channels."""
+    place = Path(__file__).parent.parent / "calibration" / "conftest.py"
+    spec = importlib.util.spec_from_file_location("synthetic_experiments", place)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    folder = tmp_path_factory.mktemp("fitted")
+    path = module.synthetic(folder / "o.csv", wavelengths=(15.0, 20.0), amplitudes=(1.5, 2.5), discrepancy=0.02)
+    few = Sampling(ensembles=2, walkers=32, warm_up=250, steps=400, doublings=2)
+    found = sp.calibrate(path, [WIDE, NARROW], sampling=few)
+    assert found.converged
+    found.write(folder, figures=False)
+    return folder
+
+
+def test_every_robot_is_predicted_as_alone(fitted: Path) -> None:
+    dataset = sp.study(STUDY, calibration=fitted / "calibration.toml")
+    for channel, preset in (("wide", WIDE), ("narrow", NARROW)):
+        for wavelength, amplitude in ((15, 2.5), (20, 3.0)):
+            robot = load(preset, **{"tail.wavelength": f"{wavelength} mm", "tail.amplitude": f"{amplitude} mm"})
+            answer = sp.predict(robot, calibration=fitted / "calibration.toml")
+            found = dataset["forward_velocity"].sel(
+                channel=channel, wavelength=1e-3 * wavelength, amplitude=1e-3 * amplitude, model="sbt", friction="rotor"
+            )
+            assert float(found) == pytest.approx(answer.forward_velocity, rel=1e-12)
+
+
+def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
+    posterior = fitted / "posterior.nc"
+    dataset = sp.study({**STUDY, "models": ["sbt", "rft"]}, posterior=posterior)
+    robot = load(NARROW, **{"tail.wavelength": "20 mm", "tail.amplitude": "3 mm"})
+    answer = sp.predict(robot, posterior=posterior)
+    assert answer.intervals is not None
+    here = {"channel": "narrow", "wavelength": 0.02, "amplitude": 0.003, "friction": "rotor"}
+    for end in ("low", "high"):
+        found = dataset[f"forward_velocity_interval_{end}"].sel(here)
+        assert float(found.sel(model="sbt")) == pytest.approx(
+            getattr(answer.intervals, end)["forward_velocity"], rel=1e-12
+        )
+        assert np.isnan(float(found.sel(model="rft")))
+    low, high = (dataset[f"forward_velocity_interval_{end}"].sel(model="sbt") for end in ("low", "high"))
+    middle = dataset["forward_velocity"].sel(model="sbt")
+    assert bool(((low < middle) & (middle < high)).all())
+
+
+def test_what_does_not_go_together_is_refused(fitted: Path) -> None:
+    posterior, calibration = fitted / "posterior.nc", fitted / "calibration.toml"
+    with pytest.raises(InputError, match="one of them"):
+        sp.study(STUDY, posterior=posterior, calibration=calibration)
+    with pytest.raises(InputError, match="is of model 'sbt', not 'rft'"):
+        sp.study({**STUDY, "models": ["rft"]}, posterior=posterior)
+
+
+def test_another_calibration_is_another_study(fitted: Path, tmp_path: Path) -> None:
+    sp.study(STUDY, output=tmp_path / "study")
+    with pytest.raises(InputError, match="holds another study"):
+        sp.study(STUDY, calibration=fitted / "calibration.toml", output=tmp_path / "study")
