@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.plots.evidence import spread
@@ -26,6 +26,7 @@ __all__ = ["calibration_figures", "observed_figure", "residual_figure"]
 
 _MOST_COLUMNS = 5
 _MOST_NAMES = 36
+_MOST_TICKS = 5
 _OBSERVED = COLOURS["black"]
 _NAMES: dict[Quantity, str] = {
     "advance": r"speed per tail rate $U_x/\omega$",
@@ -115,13 +116,15 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
         for axes in panels[-1]:
             axes.set_xlabel(r"wavelength $\lambda$ (mm)")
-        _alike_ticks(panels)
+        _alike_ticks(panels, np.unique(waves.round(6)))
         return figure
 
 
-def _alike_ticks(panels: Sequence[Sequence[Axes]]) -> None:
+def _alike_ticks(panels: Sequence[Sequence[Axes]], wavelengths: Samples) -> None:
+    """The same ticks everywhere: at the wavelengths themselves, if they are few."""
     for axes in (panel for row in panels for panel in row):
-        axes.xaxis.set_major_locator(MaxNLocator(4, integer=True))
+        few = len(wavelengths) <= _MOST_TICKS
+        axes.xaxis.set_major_locator(FixedLocator(list(wavelengths)) if few else MaxNLocator(4, integer=True))
 
 
 def _rows(found: Calibrated) -> list[dict[str, Any]]:
@@ -216,6 +219,7 @@ def residual_figure(found: Calibrated) -> Figure:
             panel=(6.4, 1.5),
             notes=[_fit_words(found), "Tails in each channel by wavelength, then amplitude."],
             legend=handles,
+            tick_room=0.3,
         )
         figure, panels = sheet.draw()
         order = sorted(range(experiment.size), key=lambda n: (*_place(found, n),))
