@@ -297,9 +297,9 @@ app.command()(flow)
 
 @app.command()
 def schema(
-    name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study or calibration.")],
+    name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study, calibration or setup.")],
 ) -> None:
-    """Print the JSON schema of a file: robot, study or calibration.
+    """Print the JSON schema of a file: robot, study, calibration or setup.
 
     Example: `spirillum schema robot`
     """

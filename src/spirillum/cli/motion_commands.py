@@ -115,9 +115,9 @@ def simulate(
 
 def _check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
+    from spirillum.extras import required
     from spirillum.files import output_target
     from spirillum.render.encode import FILMS
-    from spirillum.render.window import required
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):

@@ -84,7 +84,7 @@ def complete_frames(incomplete: str) -> list[str]:
 
 def complete_schemas(incomplete: str) -> list[str]:
     """Names of schemas."""
-    return _starting(("calibration", "robot", "study"), incomplete)
+    return _starting(("calibration", "robot", "setup", "study"), incomplete)
 
 
 def _complete_accuracies(incomplete: str) -> list[str]:

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.render.window import required
+from spirillum.extras import required
 
 __all__ = ["FILMS", "Writer", "film_writer"]
 

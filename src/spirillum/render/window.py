@@ -7,42 +7,18 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
 from typing import Any
 
 from spirillum.errors import InputError
+from spirillum.extras import required
 
-__all__ = ["new_plotter", "required"]
+__all__ = ["new_plotter"]
 
 _INSTEAD = "allowed: a display, or -o FILE, which needs none"
 _CHOICE = "VTK_DEFAULT_OPENGL_WINDOW"
 _OFF_SCREEN = "vtkEGLRenderWindow"
 _SOFTWARE = "vtkOSOpenGLRenderWindow"
 _SOFTWARE_LIBRARIES = ("libOSMesa.so", "libOSMesa.so.8", "libOSMesa.so.6")
-
-
-def required(name: str, purpose: str) -> ModuleType:
-    """A library of the extra `3d`.
-
-    Args:
-        name: the library.
-        purpose: what it is needed for, for the sentence of an error.
-
-    Raises:
-        InputError: if it is not installed.
-    """
-    from importlib import import_module
-
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        raise InputError(
-            f"{purpose} needs {error.name or name}, which is not installed; allowed: pip install 'spirillum[3d]'"
-        ) from error
-    except ImportError as error:  # a library of the system that it needs is missing
-        raise InputError(
-            f"{purpose} needs {name}, which cannot be loaded ({str(error)[:150]}); allowed: install what it lacks"
-        ) from error
 
 
 def new_plotter(size: tuple[int, int], *, live: bool = False, samples: int = 4) -> Any:

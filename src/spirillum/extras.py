@@ -1,0 +1,33 @@
+"""Libraries that come with an extra, and a sentence where one is missing."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from spirillum.errors import InputError
+
+__all__ = ["required"]
+
+
+def required(name: str, purpose: str, extra: str = "3d") -> ModuleType:
+    """A library that an extra installs.
+
+    Args:
+        name: the library.
+        purpose: what it is needed for, for the sentence of an error.
+        extra: the extra that installs it.
+
+    Raises:
+        InputError: if it is not installed.
+    """
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"{purpose} needs {error.name or name}, which is not installed; allowed: pip install 'spirillum[{extra}]'"
+        ) from error
+    except ImportError as error:  # a library of the system that it needs is missing
+        raise InputError(
+            f"{purpose} needs {name}, which cannot be loaded ({str(error)[:150]}); allowed: install what it lacks"
+        ) from error
