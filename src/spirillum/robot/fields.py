@@ -33,6 +33,7 @@ __all__ = [
     "RotaryFriction",
     "Section",
     "Text",
+    "Time",
     "Torque",
     "TorqueConstant",
     "Velocity",
@@ -129,6 +130,7 @@ RotaryFriction = Annotated[float, *_quantity("rotary friction")]
 MagneticMoment = Annotated[float, *_quantity("magnetic moment")]
 MagneticField = Annotated[float, *_quantity("magnetic field")]
 MomentAngle = Annotated[float, *_quantity("moment angle")]
+Time = Annotated[float, *_quantity("time")]
 Voltage = Annotated[float, *_quantity("voltage")]
 Resistance = Annotated[float, *_quantity("resistance")]
 Inductance = Annotated[float, *_quantity("inductance")]
