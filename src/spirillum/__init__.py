@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from spirillum.motion.settling import Settling, settle
     from spirillum.motion.simulation import simulate
     from spirillum.motion.swimming import swim
-    from spirillum.render.film import Film, film
-    from spirillum.render.show import Picture3D, show
+    from spirillum.drawing.film import Film, film
+    from spirillum.drawing.show import Picture3D, show
     from spirillum.robot import Robot, RobotBatch, load
     from spirillum.studies import study
 
@@ -69,11 +69,11 @@ __all__ = [
 _HOME = {
     "Calibrated": "spirillum.calibration.fit",
     "Export": "spirillum.exports.write",
-    "Film": "spirillum.render.film",
+    "Film": "spirillum.drawing.film",
     "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
     "ModelComparison": "spirillum.motion.comparison",
-    "Picture3D": "spirillum.render.show",
+    "Picture3D": "spirillum.drawing.show",
     "Prediction": "spirillum.motion.prediction",
     "Ranking": "spirillum.calibration.ranking",
     "Resistance": "spirillum.hydrodynamics.resistance",
@@ -86,7 +86,7 @@ _HOME = {
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
     "export": "spirillum.exports.write",
-    "film": "spirillum.render.film",
+    "film": "spirillum.drawing.film",
     "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
     "magnetic_sweep": "spirillum.motion.magnetic_sweep",
@@ -94,7 +94,7 @@ _HOME = {
     "rank_models": "spirillum.calibration.ranking",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
-    "show": "spirillum.render.show",
+    "show": "spirillum.drawing.show",
     "simulate": "spirillum.motion.simulation",
     "study": "spirillum.studies",
     "suggest": "spirillum.calibration.suggest",

@@ -117,7 +117,7 @@ def _check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
     from spirillum.extras import required
     from spirillum.files import output_target
-    from spirillum.render.encode import FILMS
+    from spirillum.drawing.encode import FILMS
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):
@@ -135,7 +135,7 @@ def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progre
         files["plot"] = str(picture)
     if movie is not None:
         from spirillum.errors import InputError
-        from spirillum.render.film import film
+        from spirillum.drawing.film import film
 
         try:
             files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)

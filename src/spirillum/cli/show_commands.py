@@ -52,7 +52,7 @@ def show(
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
     from spirillum.cli import text
-    from spirillum.render.show import show as answer
+    from spirillum.drawing.show import show as answer
 
     target = output if output is not None or window else Path("robot.png")
     found = answer(
@@ -97,9 +97,9 @@ def film(
     """
     from spirillum.cli import text
     from spirillum.files import output_target
-    from spirillum.render.encode import FILMS
-    from spirillum.render.film import film as answer
-    from spirillum.render.run_file import open_run
+    from spirillum.drawing.encode import FILMS
+    from spirillum.drawing.film import film as answer
+    from spirillum.drawing.run_file import open_run
 
     output_target(output, FILMS, "run.mp4")
     dataset = open_run(run)

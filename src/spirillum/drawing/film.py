@@ -14,17 +14,17 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import output_target, whole_file
-from spirillum.render.camera import Camera, Margins, View, checked_view, fitted
-from spirillum.render.encode import FILMS, film_writer
-from spirillum.render.poses import Pose, Poses, poses_of
-from spirillum.render.run_file import open_run, robot_of
-from spirillum.render.show import checked_size, glass_around, shown_points
+from spirillum.drawing.camera import Camera, Margins, View, checked_view, fitted
+from spirillum.drawing.encode import FILMS, film_writer
+from spirillum.drawing.poses import Pose, Poses, poses_of
+from spirillum.drawing.run_file import open_run, robot_of
+from spirillum.drawing.show import checked_size, glass_around, shown_points
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.render.scene import DrawnRobot, Scene
+    from spirillum.drawing.scene import DrawnRobot, Scene
 
 __all__ = ["CAMERAS", "Film", "film"]
 
@@ -115,7 +115,7 @@ def film(
     if isinstance(dataset, (str, Path)):
         dataset = open_run(dataset)
     robot = robot_of(dataset)
-    from spirillum.render.scene import DrawnRobot, level_height
+    from spirillum.drawing.scene import DrawnRobot, level_height
 
     solids = DrawnRobot.of(robot)
     poses = poses_of(dataset, level_height(solids))
@@ -175,8 +175,8 @@ class _Shots:
 
     def images(self, times: Samples, line: str, speed: float) -> Generator[np.ndarray]:
         """The frames at times of the run."""
-        from spirillum.render.overlay import Stamp, blended_into, scale_bar, words_on
-        from spirillum.render.scene import Scene
+        from spirillum.drawing.overlay import Stamp, blended_into, scale_bar, words_on
+        from spirillum.drawing.scene import Scene
 
         first = self._poses.at(float(times[0]))
         bar = scale_bar(self._camera, self._size, first.position)
@@ -268,7 +268,7 @@ def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[
 
 def _round_down(value: float) -> float:
     """The number of 1, 2 or 5 times a power of ten at or below a value."""
-    from spirillum.render.glass import ruler_steps
+    from spirillum.drawing.glass import ruler_steps
 
     return ruler_steps(value)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.render.camera import View
+from spirillum.drawing.camera import View
 
 __all__ = ["add_grid"]
 

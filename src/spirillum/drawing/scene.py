@@ -12,13 +12,13 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.extras import required
-from spirillum.render.camera import Camera, View
-from spirillum.render.glass import add_glass, ruler_steps
-from spirillum.render.ground import add_grid
-from spirillum.render.light import add_light
-from spirillum.render.poses import Pose
-from spirillum.render.shadow import add_shade
-from spirillum.render.window import new_plotter
+from spirillum.drawing.camera import Camera, View
+from spirillum.drawing.glass import add_glass, ruler_steps
+from spirillum.drawing.ground import add_grid
+from spirillum.drawing.light import add_light
+from spirillum.drawing.poses import Pose
+from spirillum.drawing.shadow import add_shade
+from spirillum.drawing.window import new_plotter
 from spirillum.robot.robot import Robot
 
 __all__ = ["DrawnRobot", "Scene", "level_height", "resting"]

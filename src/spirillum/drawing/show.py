@@ -14,14 +14,14 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import output_target, whole_file
-from spirillum.render.camera import Camera, Margins, View, checked_view, fitted
-from spirillum.render.poses import Pose
+from spirillum.drawing.camera import Camera, Margins, View, checked_view, fitted
+from spirillum.drawing.poses import Pose
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
-    from spirillum.render.scene import DrawnRobot
+    from spirillum.drawing.scene import DrawnRobot
 
 __all__ = ["LARGEST", "SMALLEST", "Picture3D", "checked_size", "glass_around", "show"]
 
@@ -115,8 +115,8 @@ def show(
     turned = parse_option("phase", phase, KINDS["angle"])
     pixels = checked_size(size)
     loaded = load(robot)
-    from spirillum.render.overlay import blended_into, scale_bar, words_on
-    from spirillum.render.scene import DrawnRobot, Scene, resting
+    from spirillum.drawing.overlay import blended_into, scale_bar, words_on
+    from spirillum.drawing.scene import DrawnRobot, Scene, resting
 
     solids = DrawnRobot.of(loaded, fineness=2.0)
     pose = resting(solids, turned)
@@ -164,7 +164,7 @@ def glass_around(
 
 def shown_points(solids: DrawnRobot, pose: Pose, glass: tuple[float, float] | None) -> Samples:
     """(n, 3) points that a picture has to hold: the robot at any angle of its tail, and the ends of the glass, m."""
-    from spirillum.render.glass import WALL
+    from spirillum.drawing.glass import WALL
 
     corners = solids.corners(pose)
     channel = solids.robot.channel

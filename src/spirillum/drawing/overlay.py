@@ -15,8 +15,8 @@ from matplotlib.patches import FancyArrowPatch
 from spirillum.arrays import Samples
 from spirillum.plots.scene import FAINT, HALO, INK, length_words
 from spirillum.plots.style import Scale, plain, styled
-from spirillum.render.camera import Camera
-from spirillum.render.glass import ruler_steps
+from spirillum.drawing.camera import Camera
+from spirillum.drawing.glass import ruler_steps
 
 __all__ = ["Bar", "Stamp", "blended_into", "scale_bar", "words_on"]
 

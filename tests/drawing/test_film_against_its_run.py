@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.render.camera import fitted
-from spirillum.render.poses import poses_of
-from spirillum.render.scene import DrawnRobot
+from spirillum.drawing.camera import fitted
+from spirillum.drawing.poses import poses_of
+from spirillum.drawing.scene import DrawnRobot
 
 SIZE = (320, 180)
 SMALL: dict[str, Any] = {"size": SIZE, "fps": 10, "view": "side"}

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.render.camera import VIEWS, Margins, checked_view, fitted
-from spirillum.render.poses import Pose
-from spirillum.render.scene import DrawnRobot, Scene, level_height, resting
-from spirillum.render.show import glass_around, shown_points
+from spirillum.drawing.camera import VIEWS, Margins, checked_view, fitted
+from spirillum.drawing.poses import Pose
+from spirillum.drawing.scene import DrawnRobot, Scene, level_height, resting
+from spirillum.drawing.show import glass_around, shown_points
 
 SIZE = (400, 226)
 _TURN = np.array([0.96, 0.2, -0.12, 0.15])
