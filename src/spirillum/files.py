@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import threading
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ __all__ = [
 PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
 """Endings of the pictures that can be written, for `output_target`."""
 _LARGEST_TEXT = 1 << 20
+_MASK_LOCK = threading.Lock()
 
 
 def read_text(path: Path, what: str, largest: int = _LARGEST_TEXT) -> str:
@@ -107,15 +109,21 @@ def whole_file(path: Path) -> Iterator[Path]:
     temporary.unlink()  # some writers treat a file that is there, even an empty one, as one to add to
     try:
         yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
+        temporary.chmod(0o666 & ~_mask())
         try:
             temporary.replace(path)
         except OSError as error:
             raise InputError(f"{path} cannot be written ({error.strerror}); allowed: a file name") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _mask() -> int:
+    """What new files may not allow; it can only be read by setting it, which two threads must not do at once."""
+    with _MASK_LOCK:
+        mask = os.umask(0)
+        os.umask(mask)
+    return mask
 
 
 def _regular(path: Path) -> Path:

@@ -1,0 +1,283 @@
+"""The commands of the virtual camera: `spirillum render` and `spirillum virtual-experiment`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from spirillum.virtual.degradation import Degradation
+
+__all__ = ["render", "virtual_experiment"]
+
+
+def _complete_presets(incomplete: str) -> list[str]:
+    return [name for name in ("clean", "degraded") if name.startswith(incomplete)]
+
+
+def _complete_views(incomplete: str) -> list[str]:
+    return [name for name in ("side", "top") if name.startswith(incomplete)]
+
+
+def _complete_directions(incomplete: str) -> list[str]:
+    return [name for name in ("left", "right") if name.startswith(incomplete)]
+
+
+_View = Annotated[str, typer.Option(autocompletion=_complete_views, help="Camera: top, or side (level).")]
+_Direction = Annotated[
+    str, typer.Option(autocompletion=_complete_directions, help="Where the nose points in the picture: right or left.")
+]
+_Fps = Annotated[float, typer.Option(help="Frames a second.")]
+_Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the picture, even numbers.")]
+_Seed = Annotated[int, typer.Option(help="Of all random numbers.")]
+_Preset = Annotated[
+    str,
+    typer.Option(
+        "--preset", autocompletion=_complete_presets, help="clean, or degraded: all disturbances but bubbles and hand."
+    ),
+]
+_Noise = Annotated[float | None, typer.Option(help="Standard deviation of noise, in steps of 255.")]
+_Lamp = Annotated[float | None, typer.Option(help="Share by which the lamp's brightness drifts, such as 0.2.")]
+_Crf = Annotated[int | None, typer.Option(help="Compression (H.264): 0, none lost, to 51; clean 18, degraded 33.")]
+_Dropped = Annotated[float | None, typer.Option(help="Share of frames that are lost, such as 0.05.")]
+_Tilt = Annotated[str | None, typer.Option(metavar="ANGLE", help="Tilt of the camera in a random direction.")]
+_Glare = Annotated[float | None, typer.Option(help="Share of the body's picture under a spot of glare, such as 0.2.")]
+_Fixed = Annotated[bool, typer.Option("--glare-fixed", help="The glare stands still instead of moving with the body.")]
+_Bubbles = Annotated[int | None, typer.Option(help="Number of bubbles that drift over the robot.")]
+_Hand = Annotated[bool, typer.Option("--hand", help="The shadow of a hand passes over the picture.")]
+
+
+def render(
+    robot: RobotArgument,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
+    ],
+    model: Model = "sbt",
+    tail_rate: TailRate = None,
+    friction: Friction = None,
+    forward_velocity: Annotated[
+        str | None, typer.Option(metavar="VELOCITY", help="Instead of the model's, such as 1mm/s.")
+    ] = None,
+    body_rate: Annotated[
+        str | None, typer.Option(metavar="RATE", help="Lab rotation rate of the body instead of the model's.")
+    ] = None,
+    run: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A run of `spirillum simulate` instead of steady swimming.")
+    ] = None,
+    duration: Annotated[str, typer.Option(metavar="TIME", help="Length of the video.")] = "20s",
+    start: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="x of the body at the first frame; else its way is centred.")
+    ] = None,
+    lateral: Annotated[str, typer.Option(metavar="LENGTH", help="Horizontal offset across the channel.")] = "0mm",
+    heading: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the robot's axis to the channel.")] = "0deg",
+    wobble: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Amplitude of a motion across, at the tail's rate.")
+    ] = "0mm",
+    body_angle: Annotated[str, typer.Option(metavar="ANGLE", help="Of the body at the first frame.")] = "0deg",
+    tail_phase: Annotated[str, typer.Option(metavar="ANGLE", help="Of the tail at the first frame.")] = "0deg",
+    gap: Annotated[str, typer.Option(metavar="LENGTH", help="Between body and tube.")] = "0.5mm",
+    view: _View = "top",
+    direction: _Direction = "right",
+    fps: _Fps = 30.0,
+    size: _Size = "640x480",
+    exposure: Annotated[str, typer.Option(metavar="TIME", help="Of each frame; else 1/120 s.")] = "8.3333333ms",
+    distortion: Annotated[float, typer.Option(help="Coefficient k1 of the lens's radial distortion.")] = -0.02,
+    preset: _Preset = "clean",
+    noise: _Noise = None,
+    lamp_drift: _Lamp = None,
+    crf: _Crf = None,
+    dropped: _Dropped = None,
+    tilt: _Tilt = None,
+    glare: _Glare = None,
+    glare_fixed: _Fixed = False,
+    bubbles: _Bubbles = None,
+    hand: _Hand = False,
+    seed: _Seed = 0,
+    depth_error: Annotated[
+        str, typer.Option(metavar="LENGTH", help="By which the setup's height of the axis is wrong, on purpose.")
+    ] = "0mm",
+    depth_uncertainty: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Standard uncertainty of that height that the setup states.")
+    ] = "0mm",
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Render a video of a swimming robot as a camera sees it, with its truth: synthetic. Needs the extra `video`.
+
+    Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
+    """
+    from spirillum.cli import text
+    from spirillum.virtual.trial import render as answer
+
+    spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
+    with text.progress_bar(quiet=json) as progress:
+        found = answer(
+            loaded_robot(robot, settings),
+            output,
+            model=model,
+            tail_rate=tail_rate,
+            friction=friction,
+            forward_velocity=forward_velocity,
+            body_rate=body_rate,
+            run=run,
+            duration=duration,
+            start=start,
+            lateral=lateral,
+            heading=heading,
+            wobble=wobble,
+            body_angle=body_angle,
+            tail_phase=tail_phase,
+            gap=gap,
+            view=view,
+            direction=direction,
+            fps=fps,
+            size=size,
+            exposure=exposure,
+            distortion=distortion,
+            degradation=spoiled,
+            seed=seed,
+            depth_error=depth_error,
+            depth_uncertainty=depth_uncertainty,
+            progress=progress,
+        )
+    text.show(found.to_dict(), _trial, json=json)
+
+
+def _degradation(
+    preset: str,
+    noise: float | None,
+    lamp_drift: float | None,
+    crf: int | None,
+    dropped: float | None,
+    tilt: str | None,
+    glare: float | None,
+    bubbles: int | None,
+    *,
+    fixed: bool,
+    hand: bool,
+) -> Degradation:
+    """A preset with those fields replaced that were given."""
+    from spirillum.units import KINDS, parse_option
+    from spirillum.virtual.degradation import degradation_of
+
+    return degradation_of(
+        preset,
+        noise=noise,
+        lamp_drift=lamp_drift,
+        crf=crf,
+        dropped=dropped,
+        tilt=None if tilt is None else parse_option("tilt", tilt, KINDS["angle"]),
+        glare=glare,
+        glare_moves=False if fixed else None,
+        bubbles=bubbles,
+        hand=True if hand else None,
+    )
+
+
+def _trial(answer: Mapping[str, Any], console: Console) -> None:
+    from rich.markup import escape
+
+    from spirillum.cli import text
+
+    lost = f", {answer['dropped']} lost" if answer["dropped"] else ""
+    size = f"{answer['width']}x{answer['height']} pixels, {answer['frames_per_second']:g} frames a second"
+    said = f"{answer['frames']} frames{lost}, {size}; setup and truth beside it"
+    console.print(f"{escape(answer['video'])}: synthetic, {said}", highlight=False, soft_wrap=True)
+    table = text.grid(f"{answer['robot']}: true motion, {answer['model']}", "quantity", "value", "unit", "SI")
+    names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate")
+    text.add_quantities(table, {name: answer[name] for name in names})
+    console.print(table)
+
+
+def virtual_experiment(
+    study: Annotated[
+        Path | None, typer.Argument(help="Study file (see `spirillum schema study`); else the paper's two presets.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the videos.")] = Path(
+        "spirillum-virtual-experiment"
+    ),
+    trials: Annotated[int, typer.Option(help="Trials of each robot.")] = 5,
+    model: Annotated[str | None, typer.Option(help="Hydrodynamic model; else the study's first, or sbt.")] = None,
+    friction: Friction = None,
+    tail_rate: TailRate = None,
+    spread: Annotated[
+        float, typer.Option(help="Planted relative standard deviation of the motor's rate from trial to trial.")
+    ] = 0.02,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Of each trial; else as long as it is in view, at most 20 s.")
+    ] = None,
+    view: _View = "top",
+    direction: _Direction = "right",
+    fps: _Fps = 30.0,
+    size: _Size = "640x480",
+    preset: _Preset = "clean",
+    noise: _Noise = None,
+    lamp_drift: _Lamp = None,
+    crf: _Crf = None,
+    dropped: _Dropped = None,
+    tilt: _Tilt = None,
+    glare: _Glare = None,
+    glare_fixed: _Fixed = False,
+    bubbles: _Bubbles = None,
+    hand: _Hand = False,
+    seed: _Seed = 0,
+    jobs: Annotated[int, typer.Option(help="Trials that are rendered at the same time.")] = 1,
+    json: Json = False,
+) -> None:
+    """Render five trials of each robot of a study, with their truth: synthetic. A rerun resumes.
+
+    Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
+    """
+    from spirillum.cli import text
+    from spirillum.virtual.experiment import virtual_experiment as answer
+
+    spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
+    with text.progress_bar(quiet=json) as progress:
+        found = answer(
+            study,
+            output,
+            trials=trials,
+            model=model,
+            friction=friction,
+            tail_rate=tail_rate,
+            spread=spread,
+            duration=duration,
+            degradation=spoiled,
+            view=view,
+            direction=direction,
+            fps=fps,
+            size=size,
+            seed=seed,
+            jobs=jobs,
+            progress=progress,
+        )
+    text.show(found.to_dict(), _experiment, json=json)
+
+
+def _experiment(answer: Mapping[str, Any], console: Console) -> None:
+    from rich.markup import escape
+
+    from spirillum.cli import text
+
+    kept = f", {answer['kept']} of them there before" if answer["kept"] else ""
+    videos = answer["trials"] * len(answer["robots"])
+    console.print(
+        f"{escape(answer['folder'])}: synthetic, {videos} videos{kept}; truth in {escape(answer['observations'])}",
+        highlight=False,
+        soft_wrap=True,
+    )
+    title = f"without the planted spread of {100 * answer['spread']:g} %"
+    table = text.grid(title, "robot", "forward velocity (mm/s)", "tail rate (Hz)", "body rate (Hz)")
+    for robot in answer["robots"]:
+        names = {"forward_velocity": "mm/s", "tail_rotation_rate": "Hz", "body_rotation_rate": "Hz"}
+        cells = [text.in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
+        table.add_row(escape(robot["robot"]), *cells)
+    console.print(table)

@@ -1,0 +1,133 @@
+"""Linear light of the whole picture: the robot at the moments of an exposure, before what stands still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.raster import blend, draw
+from spirillum.robot.robot import Robot
+from spirillum.virtual.optics import Lens
+from spirillum.virtual.solids import Solid, solids_of
+from spirillum.virtual.tank import Tank, backdrop, spots, tint
+from spirillum.virtual.way import Moment, Way
+
+__all__ = ["Painter"]
+
+_STILL = 0.1
+"""Blur below which an exposure is drawn as one moment, pixels."""
+_STEP = 0.8
+"""Blur between two moments of an exposure, pixels."""
+_MOST_MOMENTS = 8
+_LAMPS = {
+    "top": ((0.25, 0.55, 0.85, 0.62), (-0.5, -0.45, 0.75, 0.38)),
+    "side": ((0.2, 0.9, 0.5, 0.68), (0.0, 0.1, 1.0, 0.34)),
+}
+"""Direction towards each lamp (right, up, towards the camera) in the picture, and its strength; assumed."""
+_SHADOW = 0.26
+"""Share of light that the robot's soft shadow takes from the floor; assumed."""
+_MARGIN = 3
+_SIDE = 4
+"""Samples of a pixel along u and along v."""
+_SAMPLES = _SIDE**2
+_FEW = 13
+"""One in so many vertices tells how far the picture blurs."""
+
+
+class Painter:
+    """Draws the robot before its tank. One painter serves one video: it keeps its samples between frames."""
+
+    def __init__(self, robot: Robot, tank: Tank, lens: Lens) -> None:
+        """Prepare.
+
+        Args:
+            robot: a checked robot.
+            tank: what stands still.
+            lens: the camera.
+        """
+        self.robot, self.tank, self.lens = robot, tank, lens
+        self.body, self.rotor = solids_of(robot)
+        self.still = backdrop(tank, lens)
+        self._lamps = _lamps(tank.view, -1.0 if lens.leftwards else 1.0)
+        self._tint = tint(lens.surface - tank.tube_height)
+        self._spots = np.swapaxes(spots(_SIDE), 1, 2)
+        self._depth = np.empty(0, dtype=np.float32)
+        self._samples = np.empty(0, dtype=np.float32)
+
+    def light(self, way: Way, time: float, exposure: float) -> np.ndarray:
+        """(rows, columns, 3) linear light of an exposure about a time.
+
+        Args:
+            way: where the robot is.
+            time: the middle of the exposure, s.
+            exposure: its length, s.
+        """
+        middle = way.at(time)
+        parts = self._parts(way, middle, time, exposure)
+        picture = self.still.light.copy()
+        left, top, right, bottom = self._window([pixels for _, _, moments in parts for pixels in moments])
+        if left >= right or top >= bottom:
+            return picture
+        depth, samples = self._buffers(bottom - top, right - left)
+        for solid, turn, moments in parts:
+            light = solid.light(turn, self._lamps)
+            for number, pixels in enumerate(moments):
+                which = np.arange(number, _SAMPLES, len(moments))  # each moment has a share of every pixel's samples
+                places = np.ascontiguousarray(self._spots[:, :, which])
+                draw(pixels, solid.faces, solid.colours, light, places, which, left, top, depth, samples)
+        still, shadow = self.still, self._shadow(middle)
+        blend(depth, samples, left, top, still.over, still.shine, still.floor, shadow, self._tint, picture)
+        return picture
+
+    def _parts(
+        self, way: Way, middle: Moment, time: float, exposure: float
+    ) -> list[tuple[Solid, Samples, list[Samples]]]:
+        """Body and rotor, how each is turned, and where its vertices are seen at the moments of an exposure."""
+        found = []
+        for solid, name in ((self.body, "body"), (self.rotor, "rotor")):
+
+            def seen(share: float, every: int = 1, solid: Solid = solid, name: str = name) -> Samples:
+                moment = way.at(time + share * exposure) if share else middle
+                return self.lens.seen(solid.vertices[::every] @ getattr(moment, name).T + moment.position)
+
+            blur = float(np.abs(seen(0.5, _FEW) - seen(-0.5, _FEW))[:, :2].max()) if exposure > 0 else 0.0
+            count = 1 if blur < _STILL else int(np.clip(np.ceil(blur / _STEP), 2, _MOST_MOMENTS))
+            shares = (np.arange(count) + 0.5) / count - 0.5
+            found.append((solid, getattr(middle, name), [seen(float(share)) for share in shares]))
+        return found
+
+    def _window(self, seen: list[Samples]) -> tuple[int, int, int, int]:
+        """Columns and rows around all that is drawn: left, top, right, bottom."""
+        low = np.min([pixels[:, :2].min(axis=0) for pixels in seen], axis=0)
+        high = np.max([pixels[:, :2].max(axis=0) for pixels in seen], axis=0)
+        width, height = self.lens.size
+        spare = _MARGIN + int(0.25 * (high[1] - low[1]))  # room for the shadow
+        left, top = (int(np.floor(value)) - spare for value in low)
+        right, bottom = (int(np.ceil(value)) + spare + 1 for value in high)
+        return max(left, 0), max(top, 0), min(right, width), min(bottom, height)
+
+    def _buffers(self, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+        need = rows * columns * _SAMPLES
+        if self._depth.size < need:
+            self._depth = np.full(need, -1e30, dtype=np.float32)
+            self._samples = np.empty(3 * need, dtype=np.float32)
+        shape = (rows, columns, _SAMPLES)
+        return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
+
+    def _shadow(self, moment: Moment) -> Samples:
+        """The soft shadow, as `blend` takes it; the lamp stands a little to one side."""
+        half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
+        drop = (-0.1 if self.lens.leftwards else 0.1) * moment.position[2]
+        x, y = moment.position[0], moment.position[1] - drop
+        return np.array([x, y, *moment.body[:2, 0], half - 0.6 * radius, 0.95 * radius, 0.22 * radius, _SHADOW])
+
+
+def _lamps(view: str, side: float) -> Samples:
+    """Lamps as `shade` takes them: direction, strength, and the direction halfway to a camera far above."""
+    rows = []
+    for *way, strength in _LAMPS[view]:
+        towards = np.array(way) * np.array([side, side, 1.0])
+        towards /= np.linalg.norm(towards)
+        half = towards + np.array([0.0, 0.0, 1.0])
+        rows.append(np.concatenate([towards, [strength], half / np.linalg.norm(half)]))
+    return np.array(rows)

@@ -1,0 +1,147 @@
+"""The robot as triangles with colours and shading, short enough that refraction bends none of their edges visibly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.raster import corner_normals, shade
+from spirillum.robot.mesh import RobotMesh, robot_mesh
+from spirillum.robot.robot import Robot
+from spirillum.robot.surface import Faces
+
+__all__ = ["MATTER", "Solid", "linear", "solids_of"]
+
+_LONGEST = 5e-3
+"""Longest edge of a triangle, m."""
+_SHARP = float(np.cos(np.radians(35.0)))
+"""Cosine of the angle between triangles above which an edge is drawn sharp."""
+MATTER: dict[str, tuple[float, float, float, float]] = {
+    "body": (0.34, 0.70, 0.45, 60.0),
+    "shaft": (0.25, 0.55, 0.70, 25.0),
+    "coupling": (0.25, 0.55, 0.70, 25.0),
+    "stub": (0.28, 0.60, 0.65, 18.0),
+    "arm": (0.28, 0.60, 0.65, 18.0),
+    "tail": (0.28, 0.60, 0.65, 18.0),
+}
+"""Ambient, diffuse and mirrored share of the light and the exponent of the mirrored one, by piece; assumed."""
+_KINDS = tuple(MATTER)
+_METALS = frozenset(_KINDS) - {"body"}
+
+
+def linear(colours: Samples) -> Samples:
+    """Linear light of sRGB colours, 0 to 1 (IEC 61966-2-1)."""
+    colours = np.asarray(colours, dtype=float)
+    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A rigid part of the robot, in its own axes, m."""
+
+    vertices: Samples = field(repr=False)
+    """(n, 3), m."""
+    faces: Faces = field(repr=False)
+    """Triangles, outward oriented, (m, 3)."""
+    colours: Samples = field(repr=False)
+    """Linear colour of each triangle and of what it mirrors, (m, 6)."""
+    normals: Samples = field(repr=False)
+    """Unit normals at the corners of each triangle, (m, 3, 3)."""
+    kind: Faces = field(repr=False)
+    """Row of `MATTER` of each triangle, (m,)."""
+
+    def light(self, turn: Samples, lamps: Samples) -> Samples:
+        """Diffuse and mirrored light of each corner, (m, 3, 2).
+
+        Args:
+            turn: rotation of the solid, (3, 3).
+            lamps: as `spirillum.kernels.raster.shade` takes them, (k, 7).
+        """
+        found = np.empty((len(self.faces), 3, 2))
+        shade(self.normals, turn, lamps, np.array(list(MATTER.values())), self.kind, found)
+        return found
+
+
+def solids_of(robot: Robot, fineness: float = 1.0) -> tuple[Solid, Solid]:
+    """Body and rotor of a robot, the rotor with its tail at phase 0.
+
+    Args:
+        robot: a checked robot.
+        fineness: of `spirillum.robot.mesh.robot_mesh`.
+    """
+    pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
+    return _joined([piece for piece in pieces if piece.part == "body"]), _joined(
+        [piece for piece in pieces if piece.part == "rotor"]
+    )
+
+
+def _joined(pieces: list[RobotMesh]) -> Solid:
+    vertices, faces, colours, normals, kind, count = [], [], [], [], [], 0
+    for piece in pieces:
+        points, triangles, origin = _shortened(np.asarray(piece.vertices), np.asarray(piece.faces))
+        own = linear(piece.colours)[origin]
+        mirrored = own if piece.name in _METALS else np.ones_like(own)
+        vertices.append(points)
+        faces.append(triangles + count)
+        colours.append(np.concatenate([own, mirrored], axis=1))
+        normals.append(_normals(points, triangles))
+        kind.append(np.full(len(triangles), _KINDS.index(piece.name)))
+        count += len(points)
+    return Solid(
+        np.ascontiguousarray(np.concatenate(vertices)),
+        np.ascontiguousarray(np.concatenate(faces), dtype=np.int64),
+        np.concatenate(colours),
+        np.concatenate(normals),
+        np.concatenate(kind).astype(np.int64),
+    )
+
+
+def _shortened(points: Samples, faces: Faces) -> tuple[Samples, Faces, Faces]:
+    """Triangles without long edges, on the same surface; and the triangle that each of them comes from."""
+    origin = np.arange(len(faces))
+    while True:
+        edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)  # (m, 3, 2)
+        unique, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+        place = place.reshape(-1, 3)
+        long = np.linalg.norm(points[unique[:, 0]] - points[unique[:, 1]], axis=1) > _LONGEST
+        if not long.any():
+            return points, faces, origin
+        middle = np.full(len(unique), -1)
+        middle[long] = len(points) + np.arange(int(long.sum()))
+        points = np.concatenate([points, 0.5 * (points[unique[long, 0]] + points[unique[long, 1]])])
+        halves = middle[place]  # new vertex on each edge of each triangle, or -1
+        parts, sources = [], []
+        for number in range(4):
+            chosen = (halves >= 0).sum(axis=1) == number
+            for corners in _split(faces[chosen], halves[chosen], number):
+                parts.append(corners)
+                sources.append(origin[chosen])
+        faces, origin = np.concatenate(parts), np.concatenate(sources)
+
+
+def _split(faces: Faces, halves: Faces, number: int) -> list[Faces]:
+    """Triangles of which `number` edges are halved, as parts with the same sense of rotation."""
+    if number == 0:
+        return [faces]
+    if number == 3:
+        (a, b, c), (ab, bc, ca) = faces.T, halves.T
+        return [np.stack(corners, axis=1) for corners in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    # Turn each triangle so that its first edge is halved (one), or its third is whole (two).
+    first = np.argmax(halves >= 0, axis=1) if number == 1 else (np.argmax(halves < 0, axis=1) + 1) % 3
+    order = (first[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(faces, order, axis=1).T
+    ab, bc, _ = np.take_along_axis(halves, order, axis=1).T
+    if number == 1:
+        return [np.stack([a, ab, c], axis=1), np.stack([ab, b, c], axis=1)]
+    return [np.stack([ab, b, bc], axis=1), np.stack([a, ab, bc], axis=1), np.stack([a, bc, c], axis=1)]
+
+
+def _normals(points: Samples, faces: Faces) -> Samples:
+    """Unit normals at the corners, the mean over those triangles around a vertex that meet it smoothly."""
+    corners = points[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    order = np.argsort(faces.ravel(), kind="stable")
+    start = np.searchsorted(faces.ravel()[order], np.arange(len(points) + 1))
+    return np.asarray(corner_normals(area, np.ascontiguousarray(faces), order // 3, start, _SHARP))

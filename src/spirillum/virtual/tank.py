@@ -1,0 +1,141 @@
+"""What stands still before the virtual camera: floor, ruler, glass tube, oil. All of it assumed, but to scale."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.sightlines import still_picture
+from spirillum.robot.robot import Robot
+from spirillum.virtual.optics import Lens
+from spirillum.virtual.solids import linear
+
+__all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint"]
+
+GLASS = 2.0e-3
+"""Thickness of the tube's wall, m; assumed."""
+_RULER_WIDTH, _RULER_LENGTH, _RULER_AWAY, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
+_OIL = (0.72, 0.90, 1.98)
+"""Absorption of red, green and blue by the oil, 1/m: a faint tint, assumed."""
+_GLASS_DARKENS = 38.0
+"""Absorption of the glass, 1/m; assumed. Glass and oil refract nearly alike: lines of sight go straight through it."""
+_MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)
+"""Wavenumbers of the floor's fine structure, 1/m; assumed."""
+_FINE = 6
+"""Samples of a pixel along u and along v."""
+
+
+@dataclass(frozen=True)
+class Tank:
+    """The still parts, in the camera's frame, m. Heights count from the floor (from the side: from the far wall)."""
+
+    view: str
+    """`top` or `side`."""
+    tube: float | None
+    """Inner radius of the tube; None: there is none."""
+    tube_height: float
+    """Height of the tube's axis; where the robot swims without one."""
+    tube_length: float
+    """Length of the tube; its middle is at x = 0."""
+    spacing: float
+    """From one line of the ruler to the next."""
+    ruler: float
+    """|y| at which the lines of both strips begin; they are 8 mm long."""
+
+    @property
+    def outside(self) -> float:
+        """Outer radius of the tube, 0 without one."""
+        return 0.0 if self.tube is None else self.tube + GLASS
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """The still parts as the camera sees them; linear light, single precision."""
+
+    light: np.ndarray = field(repr=False)
+    """Without the robot, (rows, columns, 3)."""
+    over: np.ndarray = field(repr=False)
+    """Share of the robot's light that passes the glass over it, (rows, columns)."""
+    shine: np.ndarray = field(repr=False)
+    """Light mirrored by the glass, (rows, columns)."""
+    floor: np.ndarray = field(repr=False)
+    """x and y of the floor behind each pixel, m, (rows, columns, 2)."""
+
+
+def tank_of(robot: Robot, view: str, spacing: float, side_height: float) -> Tank:
+    """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
+
+    Args:
+        robot: a checked robot.
+        view: `top` or `side`.
+        spacing: of the ruler's lines, m.
+        side_height: height of the tube's axis above the far wall in the view from the side, m.
+    """
+    if robot.channel is None:
+        reach, tube, length = 0.6 * robot.body.diameter, None, 0.0
+    else:
+        tube = 0.5 * robot.channel.diameter
+        reach, length = tube + GLASS, robot.channel.length or 1.0
+    height = side_height if view == "side" else reach
+    return Tank(view, tube, height, length, spacing, reach + _RULER_AWAY)
+
+
+def spots(side: int) -> Samples:
+    """Places of side^2 samples in each of 4 x 4 neighbouring pixels, -0.5 to 0.5, (16, side^2, 2).
+
+    In every pixel one sample lies in each of side x side cells and in each of side^2 rows and columns (multi-jittered
+    samples: K. Chiu, P. Shirley, C. Wang, Graphics Gems IV, 1994). The neighbours differ, and are shifted against each
+    other, so that an edge of any direction moves in steps finer than one sample's.
+    """
+    rng = np.random.default_rng(4)
+    count = side * side
+    found = np.empty((16, count, 2))
+    for variant in range(16):
+        row, column = np.divmod(np.arange(count), side)
+        inner_u = np.array([rng.permutation(side) for _ in range(side)])
+        inner_v = np.array([rng.permutation(side) for _ in range(side)])
+        u, v = side * column + inner_u[column, row], side * row + inner_v[row, column]
+        shift = (np.array(divmod(variant, 4)) - 1.5) / 4.0
+        found[variant] = ((np.stack([u, v], axis=-1) + 0.5 + shift) / count - 0.5)[rng.permutation(count)]
+    return found
+
+
+def tint(depth: float) -> Samples:
+    """(3,) share of light that passes a depth of oil."""
+    return np.asarray(np.exp(-depth * np.array(_OIL)))
+
+
+def backdrop(tank: Tank, lens: Lens) -> Backdrop:
+    """See the still parts through a lens.
+
+    Args:
+        tank: what stands there.
+        lens: the camera.
+    """
+    return _seen(tank, lens)
+
+
+@lru_cache(maxsize=4)
+def _seen(tank: Tank, lens: Lens) -> Backdrop:
+    width, height = lens.size
+    light, over, shine, floor = (np.empty((height, width, *more), dtype=np.float32) for more in ((3,), (), (), (2,)))
+    ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)
+    colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))
+    end = tank.ruler + _RULER_LENGTH
+    width_of_line = min(_RULER_WIDTH, 0.25 * tank.spacing)
+    ruler = np.array([tank.ruler - _PAPER, tank.ruler, end, end + _PAPER, tank.spacing, width_of_line])
+    half = -1.0 if tank.tube is None else 0.5 * tank.tube_length
+    tube = np.array([tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half, _GLASS_DARKENS])
+    grains = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2))
+    waves = np.array(
+        [
+            (2 * np.pi * scale * np.cos(way), 2 * np.pi * scale * np.sin(way), phase, 0.012)
+            for scale, (way, phase) in zip(_MOTTLE, grains, strict=True)
+        ]
+    )
+    oil = np.array(_OIL)
+    still_picture(lens.numbers, lens.turn, spots(_FINE), colours, ruler, tube, waves, oil, light, over, shine, floor)
+    return Backdrop(light, over, shine, floor)

@@ -1,0 +1,84 @@
+"""`spirillum render` and `spirillum virtual-experiment`: options in, answers out."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from spirillum.cli import main
+from spirillum.units import Hz
+
+Run = Callable[..., tuple[int, str, str]]
+TINY = ("--duration", "0.1s", "--size", "96x64", "--tail-rate", "1.2Hz")
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Exit code, standard output and error of a command."""
+
+    def call(*words: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main(list(words))
+        out, err = capsys.readouterr()
+        return int(end.value.code or 0), out, err
+
+    return call
+
+
+def test_render_answers_with_the_truth(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    words = ("--body-rate", "-0.1Hz", "--forward-velocity", "1mm/s", "--preset", "degraded", "--noise", "3", "--hand")
+    code, out, _ = run("render", "biorob2012-wide", "-o", str(path), *TINY, *words, "--glare-fixed", "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["schema"] == "spirillum.virtual-trial/1"
+    assert answer["synthetic"] is True
+    assert answer["body_rotation_rate"]["value"] == pytest.approx(-0.1 * Hz)
+    truth = json.loads(Path(answer["truth"]).read_text())
+    what = truth["degradation"]
+    assert (what["noise"], what["crf"], what["hand"], what["glare_moves"]) == (3.0, 33, True, False)
+    assert truth["model"] == "prescribed"
+
+
+def test_render_for_people_says_synthetic(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run(
+        "render", "biorob2012-narrow", "-o", str(tmp_path / "a.mp4"), *TINY, "--set", "tail.wavelength=20mm"
+    )
+    assert code == 0
+    assert "synthetic, 4 frames" in out
+    assert "forward velocity" in out
+    assert (tmp_path / "a.robot.toml").is_file()
+
+
+def test_a_virtual_experiment_is_answered(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("virtual-experiment", "-o", str(tmp_path / "e"), *TINY, "--trials", "1", "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["schema"] == "spirillum.virtual-experiment/1"
+    assert [robot["robot"] for robot in answer["robots"]] == ["biorob2012-wide", "biorob2012-narrow"]
+    code, out, _ = run("virtual-experiment", "-o", str(tmp_path / "e"), *TINY, "--trials", "1")
+    assert code == 0
+    assert "2 of them there before" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "a.avi"), "does not end in .mp4"),
+        (("-o", "a.mp4", "--preset", "awful"), "allowed: clean, degraded"),
+        (("-o", "a.mp4", "--tilt", "2"), "has no unit"),
+        (("-o", "a.mp4", "--crf", "99"), "crf = 99"),
+        (("-o", "a.mp4", "--run", "no.nc"), "no.nc does not exist"),
+        (("-o", "no/where/a.mp4"), "no such folder"),
+    ],
+)
+def test_bad_input_gets_one_sentence(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("render", "biorob2012-wide", *TINY, *words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,81 @@
+"""A virtual experiment: its trials, its planted spread, its table; a rerun keeps what is there."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.measurement.observations import read_observations
+from spirillum.tracking.setup import load_setup
+from spirillum.units import Hz
+from spirillum.virtual.experiment import virtual_experiment
+
+SMALL: dict[str, Any] = {"trials": 2, "duration": "0.1 s", "size": (96, 64), "tail_rate": "1.2 Hz"}
+
+
+def test_all_files_are_there_and_a_rerun_keeps_them(tmp_path: Path) -> None:
+    told: list[tuple[str, int, int]] = []
+    folder = tmp_path / "e"
+    first = virtual_experiment(None, folder, **SMALL, jobs=2, progress=lambda *words: told.append(words))
+    assert first.robots == ("biorob2012-wide", "biorob2012-narrow")
+    assert told[-1][1:] == (4, 4)
+    names = {path.name for path in (folder / "biorob2012-wide").iterdir()}
+    ends = ("mp4", "truth.json", "truth.nc")
+    assert names == {"setup.toml", *(f"trial-{number}.{end}" for number in (1, 2) for end in ends)}
+    assert load_setup(folder / "biorob2012-narrow" / "setup.toml")[1].name == "biorob2012-narrow"
+    lost = folder / "biorob2012-wide" / "trial-2.mp4"
+    before, content = (folder / "biorob2012-wide" / "trial-1.mp4").stat().st_mtime_ns, lost.read_bytes()
+    lost.unlink()
+    second = virtual_experiment(None, folder, **SMALL)
+    assert second.kept == 3
+    assert lost.read_bytes() == content
+    assert (folder / "biorob2012-wide" / "trial-1.mp4").stat().st_mtime_ns == before
+    with pytest.raises(sp.InputError, match="another virtual experiment"):
+        virtual_experiment(None, folder, **(SMALL | {"trials": 3}))
+
+
+def test_the_table_is_an_observations_file_and_every_rate_has_the_same_factor(tmp_path: Path) -> None:
+    found = virtual_experiment({"robots": ["biorob2012-wide"]}, tmp_path / "e", **SMALL, spread=0.1)
+    rows = read_observations(found.observations)
+    assert found.observations.read_text().startswith("# SYNTHETIC: ")
+    steady = found.rates["biorob2012-wide"]
+    assert steady["tail_rotation_rate"] == pytest.approx(1.2 * Hz)
+    for row in rows:
+        factor = row.tail_rate / (1.2 * Hz)
+        assert row.forward_velocity == pytest.approx(factor * steady["forward_velocity"], rel=1e-6)
+        assert row.body_rate == pytest.approx(factor * steady["body_rotation_rate"], rel=1e-6)
+        assert row.motor_rate == pytest.approx(row.tail_rate - row.body_rate, rel=1e-6)
+    assert rows[0].tail_rate != rows[1].tail_rate
+
+
+def test_a_grid_gives_each_tail_a_folder_and_the_spread_its_size(tmp_path: Path) -> None:
+    grid = {"channels": {"w": "biorob2012-wide"}, "wavelengths": ["20 mm", "25 mm"], "amplitudes": ["2 mm"]}
+    found = virtual_experiment({"grid": grid, "models": ["rft"]}, tmp_path / "e", **SMALL)
+    assert found.robots == ("biorob2012-wide-20-2", "biorob2012-wide-25-2")
+    setup, robot = load_setup(tmp_path / "e" / "biorob2012-wide-20-2" / "setup.toml")
+    assert setup.robot.file == "robot.toml"
+    assert robot.tail.wavelength == pytest.approx(0.020)
+
+
+def test_the_planted_spread_has_its_size() -> None:
+    from spirillum.robot.load import load
+    from spirillum.virtual.experiment import _planned
+
+    steady = {"forward_velocity": 1e-3, "tail_rotation_rate": 7.0, "body_rotation_rate": -0.5}
+    look = {"view": "top", "size": (640, 480), "direction": "right"}
+    plans = _planned("w", load("biorob2012-wide"), steady, 400, 0.02, None, look, (0, 0))
+    factors = np.array([plan.rates["tail_rotation_rate"] for plan in plans]) / 7.0
+    assert factors.std() == pytest.approx(0.02, rel=0.1)
+    assert factors.mean() == pytest.approx(1.0, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({"trials": 0}, "trials"), ({"spread": 0.5}, "spread"), ({"jobs": 0}, "jobs"), ({"model": "x"}, "model")],
+)
+def test_wrong_options_get_one_sentence(tmp_path: Path, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sp.InputError, match=words):
+        virtual_experiment(None, tmp_path / "e", **(SMALL | options))
+    assert not (tmp_path / "e").exists()

@@ -1,0 +1,267 @@
+"""A rendered trial: its truth, its frames and their times, its setup; the same seed gives the same bytes."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+import xarray as xr
+
+import spirillum as sp
+from spirillum.robot.load import load, preset_names
+from spirillum.tracking.setup import load_setup
+from spirillum.units import Hz
+from spirillum.virtual.degradation import Degradation, degradation_of
+from spirillum.virtual.robot_file import is_preset, robot_text
+from spirillum.virtual.trial import render
+from spirillum.virtual.way import lab_to_camera, run_way, steady_way
+
+ROBOT = "biorob2012-wide"
+SMALL: dict[str, Any] = {
+    "size": (160, 120),
+    "forward_velocity": "1 mm/s",
+    "tail_rate": "1.2 Hz",
+    "body_rate": "-0.1 Hz",
+    "duration": "0.5 s",
+}
+
+
+def frames_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Times and pictures of a video."""
+    with av.open(str(path)) as container:
+        found = [(frame.time, frame.to_ndarray(format="rgb24")) for frame in container.decode(video=0)]
+    return np.array([time for time, _ in found]), np.stack([image for _, image in found])
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A short clean trial."""
+    return render(ROBOT, tmp_path_factory.mktemp("trial") / "a.mp4", **SMALL)
+
+
+def test_the_truth_says_what_was_asked_and_that_it_is_synthetic(trial: Any) -> None:
+    truth = json.loads(trial.truth.read_text())
+    assert truth["schema"] == "spirillum.truth/1"
+    assert truth["synthetic"] is True
+    assert truth["forward_velocity"] == {"value": pytest.approx(1e-3), "unit": "m/s"}
+    assert truth["tail_rotation_rate"] == {"value": pytest.approx(1.2 * Hz), "unit": "rad/s"}
+    assert truth["motor_rotation_rate"]["value"] == pytest.approx(1.3 * Hz)
+    with av.open(str(trial.path)) as container:
+        assert "synthetic" in container.metadata["comment"]
+    assert "synthetic" in trial.setup.read_text()
+
+
+def test_the_truth_of_every_frame_is_at_its_time(trial: Any) -> None:
+    times, images = frames_of(trial.path)
+    with xr.open_dataset(trial.path.with_name("a.truth.nc")) as truth:
+        assert np.allclose(truth["time"], times, atol=1e-6)
+        assert len(images) == trial.frames == 16
+        assert np.allclose(np.diff(truth["x"]), 1e-3 / 30, rtol=1e-9)
+        assert np.allclose(truth["y"], 0.0)
+        assert np.allclose(np.diff(truth["tail_phase"]), 1.2 * Hz / 30)
+        assert np.allclose(np.diff(truth["body_angle"]), -0.1 * Hz / 30)
+
+
+@pytest.mark.parametrize("fps", [29.97, 1000 / 33, 12.3456789])
+def test_odd_paces_keep_their_times(tmp_path: Path, fps: float) -> None:
+    render(ROBOT, tmp_path / "a.mp4", **(SMALL | {"size": (96, 64)}), fps=fps)
+    times, _ = frames_of(tmp_path / "a.mp4")
+    with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
+        assert np.allclose(truth["time"], times, atol=2e-5)
+        assert np.allclose(truth["x"] - truth["x"][0], 1e-3 * truth["time"], atol=1e-12)
+
+
+def test_the_setup_is_one_and_knows_the_heights(trial: Any) -> None:
+    setup, robot = load_setup(trial.setup)
+    assert robot == load(ROBOT)
+    assert setup.camera.height == pytest.approx(0.210)
+    assert setup.tank.surface == pytest.approx(0.060)
+    assert setup.robot.axis_height == pytest.approx(0.022 - 0.020 + 0.009 + 0.0005)
+
+
+def test_a_planted_wrong_depth_stands_in_the_setup_alone(tmp_path: Path) -> None:
+    options = SMALL | {"depth_error": "-5 mm", "depth_uncertainty": "4 mm"}
+    wrong = render(ROBOT, tmp_path / "a.mp4", **options)
+    right = render(ROBOT, tmp_path / "b.mp4", **SMALL)
+    setup, true = load_setup(wrong.setup)[0], load_setup(right.setup)[0]
+    assert setup.robot.axis_height == pytest.approx(true.robot.axis_height - 5e-3)
+    assert setup.robot.axis_height_uncertainty == pytest.approx(4e-3)
+    assert wrong.path.read_bytes() == right.path.read_bytes()
+
+
+def test_lost_frames_leave_the_times_of_the_others_true(tmp_path: Path) -> None:
+    what = Degradation(dropped=0.25)
+    some = render(ROBOT, tmp_path / "a.mp4", **SMALL, degradation=what)
+    times, images = frames_of(some.path)
+    assert (some.frames, some.dropped) == (12, 4)
+    with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
+        number = truth["frame"].values
+        assert np.allclose(times, number / 30, atol=1e-6)
+        assert np.allclose(truth["x"] - truth["x"][0], 1e-3 * times, atol=1e-12)
+    assert number[0] == 0
+    assert number[-1] == 15
+    every = frames_of(render(ROBOT, tmp_path / "b.mp4", **SMALL).path)[1]
+    assert np.abs(images.astype(int) - every[number]).mean() < 1.0  # the same pictures, but for compression
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
+    options = SMALL | {"degradation": degradation_of("degraded", bubbles=3, hand=True), "duration": "0.2 s"}
+    first, again, other = (
+        render(ROBOT, tmp_path / f"{name}.mp4", **options, seed=seed) for name, seed in (("a", 5), ("b", 5), ("c", 6))
+    )
+    assert first.path.read_bytes() == again.path.read_bytes()
+    assert first.path.read_bytes() != other.path.read_bytes()
+
+
+def test_pngs_hold_their_numbers_and_the_setup_their_pace(tmp_path: Path) -> None:
+    what = Degradation(dropped=0.2)
+    found = render(ROBOT, tmp_path / "frames", **(SMALL | {"duration": "0.3 s"}), degradation=what, fps=30.0)
+    names = sorted(path.name for path in (tmp_path / "frames").iterdir())
+    with xr.open_dataset(tmp_path / "frames.truth.nc") as truth:
+        assert names == [f"{number:05d}.png" for number in truth["frame"].values]
+    assert load_setup(found.setup)[0].camera.frames_per_second == 30.0
+
+
+def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
+    run = sp.simulate(ROBOT, model="rft", motion="held", duration="0.6 s")
+    found = render(ROBOT, tmp_path / "a.mp4", run=run, duration="0.5 s", size=(160, 120))
+    with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
+        there = np.interp(truth["time"], run["time"], run["position"])
+        assert np.allclose(truth["x"] - truth["x"][0], there - there[0], atol=1e-9)
+        assert np.allclose(
+            np.diff(truth["tail_phase"]), np.diff(np.interp(truth["time"], run["time"], run["tail_angle"]))
+        )
+    assert found.model.startswith("run")
+
+
+@pytest.mark.parametrize("view", ["top", "side"])
+@pytest.mark.parametrize("leftwards", [False, True])
+def test_the_way_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:
+    from spirillum.drawing.poses import rolled, rotation_matrix
+
+    time = np.linspace(0.0, 3.0, 31)
+    position = np.stack([1e-3 * time, 2e-4 * np.sin(time), -0.01 + 1e-4 * time], axis=-1)
+    yaw, pitch = 0.1 * np.sin(time), 0.15 * np.cos(time)
+    attitude = np.array(
+        [_product(_about(2, a), _about(1, b), rolled(-4.0 * t)) for a, b, t in zip(yaw, pitch, time, strict=True)]
+    )
+    run = xr.Dataset(
+        {
+            "position": (("time", "axis"), position),
+            "attitude": (("time", "quaternion"), attitude),
+            "tail_phase": ("time", 7.0 * time),
+        },
+        {"time": time},
+    )
+    way = run_way(run, view, leftwards=leftwards, axis=0.022, level=0.0)
+    turn = lab_to_camera(view, leftwards=leftwards)
+    for place, moment in enumerate(time):
+        now = way.at(float(moment))
+        body = turn @ rotation_matrix(attitude[place])
+        assert np.allclose(now.body, body, atol=1e-12)
+        assert np.allclose(now.rotor, body @ rotation_matrix(rolled(7.0 * moment)), atol=1e-12)
+        assert np.allclose(now.position, turn @ position[place] + [0.0, 0.0, 0.022])
+    assert np.ptp(way.body_angle) == pytest.approx(12.0, abs=0.1)  # nearly two turns, unwrapped
+
+
+def _about(axis: int, angle: float) -> np.ndarray:
+    """Quaternion of a turn about an axis."""
+    found = np.array([np.cos(0.5 * angle), 0.0, 0.0, 0.0])
+    found[1 + axis] = np.sin(0.5 * angle)
+    return found
+
+
+def _product(*quaternions: np.ndarray) -> np.ndarray:
+    """Product of quaternions w, x, y, z."""
+    found = np.array([1.0, 0.0, 0.0, 0.0])
+    for other in quaternions:
+        vector = found[0] * other[1:] + other[0] * found[1:] + np.cross(found[1:], other[1:])
+        found = np.concatenate([[found[0] * other[0] - found[1:] @ other[1:]], vector])
+    return found
+
+
+@pytest.mark.parametrize("view", ["top", "side"])
+@pytest.mark.parametrize("direction", ["right", "left"])
+def test_a_robot_aside_keeps_its_gap(tmp_path: Path, view: str, direction: str) -> None:
+    options = SMALL | {"duration": "0.1 s", "view": view, "direction": direction, "lateral": "3 mm", "gap": "1 mm"}
+    render(ROBOT, tmp_path / "a.mp4", **options)
+    axis = 0.022 if view == "top" else 0.030
+    with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
+        y, z = float(truth["y"][0]), float(truth["z"][0]) - axis
+    assert np.hypot(y, z) == pytest.approx(0.020 - 0.009 - 0.001)
+    aside = y if view == "top" else {"right": -z, "left": z}[direction]
+    assert aside == pytest.approx(0.003)
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_robot_file_holds_every_field(name: str, tmp_path: Path) -> None:
+    robot = load(name)
+    path = tmp_path / "robot.toml"
+    path.write_text(robot_text(robot), encoding="utf-8")
+    assert load(path) == robot
+    assert is_preset(robot)
+
+
+def test_a_changed_robot_lies_beside_its_setup(tmp_path: Path) -> None:
+    changed = load(ROBOT, **{"tail.wavelength": "20 mm"})
+    found = render(changed, tmp_path / "a.mp4", **(SMALL | {"duration": "0.1 s"}))
+    assert load_setup(found.setup)[1] == changed
+
+
+def test_steady_ways_are_straight_and_wobbles_come_back() -> None:
+    rates = {"forward_velocity": 1e-3, "body_rotation_rate": -0.5, "tail_rotation_rate": 4.0 * np.pi}
+    way = steady_way(3.0, **rates, position=np.array([0.01, 0.0, 0.02]), wobble=2e-4, heading=0.02)
+    times = np.linspace(0.0, 3.0, 7)  # every half turn, and whole ones
+    series = way.series(times)
+    assert np.allclose(series["x"], 0.01 + 1e-3 * times)
+    assert np.allclose(series["y"], 2e-4 * np.cos(4.0 * np.pi * times), atol=2e-7)
+    assert way.rates()["motor_rotation_rate"] == pytest.approx(4.0 * np.pi + 0.5)
+    now = way.at(1.3)
+    assert np.allclose(now.body @ now.body.T, np.eye(3))
+    assert np.arctan2(now.body[1, 0], now.body[0, 0]) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"size": (161, 120)}, "even numbers"),
+        ({"view": "front"}, "allowed: top, side"),
+        ({"direction": "up"}, "allowed: right, left"),
+        ({"fps": 0.0}, "fps"),
+        ({"exposure": "1 s"}, "exposure"),
+        ({"gap": "12 mm"}, "allowed: 0 to 11 mm"),
+        ({"lateral": "11 mm"}, "at most 10.5 mm"),
+        ({"start": "1 m"}, "never in the picture"),
+        ({"duration": "0 s"}, "makes 1 frames"),
+        ({"seed": -1}, "seed"),
+        ({"degradation": "bad"}, "allowed: clean, degraded"),
+        ({"tail_rate": "1.2"}, "unit"),
+    ],
+)
+def test_wrong_options_get_one_sentence_and_leave_nothing(tmp_path: Path, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sp.InputError, match=words):
+        render(ROBOT, tmp_path / "a.mp4", **(SMALL | options))
+    assert not list(tmp_path.iterdir())
+
+
+def test_robots_that_this_camera_cannot_show_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(sp.InputError, match="which this camera can show"):
+        render("ecoli", tmp_path / "a.mp4", **SMALL)
+    with pytest.raises(sp.InputError, match="a tube under the oil"):
+        render(load(ROBOT, **{"channel.diameter": "60 mm"}), tmp_path / "a.mp4", **SMALL)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_trial_leaves_nothing(tmp_path: Path) -> None:
+    def interrupt(_what: str, done: int, _total: int) -> None:
+        if done == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        render(ROBOT, tmp_path / "a.mp4", **SMALL, progress=interrupt)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(KeyboardInterrupt):
+        render(ROBOT, tmp_path / "frames", **SMALL, progress=interrupt)
+    assert not list(tmp_path.iterdir())
