@@ -10,8 +10,8 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.files import write_dataset
 from spirillum.drawing.run_file import open_run, robot_of
+from spirillum.files import write_dataset
 
 
 @pytest.fixture

@@ -115,9 +115,9 @@ def simulate(
 
 def _check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
+    from spirillum.drawing.encode import FILMS
     from spirillum.extras import required
     from spirillum.files import output_target
-    from spirillum.drawing.encode import FILMS
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):
@@ -134,8 +134,8 @@ def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progre
         save_as(trajectory_figure(dataset), picture)
         files["plot"] = str(picture)
     if movie is not None:
-        from spirillum.errors import InputError
         from spirillum.drawing.film import film
+        from spirillum.errors import InputError
 
         try:
             files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)

@@ -96,10 +96,10 @@ def film(
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """
     from spirillum.cli import text
-    from spirillum.files import output_target
     from spirillum.drawing.encode import FILMS
     from spirillum.drawing.film import film as answer
     from spirillum.drawing.run_file import open_run
+    from spirillum.files import output_target
 
     output_target(output, FILMS, "run.mp4")
     dataset = open_run(run)

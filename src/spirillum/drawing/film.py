@@ -12,13 +12,13 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
 from spirillum.drawing.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.drawing.encode import FILMS, film_writer
 from spirillum.drawing.poses import Pose, Poses, poses_of
 from spirillum.drawing.run_file import open_run, robot_of
 from spirillum.drawing.show import checked_size, glass_around, shown_points
+from spirillum.errors import InputError
+from spirillum.files import output_target, whole_file
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:

@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from spirillum.arrays import Samples
-from spirillum.plots.scene import FAINT, HALO, INK, length_words
-from spirillum.plots.style import Scale, plain, styled
 from spirillum.drawing.camera import Camera
 from spirillum.drawing.glass import ruler_steps
+from spirillum.plots.scene import FAINT, HALO, INK, length_words
+from spirillum.plots.style import Scale, plain, styled
 
 __all__ = ["Bar", "Stamp", "blended_into", "scale_bar", "words_on"]
 

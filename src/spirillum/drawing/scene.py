@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.extras import required
 from spirillum.drawing.camera import Camera, View
 from spirillum.drawing.glass import add_glass, ruler_steps
 from spirillum.drawing.ground import add_grid
@@ -19,6 +18,7 @@ from spirillum.drawing.light import add_light
 from spirillum.drawing.poses import Pose
 from spirillum.drawing.shadow import add_shade
 from spirillum.drawing.window import new_plotter
+from spirillum.extras import required
 from spirillum.robot.robot import Robot
 
 __all__ = ["DrawnRobot", "Scene", "level_height", "resting"]

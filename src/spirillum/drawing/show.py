@@ -12,10 +12,10 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
 from spirillum.drawing.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.drawing.poses import Pose
+from spirillum.errors import InputError
+from spirillum.files import output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
