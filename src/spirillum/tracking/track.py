@@ -76,3 +76,5 @@ class Track:
     """Name of the video."""
     flags: tuple[Flag, ...] = ()
     """What to know about it."""
+    words: str = ""
+    """What the video's file says of itself, such as that it is synthetic."""

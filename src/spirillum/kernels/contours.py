@@ -1,0 +1,106 @@
+"""Apparent edges of a body from polynomials, and where they are in the picture, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.compiled import compiled
+from spirillum.kernels.snell import pixels_of_points
+
+__all__ = ["edge_places", "edge_points"]
+
+
+@compiled
+def _sum(factors: Samples, basis: Samples) -> float:
+    """Value of a polynomial."""
+    total = 0.0
+    for i in range(basis.shape[0]):
+        for j in range(basis.shape[1]):
+            total += factors[i, j] * basis[i, j]
+    return total
+
+
+@compiled
+def edge_points(pose: Samples, factors: Samples, normals: Samples, reach: Samples, out: Samples) -> None:
+    """Edge points (n, 2) on the plane through the axis, in the body's frame, m.
+
+    Args:
+        pose: x, y, heading.
+        factors: Chebyshev coefficients of the points, and of those of a flat end's lower rim, (2, n, 2, a, b); the
+            outer one of both counts.
+        normals: outward directions, (n, 2).
+        reach: largest distances of the lens along and across, (2,).
+        out: the points, (n, 2).
+    """
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    place = (-(cos * pose[0] + sin * pose[1]), -(-sin * pose[0] + cos * pose[1]))
+    orders = factors.shape[3], factors.shape[4]
+    basis = np.empty((orders[0], orders[1]))
+    a = min(max(place[0] / reach[0], -1.0), 1.0)
+    b = min(max(place[1] / reach[1], -1.0), 1.0)
+    turn_a, turn_b = math.acos(a), math.acos(b)
+    for i in range(orders[0]):
+        for j in range(orders[1]):
+            basis[i, j] = math.cos(i * turn_a) * math.cos(j * turn_b)
+    for n in range(out.shape[0]):
+        out[n, 0], out[n, 1] = _sum(factors[0, n, 0], basis), _sum(factors[0, n, 1], basis)
+        if factors[0, n, 0, 0, 0] != factors[1, n, 0, 0, 0] or factors[0, n, 0, 1, 0] != factors[1, n, 0, 1, 0]:
+            other = _sum(factors[1, n, 0], basis)
+            if (other - out[n, 0]) * normals[n, 0] > 0.0:
+                out[n, 0], out[n, 1] = other, _sum(factors[1, n, 1], basis)
+
+
+@compiled
+def edge_places(
+    pose: Samples,
+    factors: Samples,
+    normals: Samples,
+    reach: Samples,
+    axis_height: float,
+    numbers: Samples,
+    pixels: Samples,
+    directions: Samples,
+    size: Samples,
+    slopes: Samples,
+) -> None:
+    """Where edges are in the picture.
+
+    Args:
+        pose: x, y, heading.
+        factors: as in `edge_points`.
+        normals: outward directions in the body's frame, (n, 2).
+        reach: as in `edge_points`.
+        axis_height: height of the axis, m.
+        numbers: the camera, as `Optics.numbers` has it.
+        pixels: the edge points, (n, 2).
+        directions: unit normals in the picture, (n, 2).
+        size: pixels per m along them, (n,).
+        slopes: change of the distance along each normal with (x, y, heading), pixels per m and per rad, (n, 3).
+    """
+    count = normals.shape[0]
+    local = np.empty((count, 2))
+    edge_points(pose, factors, normals, reach, local)
+    cos, sin = math.cos(pose[2]), math.sin(pose[2])
+    points, ends = np.empty((2 * count, 3)), np.empty((2 * count, 2))
+    step = 1e-4
+    for n in range(count):
+        for k in range(2):
+            x = local[n, 0] + k * step * normals[n, 0]
+            y = local[n, 1] + k * step * normals[n, 1]
+            points[k * count + n, 0] = pose[0] + cos * x - sin * y
+            points[k * count + n, 1] = pose[1] + sin * x + cos * y
+            points[k * count + n, 2] = axis_height
+    pixels_of_points(points, numbers, ends)
+    for n in range(count):
+        d_u = (ends[count + n, 0] - ends[n, 0]) / step
+        d_v = (ends[count + n, 1] - ends[n, 1]) / step
+        far = math.sqrt(d_u * d_u + d_v * d_v)
+        pixels[n, 0], pixels[n, 1] = ends[n, 0], ends[n, 1]
+        directions[n, 0], directions[n, 1] = d_u / far, d_v / far
+        size[n] = far
+        slopes[n, 0] = far * (cos * normals[n, 0] - sin * normals[n, 1])
+        slopes[n, 1] = far * (sin * normals[n, 0] + cos * normals[n, 1])
+        slopes[n, 2] = far * (local[n, 0] * normals[n, 1] - local[n, 1] * normals[n, 0])

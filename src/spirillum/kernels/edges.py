@@ -1,0 +1,261 @@
+"""Brightness across edges of a picture, and how far an edge has moved, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.compiled import compiled
+
+__all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles"]
+
+_RUN = 6
+"""Neighbouring points of an edge on which brightness rises or falls in the same sense."""
+
+
+@compiled
+def profiles_across(
+    picture: Samples, origin: Samples, pixels: Samples, normals: Samples, offsets: Samples, out: Samples
+) -> None:
+    """Brightness (n, m) at offsets (m,) along the normals (n, 2) of edge points (n, 2), by cubic interpolation.
+
+    Args:
+        picture: brightness of a part of the picture, (h, w).
+        origin: pixel (u, v) of that part's first corner, (2,).
+        pixels: the edge points, (n, 2).
+        normals: unit directions, (n, 2).
+        offsets: distances along them, pixels, (m,).
+        out: the brightness, (n, m); NaN outside.
+    """
+    height, width = picture.shape
+    for i in range(pixels.shape[0]):
+        for k in range(offsets.size):
+            u = pixels[i, 0] + offsets[k] * normals[i, 0] - origin[0]
+            v = pixels[i, 1] + offsets[k] * normals[i, 1] - origin[1]
+            if not (1.0 <= u < width - 2.0 and 1.0 <= v < height - 2.0):
+                out[i, k] = math.nan
+                continue
+            col, row = int(u), int(v)
+            a, b = u - col, v - row
+            w_0, w_1 = ((-0.5 * a + 1.0) * a - 0.5) * a, (1.5 * a - 2.5) * a * a + 1.0
+            w_2, w_3 = ((-1.5 * a + 2.0) * a + 0.5) * a, (0.5 * a - 0.5) * a * a
+            total = 0.0
+            for j in range(4):
+                if j == 0:
+                    weight = ((-0.5 * b + 1.0) * b - 0.5) * b
+                elif j == 1:
+                    weight = (1.5 * b - 2.5) * b * b + 1.0
+                elif j == 2:
+                    weight = ((-1.5 * b + 2.0) * b + 0.5) * b
+                else:
+                    weight = (0.5 * b - 0.5) * b * b
+                line = row - 1 + j
+                total += weight * (
+                    w_0 * picture[line, col - 1]
+                    + w_1 * picture[line, col]
+                    + w_2 * picture[line, col + 1]
+                    + w_3 * picture[line, col + 2]
+                )
+            out[i, k] = total
+
+
+@compiled
+def shifts_of_profiles(
+    profiles: Samples, usual: Samples, slopes: Samples, shifts: Samples, strengths: Samples, misses: Samples
+) -> None:
+    """How far each edge has moved along its normal: q(s) = b + c s + a (p(s) - d p'(s)) by least squares.
+
+    Brightness, its gradient, and the contrast (also its sign) are free at every point, so that lamp, shadows and the
+    colour of a stripe do not move an edge.
+
+    Args:
+        profiles: brightness q, (n, m).
+        usual: what p it is like when the edge is in its place, (n, m), free of a mean and a slope.
+        slopes: its derivative p', per sample, (n, m).
+        shifts: d, samples, (n,); NaN where it cannot be told.
+        strengths: a, (n,).
+        misses: root mean square of what remains, (n,).
+    """
+    count, length = profiles.shape
+    half = 0.5 * (length - 1)
+    spread = length * (length * length - 1.0) / 12.0
+    for i in range(count):
+        mean, tilt, bad = 0.0, 0.0, False
+        for k in range(length):
+            mean += profiles[i, k]
+            tilt += profiles[i, k] * (k - half)
+        if math.isnan(mean):
+            bad = True
+        mean, tilt = mean / length, tilt / spread
+        m_slope, t_slope = 0.0, 0.0
+        for k in range(length):
+            m_slope += slopes[i, k]
+            t_slope += slopes[i, k] * (k - half)
+        m_slope, t_slope = m_slope / length, t_slope / spread
+        pp, ps, ss, pq, sq, qq = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(length):
+            q = profiles[i, k] - mean - tilt * (k - half)
+            p = usual[i, k]
+            s = slopes[i, k] - m_slope - t_slope * (k - half)
+            pp += p * p
+            ps += p * s
+            ss += s * s
+            pq += p * q
+            sq += s * q
+            qq += q * q
+        determinant = pp * ss - ps * ps
+        if bad or determinant <= 1e-9 * pp * ss or pp == 0.0:
+            shifts[i], strengths[i], misses[i] = math.nan, 0.0, math.nan
+            continue
+        a = (pq * ss - sq * ps) / determinant
+        c = (sq * pp - pq * ps) / determinant
+        rest = max(qq - a * pq - c * sq, 0.0)
+        strengths[i] = a
+        misses[i] = math.sqrt(rest / (length - 4.0))
+        shifts[i] = -c / a if a != 0.0 else math.nan
+
+
+@compiled
+def _score(sums: Samples, seen: Samples, all_of: Samples) -> float:
+    """Geometric mean of the first four groups' means, and a share of the fifth's."""
+    score, used = 1.0, 0.0
+    for g in range(min(sums.size, 4)):
+        if all_of[g] == 0.0:
+            continue
+        if 2.0 * seen[g] < all_of[g]:
+            return 0.0
+        score *= sums[g] / seen[g]
+        used += 1.0
+    if score <= 0.0 or used == 0.0:
+        return 0.0
+    score = score ** (1.0 / used)
+    if sums.size > 4 and seen[4] > 0.0:
+        score += 0.3 * min(sums[4] / seen[4], 2.0 * score)
+    return float(score)
+
+
+@compiled
+def edge_scores(
+    slope_u: Samples,
+    slope_v: Samples,
+    pixels: Samples,
+    normals: Samples,
+    group: Samples,
+    groups: int,
+    places: Samples,
+    scores: Samples,
+) -> None:
+    """How clearly a shape's edges show in a picture, with the shape at different places.
+
+    Of each group of edges the mean brightness gradient along the normals counts, first over a few neighbouring points
+    with its sign, which noise and clutter change, then without; of the groups the geometric mean of
+    the first four (both ends, both sides), so that none can stand in for another, and a share of the fifth.
+
+    Args:
+        slope_u: brightness gradient along u, (h, w).
+        slope_v: the same along v, (h, w).
+        pixels: edge points of the shape, (n, 2).
+        normals: their unit normals, (n, 2).
+        group: index of the group of each point, (n,).
+        groups: number of groups.
+        places: shifts of the shape, pixels, (k, 2).
+        scores: the scores, (k,); 0 where more than half of a group is outside.
+    """
+    height, width = slope_u.shape
+    sums, seen, all_of = np.zeros(groups), np.zeros(groups), np.zeros(groups)
+    for i in range(group.size):
+        all_of[int(group[i])] += 1.0
+    for k in range(places.shape[0]):
+        sums[:] = 0.0
+        seen[:] = 0.0
+        together, length = 0.0, 0
+        for i in range(pixels.shape[0]):
+            col = int(pixels[i, 0] + places[k, 0] + 0.5)
+            row = int(pixels[i, 1] + places[k, 1] + 0.5)
+            g = int(group[i])
+            if 0 <= col < width and 0 <= row < height:
+                together += slope_u[row, col] * normals[i, 0] + slope_v[row, col] * normals[i, 1]
+                seen[g] += 1.0
+            length += 1
+            if length == _RUN or i == pixels.shape[0] - 1 or int(group[i + 1]) != g:
+                sums[g] += abs(together)
+                together, length = 0.0, 0
+        scores[k] = _score(sums, seen, all_of)
+
+
+@compiled
+def _least_squares(shifts: Samples, slopes: Samples, weights: Samples, size: Samples, change: Samples) -> None:
+    """The change (3,) that explains the shifts best; `size` makes its three slopes alike."""
+    normal, right = np.zeros((3, 3)), np.zeros(3)
+    for i in range(shifts.size):
+        if weights[i] > 0.0:
+            for a in range(3):
+                share = weights[i] * slopes[i, a] / size[a]
+                right[a] += share * shifts[i]
+                for b in range(a + 1):
+                    normal[a, b] += share * slopes[i, b] / size[b]
+    _solve(normal, right)
+    for a in range(3):
+        change[a] = right[a] / size[a]
+
+
+@compiled
+def _solve(normal: Samples, right: Samples) -> None:
+    """Solve three linear equations with a positive definite matrix, given in its lower half, in place."""
+    little = 1e-9 * (normal[0, 0] + normal[1, 1] + normal[2, 2]) + 1e-300
+    for a in range(3):  # Cholesky's factors in the lower half
+        for b in range(a + 1):
+            value = normal[a, b] + (little if a == b else 0.0)
+            for c in range(b):
+                value -= normal[a, c] * normal[b, c]
+            normal[a, b] = math.sqrt(max(value, 1e-300)) if a == b else value / normal[b, b]
+    for a in range(3):
+        for b in range(a):
+            right[a] -= normal[a, b] * right[b]
+        right[a] /= normal[a, a]
+    for a in range(2, -1, -1):
+        for b in range(a + 1, 3):
+            right[a] -= normal[b, a] * right[b]
+        right[a] /= normal[a, a]
+
+
+@compiled
+def robust_change(shifts: Samples, slopes: Samples, weights: Samples, used: Samples, change: Samples) -> float:
+    """Least squares in which what does not fit the others does not count (Tukey's biweight).
+
+    Args:
+        shifts: how far each edge has moved along its normal, pixels, (n,).
+        slopes: how far it would for each unit of a change, (n, 3).
+        weights: inverse variances, 0 for what is not known, (n,).
+        used: the weights in the end, (n,).
+        change: the change, (3,).
+
+    Returns:
+        the level of what remains over what was expected, at least 1/2.
+    """
+    count = shifts.size
+    size = np.full(3, 1e-300)
+    known = 0
+    for i in range(count):
+        used[i] = weights[i] * min(1.0, 0.5 / max(abs(shifts[i]), 1e-9))
+        known += weights[i] > 0.0
+        for a in range(3):
+            size[a] = max(size[a], abs(slopes[i, a]))
+    rest, miss = np.empty(known), np.empty(count)
+    level = 1.0
+    for _ in range(6):
+        _least_squares(shifts, slopes, used, size, change)
+        k = 0
+        for i in range(count):
+            if weights[i] > 0.0:
+                left = shifts[i] - slopes[i, 0] * change[0] - slopes[i, 1] * change[1] - slopes[i, 2] * change[2]
+                miss[i] = abs(left) * math.sqrt(weights[i])
+                rest[k] = miss[i]
+                k += 1
+        level = max(0.5, 1.4826 * np.median(rest))
+        for i in range(count):
+            share = miss[i] / (4.685 * level) if weights[i] > 0.0 else 1.0
+            used[i] = weights[i] * (1.0 - share * share) ** 2 if share < 1.0 else 0.0
+    return level

@@ -1,0 +1,159 @@
+"""Classes of colour: what the lamp and the camera make of the named colours of the stripes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise, permutations
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.mesh import STRIPE_COLOURS
+
+__all__ = ["colour_classes", "named_colours", "named_rightly", "order_seen", "pattern_period"]
+
+_MANY = 6
+"""More classes than this are matched to names by the least total distance alone."""
+_PAIRS = 3
+"""Kinds of neighbouring stripes that have to be seen before their order is judged."""
+_FITS = 0.7
+"""Share of neighbouring stripes that have to stand in a given order."""
+
+
+def named_colours(names: Sequence[str]) -> Samples:
+    """RGB of colours by name, 0 to 255, (n, 3)."""
+    return 255.0 * np.array([STRIPE_COLOURS[name] for name in names])  # type: ignore[index]
+
+
+def pattern_period(stripes: Sequence[str]) -> float:
+    """Smallest angle by which the stripes can be turned so that they look the same, rad."""
+    count = len(stripes)
+    for step in range(1, count + 1):
+        if count % step == 0 and all(stripes[k] == stripes[(k + step) % count] for k in range(count)):
+            return 2.0 * np.pi * step / count
+    return 2.0 * np.pi
+
+
+def _opponent(colours: Samples) -> Samples:
+    """Colours as brightness, which lamps change, and two differences, which they change less."""
+    red, green, blue = colours[..., 0], colours[..., 1], colours[..., 2]
+    return np.stack([0.35 * (red + green + blue) / 3.0, red - green, 0.5 * (red + green) - blue], axis=-1)
+
+
+def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Samples]:
+    """Colours of the named classes in a picture.
+
+    Starts from the named colours under a lamp that gives the samples' mean, then moves each class to the mean of the
+    samples that are nearest to it (k-means), held by its start where few samples are.
+
+    Args:
+        samples: colours of pixels of the stripes, (m, 3).
+        names: distinct names of colours.
+
+    Returns:
+        The classes' colours in the picture, (classes, 3), and the named colours under the same lamp.
+    """
+    named = named_colours(names)
+    lamp = np.clip(samples.mean(axis=0) / named.mean(axis=0), 0.2, 5.0)
+    lamp = np.mean(lamp) * (lamp / np.mean(lamp)) ** 0.5  # not all stripes show: believe half of the tint
+    start = named * lamp
+    palette = start.copy()
+    held = 0.02 * len(samples) / len(names)
+    for _ in range(12):
+        nearest = _nearest(samples, palette)
+        for index in range(len(names)):
+            mine = samples[nearest == index]
+            total = mine.sum(axis=0) if len(mine) else np.zeros(3)
+            palette[index] = (total + held * start[index]) / (len(mine) + held)
+    return palette, start
+
+
+def _nearest(samples: Samples, palette: Samples) -> np.ndarray:
+    """Class of each sample."""
+    distance = np.sum((_opponent(samples)[..., None, :] - _opponent(palette)) ** 2, axis=-1)
+    return np.asarray(np.argmin(distance, axis=-1))
+
+
+def order_seen(
+    profiles: Samples, angles: Samples, palette: Samples, start: Samples, stripes: Sequence[str], names: Sequence[str]
+) -> tuple[Samples, str]:
+    """Check the order of the stripes by which colours are seen side by side.
+
+    Args:
+        profiles: colours along the angle about the axis, from +z towards -y, for some frames, (f, n, 3).
+        angles: these angles, rad, (n,).
+        palette: colours of the classes, (classes, 3).
+        start: named colours under this lamp, (classes, 3).
+        stripes: names in the order given.
+        names: distinct names, one a class.
+
+    Returns:
+        The classes' colours by the names that fit them best, and `given`, `reversed`, `other` or `unseen`.
+    """
+    count = len(names)
+    seen = _neighbours(profiles, angles, palette, 2.0 * np.pi / len(stripes))
+    if seen.sum() < 3 or np.count_nonzero(seen) < min(_PAIRS, count):
+        return palette, "unseen"
+    order = [names.index(name) for name in stripes]
+    forward = np.zeros((count, count), dtype=bool)
+    for k, one in enumerate(order):
+        forward[one, order[(k + 1) % len(order)]] = True
+    cost = np.sqrt(np.sum((_opponent(palette)[:, None] - _opponent(start)) ** 2, axis=-1))  # cluster, name
+
+    def share(assigned: np.ndarray, allowed: np.ndarray) -> float:
+        """Share of the seen neighbours that are allowed, with cluster i named assigned[i]."""
+        return float(seen[allowed[np.ix_(assigned, assigned)]].sum() / seen.sum())
+
+    if count <= _MANY:
+        trials = [np.array(p) for p in permutations(range(count))]
+    else:
+        from scipy.optimize import linear_sum_assignment
+
+        trials = [np.asarray(linear_sum_assignment(cost)[1])]
+    costs = np.array([cost[np.arange(count), trial].sum() for trial in trials])
+    shares = np.array([share(trial, forward) for trial in trials])
+    best = int(np.argmin(costs))
+    fitting = shares >= _FITS
+    if fitting.any():
+        chosen = int(np.argmin(np.where(fitting, costs, np.inf)))
+        if costs[chosen] <= 1.5 * costs[best]:
+            return _renamed(palette, trials[chosen]), "given"
+    backward = share(trials[best], forward.T) >= _FITS
+    return _renamed(palette, trials[best]), "reversed" if backward else "other"
+
+
+def named_rightly(palette: Samples, start: Samples) -> bool:
+    """Whether no other assignment of names fits the classes' colours clearly better.
+
+    Args:
+        palette: colours of the classes, (classes, 3).
+        start: named colours under this lamp, (classes, 3).
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    cost = np.linalg.norm(_opponent(palette)[:, None] - _opponent(start), axis=-1)
+    rows, columns = linear_sum_assignment(cost)
+    return bool(np.trace(cost) <= 1.2 * cost[rows, columns].sum() + 1e-9)
+
+
+def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
+    """Colours by name, from colours by cluster."""
+    by_name = np.empty_like(palette)
+    by_name[assigned] = palette
+    return by_name
+
+
+def _neighbours(profiles: Samples, angles: Samples, palette: Samples, width: float) -> Samples:
+    """How often a class is seen next to another one, towards larger angles, (classes, classes)."""
+    seen = np.zeros((len(palette), len(palette)))
+    step = float(angles[1] - angles[0])
+    for profile in profiles:
+        good = np.isfinite(profile).all(axis=1)
+        classes = np.where(good, _nearest(np.nan_to_num(profile), palette), -1)
+        bounds = np.flatnonzero(np.diff(classes)) + 1
+        runs = np.split(classes, bounds)
+        wide = [int(run[0]) for run in runs if len(run) * step > 0.35 * width]
+        for one, two in pairwise(wide):
+            if one != two and one >= 0 and two >= 0:
+                seen[one, two] += 1.0
+    return seen

@@ -1,0 +1,199 @@
+"""From a video and its setup to a track: scale, looks, then one frame after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+from spirillum.tracking.body import Body, Placed
+from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
+from spirillum.tracking.frames import Video
+from spirillum.tracking.optics import Optics, Pose, placed
+from spirillum.tracking.roll import Stripes
+from spirillum.tracking.ruler import still_picture
+from spirillum.tracking.scale import Sight
+from spirillum.tracking.search import candidates, refined
+from spirillum.tracking.setup import Setup
+from spirillum.tracking.start import Start, first_look, on_the_way
+from spirillum.tracking.tail import Wire
+from spirillum.tracking.track import Flag, Track
+from spirillum.tracking.unwrapping import contradictions, unwrapped
+from spirillum.tracking.warnings import gaps_of, sight_flags
+
+__all__ = ["Seen", "follow", "scale_of"]
+
+_LOOK_AGAIN = 15
+"""Frames between two searches of the whole picture for a robot that was lost."""
+_MEMORY = 12
+"""Frames from which the next place is guessed."""
+
+
+class Seen(NamedTuple):
+    """What was seen on one frame, for whoever draws it."""
+
+    time: float
+    """s."""
+    pose: Pose | None
+    """Where the body is in the camera's frame; None where it was not seen."""
+    body_angle: float
+    """rad, modulo the stripes' period; NaN where it could not be read."""
+    tail_phase: float
+    """rad, modulo 2 pi; NaN where it could not be read."""
+    optics: Optics
+    """The camera."""
+
+
+@dataclass
+class _Row:
+    """What is kept of the frames."""
+
+    time: list[float] = field(default_factory=list)
+    index: list[int] = field(default_factory=list)
+    placed: list[Placed] = field(default_factory=list)
+    roll: list[tuple[float, float]] = field(default_factory=list)
+    tail: list[tuple[float, float]] = field(default_factory=list)
+
+
+def follow(
+    video: str | Path | Video,
+    setup: Setup,
+    robot: Robot,
+    *,
+    folder: Path | None = None,
+    progress: Callable[[int, int | None], None] | None = None,
+    on_frame: Callable[[int, np.ndarray, Seen], None] | None = None,
+) -> Track:
+    """Follow a robot through a video.
+
+    Args:
+        video: the film, or a folder of images.
+        setup: what the experimenter knows.
+        robot: the robot in front of the camera.
+        folder: folder of the setup file, where a checkerboard's pictures lie; unset: the present one.
+        progress: called with the number of frames done and of all, where that is known.
+        on_frame: called with each frame's number, its picture (8-bit RGB) and what was seen on it.
+
+    Raises:
+        InputError: if the video cannot be read, or neither ruler nor robot is found in it.
+    """
+    video = opened(video, setup)
+    frames = samples_of(video, setup)
+    images = [frame.image for frame in frames]
+    still = still_picture(images)
+    sight = sight_of(video, setup, still, folder)
+    bounds = bounds_of(setup, video)
+    body = Body(robot, sight.optics, bounds)
+    start = first_look(video.name, body, frames, still)
+    stripes, wire = Stripes(robot, setup, sight.optics), Wire(robot, setup, sight.optics)
+    stripes.learn(start.seen)
+    wire.learn(start.seen)
+    rows = _Row()
+    total = video.count
+    for frame in video.frames(setup.start, setup.end):
+        guess = _guess(rows, frame.time, start)
+        found = _placed(body, frame.image, guess, start.expected(frame.time))
+        if not found.known and len(rows.time) % _LOOK_AGAIN == 0:
+            found = _searched(body, frame.image, still, start, found)
+        read = (np.nan, np.nan), (np.nan, np.nan)
+        if found.known:
+            read = stripes.read(frame.image, found.pose), wire.read(frame.image, found.pose)
+        rows.time.append(frame.time)
+        rows.index.append(frame.index)
+        rows.placed.append(found)
+        rows.roll.append(read[0])
+        rows.tail.append(read[1])
+        if on_frame is not None:
+            pose = found.pose if found.known else None
+            on_frame(frame.index, frame.image, Seen(frame.time, pose, read[0][0], read[1][0], sight.optics))
+        if progress is not None:
+            progress(len(rows.time), total)
+    every = (*video.flags, *sight.flags, *start.flags, *stripes.flags, *wire.flags)
+    return _track(video, setup, robot, sight, rows, stripes.period, wire.handedness(), every)
+
+
+def _guess(rows: _Row, time: float, start: Start) -> Pose:
+    """Where the body should be, from the frames before."""
+    last = [(at, one.pose) for at, one in zip(rows.time[-_MEMORY:], rows.placed[-_MEMORY:], strict=True) if one.known]
+    if len(last) < 2 or not rows.placed[-1].known:
+        return start.expected(time)
+    return on_the_way(last, time)
+
+
+def _placed(body: Body, image: np.ndarray, guess: Pose, expected: Pose) -> Placed:
+    """The body near a guess, or else where it should be; not seen if it would have jumped."""
+    found = body.place(image, guess)
+    far = 4.0 * body.optics.length_per_pixel
+    if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) > far:
+        found = found._replace(error=Pose(np.nan, np.nan, np.nan))
+    if not found.known and guess is not expected:
+        again = body.place(image, expected)
+        if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
+            return again
+    return found
+
+
+def _searched(body: Body, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
+    """The body anywhere in a picture."""
+    for candidate in candidates(image, still, body.contour, body.optics, body.bounds)[:2]:
+        better = refined(image, still, candidate, body.contour, body.optics, body.bounds)
+        if start.as_clear(better.score):
+            found = body.place(image, better.pose)
+            if found.known:
+                return found
+    return lost
+
+
+def _track(
+    video: Video,
+    setup: Setup,
+    robot: Robot,
+    sight: Sight,
+    rows: _Row,
+    period: float,
+    hand: int,
+    flags: tuple[Flag, ...],
+) -> Track:
+    time = np.array(rows.time)
+    known = np.array([one.known for one in rows.placed])
+    pose = np.where(known[:, None], np.array([one.pose for one in rows.placed]), np.nan)
+    errors = np.array([one.error for one in rows.placed])
+    roll, tail = np.array(rows.roll), np.array(rows.tail)
+    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], period)
+    tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
+    position = pose[:, :2] - sight.optics.origin[:2]
+    odd = contradictions(time, body_angle, tail_phase, position[:, 0], robot, hand)
+    frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
+    seen_flags = sight_flags(time, pose, errors, rows.placed, sight.optics, setup)
+    return Track(
+        time=time,
+        frame=frame,
+        position=position,
+        heading=pose[:, 2],
+        body_angle=body_angle,
+        tail_phase=tail_phase,
+        position_error=errors[:, 0],
+        body_angle_error=np.where(np.isfinite(body_angle), roll[:, 1], np.nan),
+        tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
+        picture=_drawn(pose, robot, sight.optics),
+        size=video.size,
+        scale=sight.scale,
+        setup=setup,
+        video=video.name,
+        words=video.words,
+        flags=(*flags, *seen_flags, *gap_flags, *roll_flags, *tail_flags, *odd),
+    )
+
+
+def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
+    """Pixels of the body's mid-length and of its nose on every frame, (n, 4)."""
+    axis = np.array([[0.0, 0.0, 0.0], [0.5 * robot.body.length, 0.0, 0.0]])
+    out = np.full((len(pose), 4), np.nan)
+    for k in np.flatnonzero(np.isfinite(pose[:, 0])):
+        out[k] = optics.pixels(placed(axis, Pose(*pose[k].tolist()), optics.axis_height)).ravel()
+    return out

@@ -1,0 +1,211 @@
+"""What a video shows that whoever uses its numbers has to know: two robots, gaps, a robot that leaves, glare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.tracking.body import Body, Placed
+from spirillum.tracking.optics import Optics
+from spirillum.tracking.search import Candidate, candidates, refined
+from spirillum.tracking.setup import Setup
+from spirillum.tracking.track import Flag
+
+__all__ = ["gaps_of", "sight_flags", "start_flags"]
+
+_THREADS = 2
+EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+"""All that a track gives."""
+
+_SECOND = 0.75
+"""Score of a second robot over that of the first."""
+_CLEAR = 1.3
+"""The same over the next best place."""
+_TURNED = 1.1
+"""Score of a robot the other way round over that of the stated direction."""
+_OFTEN = 0.6
+"""Share of the frames in which something has to be seen to be said."""
+_LOST = 0.03
+"""Share of frames without the robot that is said."""
+_PART = 0.97
+"""Share of the edges in the picture below which the robot is partly out of view."""
+_HIDDEN = 0.55
+"""Share of the edges that fit below which glare, shadows or bubbles are said."""
+
+
+def close_places(body: Body, image: np.ndarray, still: Samples, *, turn: float = 0.0) -> list[Candidate]:
+    """The three likeliest places, looked at closely, best first.
+
+    Args:
+        body: the robot's body.
+        image: 8-bit RGB, (h, w, 3).
+        still: what stands still in the video, (h, w, 3).
+        turn: angle by which the body is turned round, rad.
+    """
+    rough = candidates(image, still, body.contour, body.optics, body.bounds, turn=turn)[:3]
+    close = [refined(image, still, one, body.contour, body.optics, body.bounds) for one in rough]
+    return sorted(close, key=lambda one: -one.score)
+
+
+def start_flags(
+    body: Body,
+    images: Sequence[np.ndarray],
+    still: Samples,
+    found: Sequence[list[Candidate]],
+    chosen: Sequence[Candidate | None],
+) -> tuple[Flag, ...]:
+    """Two robots, or a nose at the other end.
+
+    Args:
+        body: the robot's body.
+        images: the frames that were searched, 8-bit RGB.
+        still: what stands still in the video.
+        found: candidates of each frame.
+        chosen: the one that was taken for the robot.
+    """
+    flags, second, count = [], 0, 0
+    asked: list[tuple[np.ndarray, float]] = []
+    half = 0.5 * body.robot.body.length
+    for image, others, one in zip(images, found, chosen, strict=True):
+        if one is None:
+            continue
+        count += 1
+        apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
+        second += any(other.score > max(_SECOND * one.score, _CLEAR * others[2].score) for other in apart)
+        if count % 2:
+            asked.append((image, others[0].score))
+    if count and second > _OFTEN * count:
+        flags.append(
+            Flag(
+                "two-robots",
+                f"more than one robot is in view (on {second} of {count} frames looked at): it is not known which is "
+                "meant, so that nothing is given; a [region] around one of them in the setup would say",
+                EVERYTHING,
+            )
+        )
+    with ThreadPoolExecutor(_THREADS) as pool:
+        backs = pool.map(lambda one: close_places(body, one[0], still, turn=np.pi), asked)
+        turned = [back[0].score / score if back else 0.0 for back, (_, score) in zip(backs, asked, strict=True)]
+    side = "left" if body.optics.leftward else "right"
+    if turned and float(np.median(turned)) > _TURNED:
+        flags.append(
+            Flag(
+                "nose-on-the-other-side",
+                f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits "
+                f"{float(np.median(turned)):.2g} times better; all signs would be wrong, so that nothing is given",
+                EVERYTHING,
+            )
+        )
+    return tuple(flags)
+
+
+def _apart(other: Candidate, one: Candidate, half: float) -> bool:
+    """Whether two robots could be at both places without touching."""
+    return max(abs(other.pose.x - one.pose.x) / 2.0, abs(other.pose.y - one.pose.y)) > half
+
+
+def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
+    """Numbers of the frames as they were recorded, with those that are missing counted.
+
+    Args:
+        time: times of the frames, s, (n,).
+        index: their numbers among those that are there, (n,).
+    """
+    if time.size < 3:
+        return index, ()
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    turns = (time - time[0]) / usual
+    whole = np.round(turns)
+    if np.abs(turns - whole).max() > 0.2 or np.any(np.diff(whole) < 1.0):
+        turns = np.concatenate([np.zeros(1), np.cumsum(np.maximum(1.0, np.round(steps / usual)))])
+        whole = turns if np.mean(np.abs(steps / usual - np.round(steps / usual)) < 0.2) > 0.95 else index - index[0]
+    missing = int(whole[-1] - whole[0]) + 1 - time.size
+    flags: tuple[Flag, ...] = ()
+    if missing > 0:
+        share = 100.0 * missing / (missing + time.size)
+        longest = float(steps.max())
+        flags = (
+            Flag(
+                "dropped-frames",
+                f"{missing} frames ({share:.1f} %) are missing, the longest gap is {longest:.3g} s: the true times are "
+                "used",
+            ),
+        )
+    return index[0] + whole, flags
+
+
+def sight_flags(
+    time: Samples, pose: Samples, errors: Samples, found: Sequence[Placed], optics: Optics, setup: Setup
+) -> tuple[Flag, ...]:
+    """A robot that leaves, comes late, is partly out of view, hidden, or swims the other way.
+
+    Args:
+        time: times, s, (n,).
+        pose: x, y, heading, NaN where it was not seen, (n, 3).
+        errors: their standard errors, (n, 3).
+        found: what was found on each frame.
+        optics: the camera.
+        setup: the setup.
+    """
+    flags: list[Flag] = []
+    known = np.isfinite(pose[:, 0])
+    count = known.size
+    if not known.any():
+        return (Flag("robot-not-seen", "the robot was not seen well enough on any frame", EVERYTHING),)
+    first, last = np.flatnonzero(known)[[0, -1]]
+    inside = np.array([one.inside for one in found])
+    if count - 1 - last > max(3, _LOST * count):
+        flags.append(
+            Flag(
+                "robot-left-the-view",
+                f"the robot was last seen at {time[last]:.2f} s of {time[-1]:.2f} s: what was measured until then "
+                "is kept",
+            )
+        )
+    if first > max(3, _LOST * count):
+        sentence = f"the robot was first seen at {time[first]:.2f} s: the measurement begins there"
+        flags.append(Flag("robot-came-late", sentence))
+    between = ~known[first : last + 1]
+    if between.mean() > _LOST:
+        flags.append(
+            Flag(
+                "robot-lost",
+                f"the robot was not seen on {between.sum()} frames ({100 * between.mean():.1f} %) between: they are "
+                "left out",
+            )
+        )
+    part = known & (inside < _PART)
+    if part.mean() > _LOST:
+        flags.append(
+            Flag(
+                "robot-partly-out-of-view",
+                f"the robot is partly out of view on {100 * part.mean():.0f} % of the frames: its place there is "
+                "less sure",
+            )
+        )
+    share = np.array([one.share for one in found])
+    if known.sum() and float(np.median(share[known])) < _HIDDEN:
+        flags.append(
+            Flag(
+                "edges-hidden",
+                f"only {100 * float(np.median(share[known])):.0f} % of the body's edges look alike on most frames: "
+                "glare, a shadow, bubbles or a wrong robot file; the place rests on the others",
+            )
+        )
+    if known.sum() > 10:
+        t, x = time[known], pose[known, 0]
+        slope = float(np.polyfit(t - t.mean(), x, 1)[0])
+        spread = float(np.std(x - np.polyval(np.polyfit(t, x, 1), t))) + float(np.nanmedian(errors[:, 0]))
+        if slope * (t[-1] - t[0]) < -max(5.0 * spread, 2.0 * optics.length_per_pixel):
+            flags.append(
+                Flag(
+                    "moves-backwards",
+                    f"the robot moves away from its nose: is robot.direction = '{setup.robot.direction}' right? If "
+                    "it is, the forward velocity is negative",
+                )
+            )
+    return tuple(flags)

@@ -1,0 +1,38 @@
+"""What the files of a video say of themselves, such as that they are synthetic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["one_line", "words_of_images"]
+
+_MOST_WORDS = 2000
+
+
+def words_of_images(folder: Path, image: Path) -> str:
+    """Texts in a PNG file, and of a README in its folder or beside it.
+
+    Args:
+        folder: folder of the images.
+        image: the first of them.
+    """
+    found = []
+    if image.suffix.lower() == ".png":
+        data = image.read_bytes()
+        at = 8
+        while at + 8 <= len(data):
+            length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+            if kind in (b"tEXt", b"iTXt"):
+                found.append(data[at + 8 : at + 8 + min(length, _MOST_WORDS)].decode("utf-8", "replace"))
+            at += 12 + length
+    for place in (folder, folder.parent):
+        for name in ("README", "README.txt", "README.md"):
+            if (place / name).is_file():
+                with (place / name).open("rb") as file:
+                    found.append(file.read(_MOST_WORDS).decode("utf-8", "replace"))
+    return one_line(" ".join(found))
+
+
+def one_line(text: str) -> str:
+    """A text of a user's file in one line."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:_MOST_WORDS]

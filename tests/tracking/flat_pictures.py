@@ -1,0 +1,285 @@
+"""Flat drawings of a swimming robot, deliberately unlike the virtual camera: a second style that has to track as well.
+
+Own pinhole, no oil, no shading, no glass; other colours. Shares nothing with renderer and tracker but the geometry of
+the robot. Camera's frame: x towards the nose, z towards the camera, y = z x x; pixel centres at whole numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.robot.geometry import amplitude_envelope
+from spirillum.robot.links import outlines_of
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+
+PAINTS = {
+    "red": (176, 38, 70),
+    "yellow": (226, 208, 92),
+    "green": (60, 128, 60),
+    "blue": (70, 92, 190),
+    "white": (236, 240, 244),
+    "black": (22, 26, 30),
+    "orange": (214, 110, 40),
+    "magenta": (176, 60, 160),
+    "cyan": (70, 170, 190),
+}
+"""8-bit RGB of the stripes' names: not the shades that the robot's own pictures have."""
+
+_SHIFT = 10  # fractional bits of the polygons' corners
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A flat film and all that is true of it; SI, rates signed about +x."""
+
+    robot: Robot = field(default_factory=lambda: load("biorob2012-wide"))
+    size: tuple[int, int] = (320, 240)
+    view: str = "top"
+    direction: str = "right"
+    camera_height: float = 0.20
+    axis_height: float = 0.015
+    focal: float = 350.0
+    ruler_height: float = 0.0
+    spacing: float = 0.002
+    ruler: bool = True
+    velocity: float = 1e-3
+    tail_rate: float = 2 * np.pi * 1.1
+    body_rate: float = -2 * np.pi * 0.12
+    start: tuple[float, float] = (0.02, 0.0)
+    heading: float = 0.0
+    body_angle: float = 0.3
+    tail_phase: float = 0.7
+    fps: float = 30.0
+    frames: int = 60
+    dropped: frozenset[int] = frozenset()
+    floor: tuple[int, int, int] = (150, 190, 170)
+    lines: tuple[int, int, int] = (60, 40, 90)
+    body: tuple[int, int, int] = (96, 70, 62)
+    wire: tuple[int, int, int] = (30, 30, 60)
+    coupling: tuple[int, int, int] = (120, 120, 50)
+    seal: tuple[int, int, int] = (200, 200, 205)
+    paints: dict[str, tuple[int, int, int]] = field(default_factory=lambda: dict(PAINTS))
+    stripes: Sequence[str] | None = None
+    """Order of the stripes as they are drawn, if not that of the robot."""
+    noise: float = 0.0
+    """Standard deviation of the noise, of 255."""
+    lamp: float = 0.0
+    """Share by which the lamp drifts over the film."""
+    fine: int = 6
+    """Samples across a pixel."""
+    seed: int = 1
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the frames that were not dropped, s."""
+        kept = [index for index in range(self.frames) if index not in self.dropped]
+        return np.array(kept) / self.fps
+
+    def truth(self, time: np.ndarray | float) -> dict[str, np.ndarray]:
+        """Where the robot is: x, y of its mid-length, heading, body_angle, tail_phase (lab)."""
+        time = np.asarray(time, dtype=float)
+        return {
+            "x": self.start[0] + self.velocity * time,
+            "y": self.start[1] + 0.0 * time,
+            "heading": self.heading + 0.0 * time,
+            "body_angle": self.body_angle + self.body_rate * time,
+            "tail_phase": self.tail_phase + self.tail_rate * time,
+        }
+
+    def pixels(self, points: np.ndarray) -> np.ndarray:
+        """Pixels of points of the camera's frame (height above the reference plane as z), (..., 2)."""
+        sign = 1.0 if self.direction == "right" else -1.0
+        scale = sign * self.focal / (self.camera_height - points[..., 2])
+        centre = 0.5 * (np.array(self.size) - 1.0)
+        return np.stack([centre[0] + scale * points[..., 0], centre[1] - scale * points[..., 1]], axis=-1)
+
+    def placed(self, points: np.ndarray, time: float) -> np.ndarray:
+        """Points of the robot, without its roll, in the camera's frame."""
+        true = self.truth(time)
+        cos, sin = np.cos(self.heading), np.sin(self.heading)
+        x, y, z = points[..., 0], points[..., 1], points[..., 2]
+        return np.stack(
+            [true["x"] + cos * x - sin * y, true["y"] + sin * x + cos * y, self.axis_height + z],
+            axis=-1,
+        )
+
+    def draw(self, time: float) -> np.ndarray:
+        """The picture at a time, (height, width, 3), 8-bit RGB."""
+        import cv2
+
+        width, height = self.size
+        canvas = np.empty((height * self.fine, width * self.fine, 3), dtype=np.uint8)
+        canvas[:] = self.floor
+        if self.ruler:
+            self._draw_ruler(canvas)
+        self._draw_rotor(canvas, time)
+        self._draw_body(canvas, time)
+        picture = cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA).astype(float)
+        duration = self.frames / self.fps
+        picture *= 1.0 + self.lamp * np.sin(1.5 * np.pi * time / duration)
+        if self.noise:
+            rng = np.random.default_rng([self.seed, round(1e6 * time)])
+            picture += rng.normal(0.0, self.noise, picture.shape)
+        return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
+
+    def _fill(self, canvas: np.ndarray, corners: np.ndarray, colour: Any) -> None:
+        """Fill a polygon given in pixels; a fine cell is centred where its share of the pixel is."""
+        import cv2
+
+        fine = (corners + 0.5) * self.fine - 0.5
+        cv2.fillPoly(canvas, [np.rint(fine * 2**_SHIFT).astype(np.int32)], [int(c) for c in colour], shift=_SHIFT)
+
+    def _draw_ruler(self, canvas: np.ndarray) -> None:
+        reach = 0.5 * max(self.size) * (self.camera_height - self.ruler_height) / self.focal
+        count = int(reach / self.spacing) + 2
+        for index in range(-count, count + 1):
+            x = self.spacing * index + 0.00037
+            for low, high in ((0.024, 0.032), (-0.032, -0.024)):
+                box = np.array([[x - 0.25e-3, low], [x + 0.25e-3, low], [x + 0.25e-3, high], [x - 0.25e-3, high]])
+                corners = np.column_stack([box, np.full(4, self.ruler_height)])
+                self._fill(canvas, self.pixels(corners), self.lines)
+
+    def _draw_rotor(self, canvas: np.ndarray, time: float) -> None:
+        robot, tail = self.robot, self.robot.tail
+        if "coupling" in (outlines := outlines_of(robot)):
+            self._fill(canvas, self._silhouette(outlines["coupling"], time), self.coupling)
+        xi = np.linspace(0.0, tail.length, 1 + int(40 * tail.length / tail.wavelength))
+        radius = amplitude_envelope(
+            xi, *(np.full(1, v) for v in (tail.amplitude, tail.length, np.inf if tail.taper is None else tail.taper))
+        )[0]
+        x = -0.5 * robot.body.length - robot.coupling.length - xi
+        angle = robot.hand * 2 * np.pi / tail.wavelength * x + float(self.truth(time)["tail_phase"])
+        wire = np.stack([x, radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+        wire = np.concatenate([[[x[0] + robot.coupling.length, 0.0, 0.0], [x[0], 0.0, 0.0]], wire])
+        seen = self.placed(wire, time)
+        middle = self.pixels(seen)
+        half = 0.5 * tail.wire_diameter * self.focal / (self.camera_height - seen[:, 2])
+        along = np.diff(middle, axis=0)
+        along /= np.linalg.norm(along, axis=1, keepdims=True) + 1e-300
+        across = np.column_stack([-along[:, 1], along[:, 0]])
+        circle = np.linspace(0.0, 2 * np.pi, 17)[:-1]
+        disc = np.column_stack([np.cos(circle), np.sin(circle)])
+        for index in range(len(along)):
+            ends = middle[index : index + 2], half[index : index + 2, None] * across[index]
+            self._fill(canvas, np.concatenate([ends[0] + ends[1], (ends[0] - ends[1])[::-1]]), self.wire)
+            self._fill(canvas, middle[index + 1] + half[index + 1] * disc, self.wire)
+
+    def _silhouette(self, outline: Any, time: float) -> np.ndarray:
+        """What a solid of revolution covers: convex hull of rings on its surface."""
+        from scipy.spatial import ConvexHull
+
+        t = np.linspace(0.0, 1.0, 25)
+        x, rho = (np.concatenate(part) for part in zip(*(piece.points(t) for piece in outline.pieces), strict=True))
+        around = np.linspace(0.0, 2 * np.pi, 97)[:-1, None]
+        points = np.stack([x + 0 * around, rho * np.cos(around), rho * np.sin(around)], axis=-1).reshape(-1, 3)
+        seen = self.pixels(self.placed(points, time))
+        return seen[ConvexHull(seen).vertices]
+
+    def _draw_body(self, canvas: np.ndarray, time: float) -> None:
+        robot = self.robot
+        self._fill(canvas, self._silhouette(outlines_of(robot)["body"], time), self.body)
+        if robot.seal is None:
+            return
+        stripes = tuple(robot.seal.stripes) if self.stripes is None else tuple(self.stripes)
+        # Ray by ray, as polygons are drawn a little too large.
+        rear, front = -0.5 * robot.body.length, robot.seal.length - 0.5 * robot.body.length
+        radius = 0.5 * robot.body.diameter
+        box = [[x, y, z] for x in (rear, front) for y in (-radius, radius) for z in (-radius, radius)]
+        corners = (self.pixels(self.placed(np.array(box), time)) + 0.5) * self.fine
+        low = np.clip(np.floor(corners.min(axis=0)), 0, None).astype(int)
+        high = np.clip(np.ceil(corners.max(axis=0)), 0, np.array(canvas.shape[1::-1])).astype(int)
+        if np.any(high <= low):
+            return
+        u, v = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
+        sign = 1.0 if self.direction == "right" else -1.0
+        centre, true = 0.5 * (np.array(self.size) - 1.0), self.truth(time)
+        across = sign * ((u + 0.5) / self.fine - 0.5 - centre[0]) / self.focal
+        up = -sign * ((v + 0.5) / self.fine - 0.5 - centre[1]) / self.focal
+        cos, sin = np.cos(self.heading), np.sin(self.heading)
+        eye = np.array([-true["x"], -true["y"]])
+        eye_x, eye_y, eye_z = (
+            cos * eye[0] + sin * eye[1],
+            cos * eye[1] - sin * eye[0],
+            self.camera_height - self.axis_height,
+        )
+        d_x, d_y = cos * across + sin * up, cos * up - sin * across
+        a, b, c = d_y**2 + 1.0, d_y * eye_y - eye_z, eye_y**2 + eye_z**2 - radius**2
+        inside = b**2 - a * c
+        t = (-b - np.sqrt(np.maximum(inside, 0.0))) / a
+        x, y, z = eye_x + t * d_x, eye_y + t * d_y, eye_z - t
+        hit = (inside > 0) & (x >= rear) & (x <= front)
+        canvas[v[hit], u[hit]] = self.seal
+        if stripes:
+            place = (np.arctan2(-y, z) - float(true["body_angle"])) * len(stripes) / (2 * np.pi) + 0.5
+            paints = np.array([self.paints[name] for name in stripes], dtype=np.uint8)
+            canvas[v[hit], u[hit]] = paints[np.floor(place[hit]).astype(int) % len(stripes)]
+
+    def pictures(self) -> Iterator[tuple[float, np.ndarray]]:
+        """Time and picture of each frame that was not dropped."""
+        for time in self.times:
+            yield float(time), self.draw(float(time))
+
+    def setup_text(self, **changes: str) -> str:
+        """What an experimenter would write; `changes` replace lines, such as `robot_direction = '"left"'`."""
+        stripes = self.robot.seal.stripes if self.robot.seal is not None else ()
+        lines = {
+            "camera.view": f'"{self.view}"',
+            "camera.height": f'"{self.camera_height * 1e3!r} mm"',
+            "camera.frames_per_second": f"{float(self.fps)!r}",
+            "markers.spacing": f'"{self.spacing * 1e3!r} mm"',
+            "markers.height": f'"{self.ruler_height * 1e3!r} mm"',
+            "robot.file": '"biorob2012-wide"',
+            "robot.axis_height": f'"{self.axis_height * 1e3!r} mm"',
+            "robot.direction": f'"{self.direction}"',
+            "robot.stripes": str(list(stripes)).replace("'", '"'),
+        }
+        if not self.ruler:
+            del lines["markers.spacing"], lines["markers.height"]
+            scale = (self.camera_height - self.axis_height) / self.focal
+            lines["markers.length_per_pixel"] = f'"{scale * 1e3!r} mm"'
+        lines |= {name.replace("_", ".", 1): text for name, text in changes.items()}
+        return "".join(f"{name} = {text}\n" for name, text in lines.items())
+
+    def write(self, path: Path, **changes: str) -> Path:
+        """Write the film (`.mp4` and the like, or a folder of PNG) and its setup beside it; the setup's path."""
+        if path.suffix:
+            self._write_film(path)
+        else:
+            self._write_folder(path)
+        setup = path.with_name(path.stem + ".setup.toml")
+        setup.write_text(self.setup_text(**changes))
+        return setup
+
+    def _write_film(self, path: Path) -> None:
+        import av
+
+        rate = Fraction(self.fps).limit_denominator(1000)
+        tick = 1 / (rate * 512)
+        with av.open(str(path), "w") as container:
+            stream: Any = container.add_stream("libx264", rate=rate, options={"crf": "14", "preset": "veryfast"})
+            stream.width, stream.height, stream.pix_fmt = *self.size, "yuv420p"
+            stream.time_base = stream.codec_context.time_base = tick
+            for time, picture in self.pictures():
+                frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+                frame.pts, frame.time_base = round(time / tick), tick
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+
+    def _write_folder(self, path: Path) -> None:
+        import cv2
+
+        path.mkdir()
+        for time, picture in self.pictures():
+            cv2.imwrite(str(path / f"{round(time * self.fps):05d}.png"), picture[..., ::-1])
+
+
+def flat(**changes: Any) -> Flat:
+    """A flat film with some things changed."""
+    return replace(Flat(), **changes)

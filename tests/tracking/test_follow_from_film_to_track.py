@@ -1,0 +1,114 @@
+"""Whole films: what is true of a drawn robot is measured, and what is wrong with a film is said."""
+
+import numpy as np
+import pytest
+
+from spirillum.errors import InputError
+from spirillum.tracking.camera import scale_of
+from spirillum.tracking.follow import Seen, follow
+from spirillum.tracking.setup import load_setup
+
+pytest.importorskip("av")
+pytest.importorskip("cv2")
+
+
+def track(film, folder, *, name="a.mp4", **changes):
+    setup, robot = load_setup(film.write(folder / name, **changes))
+    return follow(folder / name, setup, robot)
+
+
+def slope(time, values):
+    seen = np.isfinite(values)
+    return np.polyfit(time[seen], values[seen], 1)[0]
+
+
+@pytest.fixture(scope="module")
+def swimmer(flat_pictures, tmp_path_factory):
+    """11 pixels in 24 frames, with 4 frames a second; and its film."""
+    turning = {"body_rate": -0.4, "tail_rate": 3.0}
+    film = flat_pictures.Flat(
+        frames=24, fps=4.0, velocity=1e-3, direction="left", view="side", lamp=0.1, noise=2.0, **turning
+    )
+    path = tmp_path_factory.mktemp("swimmer") / "a.mp4"
+    film.write(path)
+    return film, path
+
+
+def test_speed_and_direction_from_the_side_and_to_the_left(swimmer):
+    film, path = swimmer
+    setup, robot = load_setup(path.with_name("a.setup.toml"))
+    seen: list[Seen] = []
+    done: list[int] = []
+    found = follow(
+        path,
+        setup,
+        robot,
+        progress=lambda count, total: done.append(count),
+        on_frame=lambda index, image, state: seen.append(state),
+    )
+    true = film.truth(found.time)
+    assert slope(found.time, found.position[:, 0]) == pytest.approx(1e-3, rel=5e-3)
+    assert found.heading == pytest.approx(0.0, abs=0.02)
+    pixel = found.scale.length_per_pixel
+    assert found.position[:, 0] == pytest.approx(true["x"], abs=0.7 * pixel)  # the middle of the picture is x = 0
+    assert np.nanmedian(found.position_error) < 0.1 * pixel
+    assert pixel == pytest.approx((0.2 - 0.015) / 350.0, rel=1e-3)
+    assert found.size == (320, 240)
+    assert done == list(range(1, 25))
+    assert [state.time for state in seen] == found.time.tolist()
+    assert found.picture[0, 2] < found.picture[0, 0]  # the nose is on the left
+    assert not [flag for flag in found.flags if flag.spoils]
+
+
+def test_only_the_scale(swimmer):
+    _, path = swimmer
+    setup, _ = load_setup(path.with_name("a.setup.toml"))
+    sight, video = scale_of(path, setup)
+    assert sight.scale.length_per_pixel == pytest.approx((0.2 - 0.015) / 350.0, rel=1e-3)
+    assert video.size == (320, 240)
+
+
+def test_a_robot_that_leaves_is_kept_as_far_as_it_was_seen(flat_pictures, tmp_path):
+    film = flat_pictures.Flat(frames=16, fps=3.0, start=(0.03, 0.0), velocity=0.02, body_rate=0.1, tail_rate=0.5)
+    found = track(film, tmp_path)
+    assert "robot-left-the-view" in [flag.name for flag in found.flags]
+    seen = np.isfinite(found.position[:, 0])
+    assert seen[:4].all()
+    assert not seen[-3:].any()
+    whole = seen & (film.truth(found.time)["x"] < 0.06)
+    assert slope(found.time[whole], found.position[whole, 0]) == pytest.approx(0.02, rel=0.01)
+
+
+def test_a_nose_on_the_other_side_gives_no_numbers(flat_pictures, tmp_path):
+    found = track(flat_pictures.Flat(frames=4), tmp_path, robot_direction='"left"')
+    flag = next(flag for flag in found.flags if flag.name == "nose-on-the-other-side")
+    assert "forward_velocity" in flag.spoils
+
+
+def test_two_robots_give_no_numbers(flat_pictures, tmp_path):
+    cv2 = pytest.importorskip("cv2")
+    one = flat_pictures.Flat(frames=4, fps=5.0, start=(0.02, 0.012), velocity=2e-3)
+    other = flat_pictures.Flat(frames=4, fps=5.0, start=(0.0, -0.012), velocity=5e-3)
+    floor = flat_pictures.Flat(start=(1.0, 0.0)).draw(0.0).astype(int)
+    for index, (time, picture) in enumerate(one.pictures()):
+        second = other.draw(time)
+        here = np.abs(second - floor).sum(axis=2) > 6
+        picture[here] = second[here]
+        (tmp_path / "film").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / "film" / f"{index}.png"), picture[:, :, ::-1])
+    (tmp_path / "film.setup.toml").write_text(one.setup_text())
+    setup, robot = load_setup(tmp_path / "film.setup.toml")
+    found = follow(tmp_path / "film", setup, robot)
+    flag = next(flag for flag in found.flags if flag.name == "two-robots")
+    assert "forward_velocity" in flag.spoils
+
+
+def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
+    empty = flat_pictures.Flat(frames=2, start=(1.0, 0.0), noise=4.0)
+    with pytest.raises(InputError, match="no robot like 'biorob2012-wide'"):
+        track(empty, tmp_path)
+    bare = flat_pictures.Flat(frames=1, ruler=False)
+    setup = bare.write(tmp_path / "b.mp4")
+    setup.write_text(flat_pictures.Flat().setup_text())
+    with pytest.raises(InputError, match="shows no ruler"):
+        follow(tmp_path / "b.mp4", *load_setup(setup))

@@ -1,0 +1,137 @@
+"""The angle that stripes are drawn at is the angle that is read."""
+
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.optics import Optics, Pose, optics_of
+from spirillum.tracking.roll import Stripes
+from spirillum.tracking.setup import load_setup
+
+PRESET = ("red", "yellow", "green", "blue") * 2
+
+
+def learnt(film: Any, folder: Path, **changes: str) -> tuple[Stripes, list[tuple[np.ndarray, Pose]], np.ndarray]:
+    path = folder / "setup.toml"
+    path.write_text(film.setup_text(**changes))
+    setup, robot = load_setup(path)
+    optics = optics_of(setup, film.size, film.focal)
+    true = film.truth(film.times)
+    pictures = [
+        (picture, Pose(float(x), float(y), film.heading))
+        for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
+    ]
+    stripes = Stripes(robot, setup, optics)
+    stripes.learn(pictures)
+    return stripes, pictures, true["body_angle"]
+
+
+def errors(
+    stripes: Stripes, pictures: list[tuple[np.ndarray, Pose]], angle: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    read = np.array([stripes.read(*picture) for picture in pictures])
+    half = 0.5 * stripes.period
+    return (read[:, 0] - angle + half) % stripes.period - half, read[:, 1]
+
+
+def film(flat_pictures: ModuleType, **changes: Any) -> Any:
+    """Frames spread over half a turn."""
+    known = {"frames": 8, "fps": 4.0, "body_rate": -np.pi / 2, "size": (480, 200), "focal": 560.0, "fine": 5}
+    return flat_pictures.flat(**(known | changes))
+
+
+@pytest.mark.parametrize("look", [{}, {"direction": "left", "view": "side", "heading": 0.03, "start": (0.02, 0.006)}])
+def test_angles_have_no_bias_beyond_a_third_of_a_degree(flat_pictures: ModuleType, tmp_path: Path, look: Any) -> None:
+    stripes, pictures, angle = learnt(film(flat_pictures, **look), tmp_path)
+    missed, error = errors(stripes, pictures, angle)
+    assert stripes.flags == ()
+    assert np.degrees(np.max(np.abs(missed))) < 0.3
+    assert np.all(error < np.deg2rad(0.3))
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        ("black", "white") * 4,
+        ("red", "yellow", "green", "blue", "white", "black", "orange", "cyan"),
+    ],
+)
+def test_other_patterns_read_as_well(flat_pictures: ModuleType, tmp_path: Path, order: tuple[str, ...]) -> None:
+    said = str(list(order)).replace("'", '"')
+    stripes, pictures, angle = learnt(film(flat_pictures, stripes=order, body_rate=-1.1), tmp_path, robot_stripes=said)
+    missed, _ = errors(stripes, pictures, angle)
+    assert stripes.flags == ()
+    assert stripes.period == pytest.approx(pattern_period(order))
+    assert np.degrees(np.max(np.abs(missed))) < 0.5
+
+
+def test_noise_and_a_drifting_lamp_leave_errors_as_large_as_said(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    stripes, pictures, angle = learnt(film(flat_pictures, noise=8.0, lamp=0.2, frames=24, fine=3), tmp_path)
+    missed, error = errors(stripes, pictures, angle)
+    assert np.degrees(np.abs(missed.mean())) < 0.3
+    assert 0.3 < np.sqrt(np.mean((missed / error) ** 2)) < 3.0
+
+
+def test_glare_on_a_part_of_the_seal_does_not_mislead(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    drawn = film(flat_pictures)
+    stripes, pictures, angle = learnt(drawn, tmp_path)
+    bright = []
+    for picture, pose in pictures:
+        shown = picture.copy()
+        centre = drawn.pixels(np.array([pose.x - 0.012, pose.y + 0.003, drawn.axis_height]))
+        v, u = np.mgrid[: shown.shape[0], : shown.shape[1]]
+        shown[(u - centre[0]) ** 2 + (v - centre[1]) ** 2 < 8**2] = 255
+        bright.append((shown, pose))
+    missed, _ = errors(stripes, bright, angle)
+    assert np.degrees(np.max(np.abs(missed))) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("order", "word"), [(PRESET[::-1], "reversed"), (("red", "green", "yellow", "blue") * 2, "another")]
+)
+def test_a_wrong_order_is_said_and_spoils_the_rate(
+    flat_pictures: ModuleType, tmp_path: Path, order: tuple[str, ...], word: str
+) -> None:
+    said = str(list(order)).replace("'", '"')
+    stripes, _, _ = learnt(film(flat_pictures), tmp_path, robot_stripes=said)
+    (flag,) = stripes.flags
+    assert flag.name == "stripe-order"
+    assert flag.spoils == ("body_rotation_rate",)
+    assert word in flag.sentence
+
+
+def test_an_even_picture_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    stripes, pictures, _ = learnt(film(flat_pictures), tmp_path)
+    rng = np.random.default_rng(3)
+    for level in (np.full(pictures[0][0].shape, 120.0), rng.uniform(0, 255, pictures[0][0].shape)):
+        assert np.isnan(stripes.read(level.astype(np.uint8), pictures[0][1])).all()
+
+
+def test_stripes_out_of_the_picture_are_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    stripes, pictures, _ = learnt(film(flat_pictures), tmp_path)
+    assert np.isnan(stripes.read(pictures[0][0], Pose(-0.5, 0.0, 0.0))).all()
+
+
+def test_periods_of_patterns() -> None:
+    assert pattern_period(PRESET) == pytest.approx(np.pi)
+    assert pattern_period(("black", "white") * 3) == pytest.approx(2 * np.pi / 3)
+    assert pattern_period(("red", "white", "white")) == pytest.approx(2 * np.pi)
+
+
+def test_a_robot_without_stripes_says_so(flat_pictures: ModuleType) -> None:
+    from spirillum.robot.load import load
+    from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
+
+    setup = Setup(
+        camera=CameraSetup(height="200 mm"),
+        markers=Markers(length_per_pixel="0.3 mm"),
+        robot=RobotSetup(file="biorob2012-wide", axis_height="10 mm"),
+    )
+    robot = load("biorob2012-wide", seal="none")
+    stripes = Stripes(robot, setup, Optics(size=(64, 64), focal=100.0, height=0.2, axis_height=0.01))
+    stripes.learn([(np.zeros((64, 64, 3), dtype=np.uint8), Pose(0.0, 0.0, 0.0))])
+    assert [flag.name for flag in stripes.flags] == ["no-stripes"]

@@ -1,0 +1,97 @@
+"""The phase that a wire is drawn at is the phase that is read."""
+
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.robot.load import load
+from spirillum.tracking.optics import Pose, optics_of
+from spirillum.tracking.setup import load_setup
+from spirillum.tracking.tail import Wire
+
+
+def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tuple[np.ndarray, Pose]], np.ndarray]:
+    path = folder / "setup.toml"
+    path.write_text(film.setup_text())
+    setup, robot = load_setup(path)
+    if robot_changes:
+        robot = load("biorob2012-wide", **robot_changes)
+    true = film.truth(film.times)
+    pictures = [
+        (picture, Pose(float(x), float(y), film.heading))
+        for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
+    ]
+    wire = Wire(robot, setup, optics_of(setup, film.size, film.focal))
+    wire.learn(pictures[::2])
+    return wire, pictures, true["tail_phase"]
+
+
+def errors(wire: Wire, pictures: list[tuple[np.ndarray, Pose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    read = np.array([wire.read(*picture) for picture in pictures])
+    return (read[:, 0] - phase + np.pi) % (2 * np.pi) - np.pi, read[:, 1]
+
+
+def film(flat_pictures: ModuleType, **changes: Any) -> Any:
+    known = {"frames": 24, "size": (480, 160), "focal": 560.0, "fine": 3, "tail_rate": 2 * np.pi * 1.3}
+    return flat_pictures.flat(**(known | changes))
+
+
+LOOKS: list[dict[str, Any]] = [
+    {},
+    {"direction": "left", "view": "side", "heading": -0.03, "start": (0.02, 0.005)},
+    {"floor": (30, 34, 60), "wire": (190, 150, 90)},
+]
+
+
+@pytest.mark.parametrize("look", LOOKS)
+def test_phases_are_read_to_a_hundredth_of_a_radian(flat_pictures: ModuleType, tmp_path: Path, look: Any) -> None:
+    wire, pictures, phase = learnt(film(flat_pictures, **look), tmp_path)
+    missed, error = errors(wire, pictures, phase)
+    assert wire.flags == ()
+    assert wire.handedness() == 1
+    assert np.max(np.abs(missed)) < 0.01
+    assert np.sqrt(np.mean((missed / error) ** 2)) < 2.0
+
+
+def test_noise_and_bubbles_leave_errors_as_large_as_said(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    import cv2
+
+    wire, pictures, phase = learnt(film(flat_pictures, noise=14.0, lamp=0.2), tmp_path)
+    rng = np.random.default_rng(5)
+    for picture, _ in pictures:
+        for u, v in rng.uniform((20, 60), (200, 100), (4, 2)):
+            cv2.circle(picture, (int(u), int(v)), 5, (255, 255, 255), 1)
+    missed, error = errors(wire, pictures, phase)
+    assert np.isfinite(missed).all()
+    assert 0.2 < np.sqrt(np.mean((missed / error) ** 2)) < 3.0
+
+
+def test_perspective_shows_a_wrong_hand(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    wire, pictures, phase = learnt(film(flat_pictures), tmp_path, **{"tail.handedness": "left"})
+    errors(wire, pictures, phase)
+    assert wire.handedness() == -1
+    assert [flag.name for flag in wire.flags] == ["handedness"]
+    assert wire.flags[0].spoils == ("tail_rotation_rate",)
+
+
+@pytest.mark.parametrize("change", [{"tail.wavelength": "20 mm"}, {"tail.wavelength": "32 mm"}])
+def test_a_tail_of_another_wavelength_does_not_fit(flat_pictures: ModuleType, tmp_path: Path, change: Any) -> None:
+    wire, _, _ = learnt(film(flat_pictures), tmp_path, **change)
+    assert wire.flags[0].name == "tail-does-not-fit"
+    assert "25 mm" in wire.flags[0].sentence or "24 mm" in wire.flags[0].sentence or "26 mm" in wire.flags[0].sentence
+
+
+def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    drawn = film(flat_pictures, wire=(150, 190, 170), noise=3.0)
+    wire, pictures, phase = learnt(drawn, tmp_path)
+    missed, _ = errors(wire, pictures, phase)
+    assert np.isnan(missed).mean() > 0.9
+    assert any("tail_rotation_rate" in flag.spoils for flag in wire.flags)
+
+
+def test_a_tail_out_of_view_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
+    wire, pictures, _ = learnt(film(flat_pictures, frames=8), tmp_path)
+    assert np.isnan(wire.read(pictures[0][0], Pose(-0.1, 0.0, 0.0))).all()

@@ -1,0 +1,115 @@
+"""Angles that go on have the rate that was put in; rates that cannot be known are said."""
+
+import numpy as np
+import pytest
+
+from spirillum.robot.load import load
+from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
+from spirillum.tracking.unwrapping import contradictions, nyquist, unwrapped
+
+FPS = 30.0
+TURN = 2 * np.pi
+
+
+def series(rate: float, *, noise: float = 0.02, period: float = TURN, count: int = 600) -> tuple[np.ndarray, ...]:
+    rng = np.random.default_rng(7)
+    time = np.arange(count) / FPS
+    angle = 0.4 + rate * time
+    return time, angle, (angle + rng.normal(0.0, noise, count)) % period, np.full(count, noise)
+
+
+@pytest.mark.parametrize("rate", [-31.4, -2.0, -0.06, 0.0, 0.06, 7.5, 31.4, 80.0])
+def test_angles_go_on_at_their_rate(rate: float) -> None:
+    time, angle, read, error = series(rate)
+    found, flags = unwrapped(time, read, error, TURN)
+    assert flags == ()
+    turns = (found - angle) / TURN
+    assert np.ptp(np.round(turns)) == 0
+    assert np.nanmax(np.abs(found - angle - TURN * np.round(turns[0]))) < 0.1
+
+
+def test_gaps_and_stray_readings_cost_no_turn() -> None:
+    time, angle, read, error = series(25.0)
+    rng = np.random.default_rng(2)
+    kept = rng.random(time.size) > 0.1
+    kept[200:245] = False
+    stray = rng.random(time.size) < 0.05
+    read[stray] = rng.uniform(0.0, TURN, stray.sum())
+    read[rng.random(time.size) < 0.05] = np.nan
+    found, flags = unwrapped(time[kept], read[kept], error[kept], TURN, "tail")
+    missed = found - angle[kept]
+    assert flags == ()
+    good = np.isfinite(missed) & ~stray[kept]
+    assert good.sum() > 0.85 * np.sum(~stray[kept] & np.isfinite(read[kept]))
+    assert np.ptp(missed[good]) < 0.2
+    assert np.nanmax(np.abs(missed - np.nanmedian(missed))) < 0.35 * TURN
+
+
+def test_a_rate_that_changes_is_followed() -> None:
+    time = np.arange(600) / FPS
+    angle = 20.0 * (time + 4.0 * np.exp(-time / 4.0)) + 0.3 * np.sin(3.0 * time)
+    found, flags = unwrapped(time, angle % TURN, np.full(600, 0.01), TURN)
+    assert flags == ()
+    assert np.ptp(found - angle) < 1e-6
+
+
+@pytest.mark.parametrize("share", [0.47, 0.5, -0.49])
+def test_a_step_near_half_a_period_is_doubtful(share: float) -> None:
+    time, _, read, error = series(share * np.pi * FPS, period=np.pi)
+    _, (flag,) = unwrapped(time, read, error, np.pi, "body")
+    assert flag.name == "aliased-body"
+    assert flag.spoils == ("body_rotation_rate",)
+
+
+def test_angles_without_order_are_no_rotation() -> None:
+    time = np.arange(300) / FPS
+    read = np.random.default_rng(1).uniform(0.0, TURN, 300)
+    _, flags = unwrapped(time, read, np.full(300, 0.1), TURN, "tail")
+    assert any(flag.name == "aliased-tail" and flag.spoils == ("tail_rotation_rate",) for flag in flags)
+
+
+def test_uneven_times_betray_a_rate_beyond_the_limit() -> None:
+    rng = np.random.default_rng(4)
+    time = (np.arange(300) + rng.uniform(-0.2, 0.2, 300)) / FPS
+    _, flags = unwrapped(time, (TURN * 31.0 * time) % TURN, np.full(300, 0.02), TURN, "tail")
+    assert [flag.name for flag in flags] == ["aliased-tail"]
+    assert "31" in flags[0].sentence
+    assert unwrapped(time, (TURN * 3.0 * time) % TURN, np.full(300, 0.02), TURN, "tail")[1] == ()
+
+
+def test_a_long_gap_may_hide_turns() -> None:
+    time, _, read, error = series(25.0)
+    read[100:500] = np.nan
+    _, flags = unwrapped(time, read, error, TURN, "tail")
+    assert "tail-turns-lost" in [flag.name for flag in flags]
+
+
+def test_nothing_read_is_nothing_given() -> None:
+    found, (flag,) = unwrapped(np.arange(10.0), np.full(10, np.nan), np.full(10, np.nan), TURN, "tail")
+    assert np.isnan(found).all()
+    assert flag.spoils == ("tail_rotation_rate",)
+
+
+def test_body_and_tail_cannot_turn_the_same_way() -> None:
+    robot = load("biorob2012-wide")
+    time = np.arange(300) / FPS
+    forward, back, still = 0.01 * time, -0.01 * time, 0.0 * time
+    assert contradictions(time, -0.7 * time, 7.0 * time, forward, robot) == ()
+    assert contradictions(time, still, -7.0 * time, back, robot) == ()
+    for hand, name in ((0, "handedness"), (1, "aliased-tail")):
+        (flag,) = contradictions(time, -0.7 * time, -7.0 * time, forward, robot, hand)
+        assert flag.name == name
+        assert "tail_rotation_rate" in flag.spoils
+    (flag,) = contradictions(time, np.full(300, np.nan), -7.0 * time, forward, robot)
+    assert flag.name == "aliased-tail"
+
+
+def test_largest_rates_are_half_a_period_a_frame() -> None:
+    setup = Setup(
+        camera=CameraSetup(height="200 mm"),
+        markers=Markers(length_per_pixel="0.3 mm"),
+        robot=RobotSetup(file="biorob2012-wide", axis_height="10 mm"),
+    )
+    robot = load("biorob2012-wide")
+    assert nyquist(setup, robot, 30.0) == pytest.approx((30.0 * np.pi, 15.0 * np.pi))
+    assert np.isnan(nyquist(setup, load("biorob2012-wide", seal="none"), 30.0).body)
