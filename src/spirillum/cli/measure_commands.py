@@ -1,0 +1,128 @@
+"""The command `spirillum measure`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from spirillum.cli.inputs import overrides_from
+from spirillum.cli.options import Json, Settings
+
+__all__ = ["measure"]
+
+_Rate = typer.Option(metavar="RATE", help="Feasibility: expected rate, such as 1.2Hz; else predicted.")
+
+
+def measure(
+    videos: Annotated[
+        list[Path] | None, typer.Argument(metavar="VIDEO...", help="Films or folders of images, one a trial.")
+    ] = None,
+    setup: Annotated[Path | None, typer.Option(metavar="FILE", help="Setup file (TOML); see `setup new`.")] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
+        "spirillum-measurement"
+    ),
+    marks: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Readings by hand (CSV); they replace what is seen on their frames."),
+    ] = None,
+    no_tracking: Annotated[
+        bool, typer.Option("--no-tracking", help="Readings by hand alone; the video gives scale and times.")
+    ] = False,
+    track: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Positions from trackpy or DeepLabCut (CSV) instead of ours.")
+    ] = None,
+    no_annotated: Annotated[bool, typer.Option("--no-annotated", help="Write no annotated video.")] = False,
+    no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw no figures and write no report.")] = False,
+    start: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Time in the video from which on to measure, such as 2s.")
+    ] = None,
+    end: Annotated[str | None, typer.Option(metavar="TIME", help="Time until which to measure.")] = None,
+    feasibility: Annotated[
+        bool, typer.Option("--feasibility", help="Before an experiment: does this camera resolve the expected rates?")
+    ] = False,
+    expect_tail_rate: Annotated[str | None, _Rate] = None,
+    expect_body_rate: Annotated[str | None, _Rate] = None,
+    expect_speed: Annotated[
+        str | None, typer.Option(metavar="VELOCITY", help="Feasibility: expected speed, such as 1mm/s; else predicted.")
+    ] = None,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Feasibility: length of a trial; else 20s.")
+    ] = None,
+    fps: Annotated[float | None, typer.Option(help="Feasibility: frames a second; else the setup's, or 30.")] = None,
+    view_width: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Feasibility: width of the view at the robot's axis.")
+    ] = None,
+    width: Annotated[int, typer.Option(help="Feasibility: width of the picture, pixels.")] = 640,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Measure speed and rotation rates in videos, each a trial, with 95 % intervals.
+
+    Example: `spirillum measure trial-1.mp4 trial-2.mp4 --setup setup.toml -o measured`
+    """
+    from spirillum.cli import measure_text, text
+    from spirillum.errors import InputError
+
+    if setup is None:
+        raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
+    overrides = overrides_from(settings)
+    if feasibility:
+        from spirillum.measurement.feasibility import feasibility as verdict
+
+        if videos and len(videos) > 1:
+            raise InputError(f"--feasibility with {len(videos)} videos; allowed: none, or one that shows the ruler")
+        found = verdict(
+            setup,
+            tail_rate=expect_tail_rate,
+            body_rate=expect_body_rate,
+            speed=expect_speed,
+            duration=duration,
+            frames_per_second=fps,
+            view_width=view_width,
+            picture_width=width,
+            video=videos[0] if videos else None,
+            overrides=overrides,
+        )
+        text.show(found.to_dict(), measure_text.feasibility, json=json)
+        if not found.feasible:
+            raise typer.Exit(1)
+        return
+    _check_no_expectations(expect_tail_rate, expect_body_rate, expect_speed, duration, fps, view_width)
+    from spirillum.measurement.measure import measure as answer
+
+    with text.progress_bar(quiet=json) as progress:
+        result = answer(
+            videos or [],
+            setup,
+            output,
+            marks=marks,
+            track=track,
+            tracking=not no_tracking,
+            annotated=not no_annotated,
+            figures=not no_figures,
+            start=_time("start", start),
+            end=_time("end", end),
+            overrides=overrides,
+            progress=progress,
+        )
+    text.show(result.to_dict(), measure_text.measurement, json=json)
+    if result.failures:
+        video, sentence = result.failures[0]
+        more = "" if len(result.failures) == 1 else f" (and {len(result.failures) - 1} more)"
+        where = "" if Path(video).name in sentence else f"{video}: "
+        raise InputError(f"{where}{sentence}{more}")
+
+
+def _check_no_expectations(*given: object) -> None:
+    from spirillum.errors import InputError
+
+    if any(item is not None for item in given):
+        raise InputError("--expect-..., --duration, --fps and --view-width without --feasibility; allowed: with it")
+
+
+def _time(name: str, value: str | None) -> float | None:
+    from spirillum.units import KINDS, parse_option
+
+    return None if value is None else parse_option(name, value, KINDS["time"])

@@ -1,0 +1,309 @@
+"""Before an experiment: whether a camera resolves the expected rates, and what uncertainty to expect."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.measurement.depth import depth_shares
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.setup import Setup, load_setup
+from spirillum.units import KINDS, Hz, parse_option
+
+__all__ = ["Check", "Feasibility", "feasibility"]
+
+_FRAMES_PER_SECOND = 30.0
+_WIDTH = 640
+_DURATION = 20.0
+_POSITION_ERROR = 0.05
+"""Error of the position on a frame, pixels."""
+_EDGE_ERROR = 0.25
+"""Error of a stripe's edge on a frame, pixels of the body's circumference."""
+_WAVE_ERROR = 0.1
+"""Error of the wire across the axis on a frame, pixels."""
+_STRIPE_ERROR = math.radians(0.2)
+"""Usual size of errors that come back with every stripe, rad."""
+_TOGETHER = 4.0
+"""Frames whose errors hang together, of position and wire."""
+_EDGE_TOGETHER = 20.0
+"""The same of the stripes' edges."""
+_NORMAL = 1.959964
+_SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
+"""Fewest pixels with which the trackers' tests have been passed with room to spare."""
+_BASIS = (
+    f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
+    f"{_WAVE_ERROR:g} pixels of the wire across; {_TOGETHER:g} neighbouring frames err alike, "
+    f"{_EDGE_TOGETHER:g} of the stripes. Orders of magnitude of clean synthetic films, not of your camera"
+)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that has to hold."""
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    passed: bool
+    decides: bool
+    """Whether a rate cannot be resolved if it fails; others only warn."""
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        return {
+            "name": self.name,
+            "value": quantity(self.value, self.unit),
+            "limit": quantity(self.limit, self.unit),
+            "passed": self.passed,
+            "decides": self.decides,
+            "sentence": self.sentence,
+        }
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """What to expect of an experiment."""
+
+    robot: Robot
+    setup: str
+    expected: Mapping[str, tuple[float, str]]
+    """What is expected: value in SI and where it is from."""
+    checks: tuple[Check, ...]
+    intervals: Mapping[str, tuple[float, float]]
+    """Half width of the 95 % interval that one trial is expected to have, and that share of the value."""
+    shares: Mapping[str, float]
+    """Relative standard uncertainty of lengths by what it comes from."""
+    warnings: tuple[str, ...]
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all rates can be resolved."""
+        return all(check.passed for check in self.checks if check.decides)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        units = {"forward_velocity": "m/s", "duration": "s", "frames_per_second": "1/s", "length_per_pixel": "m"}
+        expected = {
+            name: quantity(value, units.get(name, "rad/s"), source=source)
+            for name, (value, source) in self.expected.items()
+        }
+        intervals = {
+            name: {
+                "half_width": quantity(reach, units.get(name, "rad/s")),
+                "share": share if math.isfinite(share) else None,
+            }
+            for name, (reach, share) in self.intervals.items()
+        }
+        content = {
+            "robot": self.robot.name,
+            "setup": self.setup,
+            "feasible": self.feasible,
+            "expected": expected,
+            "checks": [check.to_dict() for check in self.checks],
+            "intervals": intervals,
+            "scale_uncertainty": math.sqrt(sum(share**2 for share in self.shares.values())),
+            "scale_sources": dict(self.shares),
+            "basis": _BASIS,
+        }
+        return envelope("feasibility", content, self.warnings)
+
+
+def feasibility(
+    setup: str | Path,
+    *,
+    tail_rate: str | float | None = None,
+    body_rate: str | float | None = None,
+    speed: str | float | None = None,
+    duration: str | float | None = None,
+    frames_per_second: float | None = None,
+    view_width: str | float | None = None,
+    picture_width: int = _WIDTH,
+    video: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+) -> Feasibility:
+    """Whether a camera resolves what a robot is expected to do, and how well.
+
+    Args:
+        setup: the setup file.
+        tail_rate: expected rate of the tail; unset: predicted by the model `sbt`, as are those that follow.
+        body_rate: expected rate of the body.
+        speed: expected forward velocity.
+        duration: length of a trial; unset: 20 s.
+        frames_per_second: of the camera; unset: the setup's, else 30.
+        view_width: width of what the picture shows at the height of the axis, instead of a scale from the setup.
+        picture_width: width of the picture, pixels.
+        video: a film or folder that shows the ruler, from which the scale is found.
+        overrides: dotted fields of the robot, as for `spirillum.load`.
+
+    Raises:
+        InputError: if a field is wrong, or the robot's motion cannot be predicted and is not given.
+    """
+    chosen, robot = load_setup(setup)
+    if overrides:
+        beside = Path(setup).parent / chosen.robot.file
+        robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
+    expected = _expected(robot, tail_rate, body_rate, speed)
+    rate = frames_per_second or chosen.camera.frames_per_second or _FRAMES_PER_SECOND
+    if not 0.01 <= rate <= 1e5:
+        raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
+    span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
+    if span <= 0:
+        raise InputError(f"duration = {span:g} s; allowed: more than 0 s")
+    if not 32 <= picture_width <= 100_000:
+        raise InputError(f"width = {picture_width}; allowed: 32 to 100000 pixels")
+    pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, picture_width, video)
+    expected |= {"duration": (span, "assumed" if duration is None else "given"), "frames_per_second": (rate, "camera")}
+    expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
+    stripes = chosen.robot.stripes or (robot.seal.stripes if robot.seal else ())
+    shares = depth_shares(chosen)
+    checks = [*_rates(expected, rate, tuple(stripes)), *_pixels(chosen, robot, pixel, len(stripes))]
+    checks += _views(expected, robot, pixel, width, span)
+    warnings = [check.sentence for check in checks if not check.passed]
+    if not math.isfinite(pixel):
+        warnings.append(
+            "nothing says how large a pixel is, so sizes in the picture and intervals are not given; allowed: "
+            "--view-width, markers.length_per_pixel, or a VIDEO that shows the ruler"
+        )
+    if not shares:
+        warnings.append("the setup gives no uncertainty of heights: 10 mm of depth can be 7 % of a length")
+    intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, span)
+    return Feasibility(robot, str(setup), expected, tuple(checks), intervals, shares, tuple(warnings))
+
+
+def _expected(
+    robot: Robot, tail_rate: str | float | None, body_rate: str | float | None, speed: str | float | None
+) -> dict[str, tuple[float, str]]:
+    given: dict[str, float | None] = {
+        "forward_velocity": None if speed is None else parse_option("expect-speed", speed, KINDS["velocity"]),
+        "body_rotation_rate": None if body_rate is None else parse_option("expect-body-rate", body_rate, KINDS["rate"]),
+        "tail_rotation_rate": None if tail_rate is None else parse_option("expect-tail-rate", tail_rate, KINDS["rate"]),
+    }
+    found = {name: (value, "given") for name, value in given.items() if value is not None}
+    if len(found) < len(given):
+        from spirillum.motion.prediction import predict
+
+        try:
+            answer = predict(robot, model="sbt", tail_rate=given["tail_rotation_rate"])
+        except InputError as error:
+            raise InputError(
+                f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all"
+            ) from error
+        for name in given:
+            found.setdefault(name, (float(getattr(answer, name)), "predicted by sbt"))
+    return {name: found[name] for name in given}
+
+
+def _pixel(
+    setup: Setup, folder: Path, view_width: str | float | None, width: int, video: str | Path | None
+) -> tuple[float, str, int]:
+    """Length per pixel at the height of the axis, where it is from, and the picture's width in pixels."""
+    if view_width is not None:
+        return parse_option("view-width", view_width, KINDS["length"]) / width, "view width", width
+    if video is not None:
+        from spirillum.tracking.follow import scale_of
+
+        found, film = scale_of(video, setup, folder=folder)
+        return found.scale.length_per_pixel, "ruler in the video", film.size[0]
+    if setup.markers.length_per_pixel is not None:
+        return setup.markers.length_per_pixel, "setup", width
+    return math.nan, "", width
+
+
+def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tuple[str, ...]) -> list[Check]:
+    found = []
+    tail, body = abs(expected["tail_rotation_rate"][0]), abs(expected["body_rotation_rate"][0])
+    limits = [("tail-rate", "tail", tail, 0.5 * rate * Hz, "a helix looks the same after a turn")]
+    if stripes:
+        share = pattern_period(stripes) / Hz
+        limits.append(
+            ("body-rate", "body", body, 0.5 * rate * share * Hz, f"the stripes repeat after {share:.3g} turns")
+        )
+    else:
+        sentence = "the robot has no stripes: the body's rotation cannot be seen"
+        found.append(Check("body-rate", body, 0.0, "rad/s", passed=False, decides=True, sentence=sentence))
+    for name, part, value, limit, why in limits:
+        passed = value < limit
+        verdict = "below" if passed else "not below"
+        sentence = (
+            f"the {part} turns {value / Hz:.4g} times a second, {verdict} the {limit / Hz:.4g} that {rate:g} frames a "
+            f"second resolve ({why})"
+        )
+        found.append(Check(name, value, limit, "rad/s", passed, decides=True, sentence=sentence))
+    return found
+
+
+def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Check]:
+    if not math.isfinite(pixel):
+        return []
+    sizes = {
+        "wire": ("the wire", robot.tail.wire_diameter),
+        "amplitude": ("the helix's amplitude", robot.tail.amplitude),
+    }
+    if stripes:
+        sizes["stripe"] = ("a stripe that faces the camera", math.pi * robot.body.diameter / stripes)
+    if setup.markers.spacing is not None:
+        sizes["spacing"] = ("the ruler's spacing", setup.markers.spacing)
+    found = []
+    for name, (words, length) in sizes.items():
+        value, limit = length / pixel, _SMALLEST[name]
+        passed = value >= limit
+        sentence = f"{words} is {value:.3g} pixels wide, {'at least' if passed else 'fewer than'} {limit:g}"
+        found.append(Check(f"{name}-pixels", value, limit, "1", passed, decides=False, sentence=sentence))
+    return found
+
+
+def _views(
+    expected: Mapping[str, tuple[float, str]], robot: Robot, pixel: float, width: int, span: float
+) -> list[Check]:
+    if not math.isfinite(pixel):
+        return []
+    view, length = pixel * width, robot.body.length + robot.coupling.length + robot.tail.length
+    room, speed = max(view - length, 0.0), abs(expected["forward_velocity"][0])
+    time = room / speed if speed > 0 else 1e9
+    passed = time >= span
+    long = "long" if time >= 1e6 else f"{time:.4g} s"
+    sentence = (
+        f"the whole robot ({1e3 * length:.4g} mm) stays in a view of {1e3 * view:.4g} mm for "
+        f"{long}, {'as long as' if passed else 'shorter than'} a trial of {span:g} s"
+    )
+    return [Check("time-in-view", min(time, 1e9), span, "s", passed, decides=False, sentence=sentence)]
+
+
+def _intervals(
+    expected: Mapping[str, tuple[float, str]],
+    robot: Robot,
+    pixel: float,
+    stripes: int,
+    shares: Mapping[str, float],
+    rate: float,
+    span: float,
+) -> dict[str, tuple[float, float]]:
+    """Half widths of 95 % intervals of one trial: the slope of n frames over a time T has sigma sqrt(12/n)/T."""
+    if not math.isfinite(pixel):
+        return {}
+    slope = math.sqrt(12.0 * _TOGETHER / max(span * rate, 3.0)) / span
+    speed, body = expected["forward_velocity"][0], abs(expected["body_rotation_rate"][0])
+    scale = math.sqrt(sum(share**2 for share in shares.values()))
+    found = {"forward_velocity": math.hypot(_POSITION_ERROR * pixel * slope, scale * speed)}
+    if stripes:
+        edges = max(stripes / 3.0, 1.0)  # a third of the circumference is seen well
+        error = _EDGE_ERROR * pixel / (0.5 * robot.body.diameter) / math.sqrt(edges)
+        cycles = max(body * span * stripes / (2 * math.pi), 1.0)
+        returning = math.sqrt(2.0) * _STRIPE_ERROR / span / cycles
+        longer = math.sqrt(_EDGE_TOGETHER / _TOGETHER)
+        found["body_rotation_rate"] = math.hypot(error * slope * longer, returning)
+    waves = max(robot.tail.length / robot.tail.wavelength, 1.0)
+    found["tail_rotation_rate"] = _WAVE_ERROR * pixel / robot.tail.amplitude / math.sqrt(waves) * slope
+    return {
+        name: (_NORMAL * error, _NORMAL * error / abs(expected[name][0]) if expected[name][0] else math.nan)
+        for name, error in found.items()
+    }

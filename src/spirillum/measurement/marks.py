@@ -1,0 +1,262 @@
+"""Readings by hand, frame by frame, as the paper has taken them: alone, or as corrections to a track."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError, did_you_mean
+from spirillum.measurement.tables import Row, Table, read_table
+from spirillum.measurement.trials import BY_HAND
+from spirillum.tracking.setup import Setup
+from spirillum.tracking.track import Flag, Scale, Track
+
+__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "corrected", "read_marks", "track_of_marks"]
+
+_WHAT = "a table of readings by hand (CSV)"
+_READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
+MARK_COLUMNS = ("video", "frame", "time_s", *_READINGS)
+"""Columns of a table of readings by hand; all may be left out but one of `frame` and `time_s`, and one reading."""
+_NEAR = 0.51
+"""A reading belongs to the frame that is nearer than this share of the time between frames."""
+_CLICK = 1.0
+"""Standard error that is taken for a click with the mouse, pixels."""
+_GLANCE = math.radians(5.0)
+"""Standard error that is taken for an angle read by eye, rad."""
+
+
+@dataclass(frozen=True)
+class Ruled:
+    """What turns pixels into lengths."""
+
+    scale: Scale
+    """Scale of lengths."""
+    size: tuple[int, int]
+    """Width and height of the picture, pixels."""
+    points: Callable[[Samples], Samples] = field(repr=False)
+    """Takes pixels (k, 2) to (x, y) at the height of the axis, m, (k, 2)."""
+
+    @classmethod
+    def plain(cls, scale: Scale, size: tuple[int, int], *, leftward: bool) -> Ruled:
+        """The same scale everywhere: no perspective, no refraction."""
+        sign = -1.0 if leftward else 1.0
+
+        def points(pixels: Samples) -> Samples:
+            middle = 0.5 * (np.array(size, dtype=float) - 1.0)
+            return np.asarray((pixels - middle) * np.array([sign, -sign]) * scale.length_per_pixel)
+
+        return cls(scale, size, points)
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Readings by hand of one video; NaN where nothing was read; SI, but pixels."""
+
+    path: Path
+    frame: Samples
+    """Number of the frame, (k,)."""
+    time: Samples
+    """Time in the video, s, (k,)."""
+    pixels: Samples
+    """Pixel of the body's mid-length, (k, 2)."""
+    position: Samples
+    """The same in lengths, m, (k, 2)."""
+    body_angle: Samples
+    """rad, (k,)."""
+    tail_phase: Samples
+    """rad, (k,)."""
+    lines: tuple[int, ...] = ()
+    """Line of each reading in the file."""
+
+
+def read_marks(path: str | Path) -> dict[str, Marks]:
+    """Read a table of readings by hand.
+
+    Args:
+        path: CSV with some of the columns `MARK_COLUMNS`. Angles are counted on over full turns (370 after a full turn
+            and ten degrees); if all of them lie within one turn and one step is longer than half a turn, they are
+            taken as read within a turn and are counted on the shorter way.
+
+    Returns:
+        The readings by the video that they name; by the empty text where the table has no such column.
+
+    Raises:
+        InputError: if a column is unknown, one is missing, or a cell is wrong; the sentence names row and column.
+    """
+    table = read_table(path, _WHAT)
+    _check_columns(table)
+    rows: dict[str, list[Row]] = {}
+    place = table.column("video")
+    for row in table.rows:
+        rows.setdefault("" if place is None else row.text(place), []).append(row)
+    return {video: _marks(table, chosen) for video, chosen in rows.items()}
+
+
+def _check_columns(table: Table) -> None:
+    header = table.headers[0]
+    for name in header:
+        if name not in MARK_COLUMNS:
+            raise InputError(
+                f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, MARK_COLUMNS)}; allowed: "
+                f"{', '.join(MARK_COLUMNS)}"
+            )
+        if header.count(name) > 1:
+            raise InputError(f"{table.path}: column '{name}' stands twice; allowed: once")
+    if not {"frame", "time_s"} & set(header):
+        raise InputError(f"{table.path}: neither column 'frame' nor 'time_s' is there; allowed: at least one of them")
+    if not set(_READINGS) & set(header):
+        raise InputError(f"{table.path} holds no readings; allowed: at least one column of {', '.join(_READINGS)}")
+
+
+def _marks(table: Table, rows: list[Row]) -> Marks:
+    def column(name: str, factor: float = 1.0) -> Samples:
+        place = table.column(name)
+        return np.array([math.nan if place is None else factor * row.number(place, name) for row in rows])
+
+    frame, time = column("frame"), column("time_s")
+    for row, number, moment in zip(rows, frame, time, strict=True):
+        if math.isnan(number) and math.isnan(moment):
+            raise InputError(f"{table.path}, row {row.line}: neither frame nor time_s; allowed: at least one of them")
+        if math.isfinite(number) and (number < 0 or number != round(number)):
+            raise row.error("frame", f"{number:g}", "a whole number from 0")
+    order = np.lexsort((frame, time)) if np.isfinite(time).all() else np.argsort(frame, kind="stable")
+    keys = time[order] if np.isfinite(time).all() else frame[order]
+    twice = np.flatnonzero(np.diff(keys) == 0)
+    if twice.size:
+        first, second = sorted((rows[order[twice[0]]].line, rows[order[twice[0] + 1]].line))
+        raise InputError(f"{table.path}, rows {first} and {second} are of the same frame; allowed: once a frame")
+    pixels = np.stack([column("x_px"), column("y_px")], axis=1)
+    position = 1e-3 * np.stack([column("x_mm"), column("y_mm")], axis=1)
+    return Marks(
+        table.path, frame[order], time[order], pixels[order], position[order],
+        _counted(np.radians(column("body_angle_deg")[order])), _counted(np.radians(column("tail_phase_deg")[order])),
+        tuple(rows[index].line for index in order),
+    )  # fmt: skip
+
+
+def _counted(angle: Samples) -> Samples:
+    """Angles read within a turn, counted on; angles that go on over full turns stay as they are."""
+    known = np.isfinite(angle)
+    values = angle[known]
+    within = values.size > 1 and np.ptp(values) <= 2 * np.pi and np.abs(np.diff(values)).max() > np.pi
+    if not within:
+        return angle
+    found = angle.copy()
+    found[known] = np.unwrap(values)
+    return found
+
+
+def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
+    """Where the readings put the body, m, (k, 2); a coordinate that was not read is taken from the picture's middle."""
+    position = marks.position.copy()
+    known = np.isfinite(marks.pixels[:, 0])
+    if ruled is not None and known.any():
+        middle = 0.5 * (np.array(ruled.size, dtype=float) - 1.0)
+        pixels = np.where(np.isfinite(marks.pixels[known]), marks.pixels[known], middle)
+        found = ruled.points(pixels)
+        found[~np.isfinite(marks.pixels[known, 1]), 1] = np.nan
+        position[known] = np.where(np.isfinite(position[known]), position[known], found)
+    return position
+
+
+def track_of_marks(
+    marks: Marks, setup: Setup, video: str, ruled: Ruled | None, time_of: Callable[[Samples], Samples] | None
+) -> Track:
+    """A track of readings by hand alone.
+
+    Args:
+        marks: the readings.
+        setup: the setup.
+        video: name of the video.
+        ruled: turns pixels into lengths; None where no readings are in pixels.
+        time_of: takes numbers of frames to times, s; None where nothing tells.
+
+    Raises:
+        InputError: if a reading has no time.
+    """
+    time = marks.time.copy()
+    missing = ~np.isfinite(time)
+    if missing.any():
+        if time_of is None:
+            raise InputError(
+                f"{marks.path}: readings have no time; allowed: a column time_s, or camera.frames_per_second "
+                "in the setup"
+            )
+        time[missing] = time_of(marks.frame[missing])
+    order = np.argsort(time, kind="stable")
+    if np.any(np.diff(time[order]) <= 0):
+        raise InputError(f"{marks.path}: two readings are of the same time; allowed: rising times")
+    inside = order[(time[order] >= setup.start) & (time[order] <= (setup.end or np.inf))]
+    count = inside.size
+    scale = ruled.scale if ruled else Scale(math.nan, 0.0, {}, 0, math.nan)
+    nothing = np.full(count, np.nan)
+    picture = np.concatenate([marks.pixels[inside], np.full((count, 2), np.nan)], axis=1)
+    click = _CLICK * (scale.length_per_pixel if ruled else 1e-4)
+    return Track(
+        time=time[inside], frame=marks.frame[inside], position=_positions(marks, ruled)[inside], heading=nothing,
+        body_angle=marks.body_angle[inside], tail_phase=marks.tail_phase[inside],
+        position_error=nothing + click, body_angle_error=nothing + _GLANCE, tail_phase_error=nothing + _GLANCE,
+        picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
+        flags=(Flag(BY_HAND, f"all {count} readings were taken by hand, from {marks.path.name}"),),
+    )  # fmt: skip
+
+
+def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
+    """A track with the readings by hand in place of what was seen.
+
+    Angles are taken to the full turn that is nearest to the track.
+
+    Args:
+        track: the automatic track.
+        marks: the readings.
+        ruled: turns pixels into lengths.
+
+    Raises:
+        InputError: if a reading belongs to no frame of the track; the sentence names its row.
+    """
+    index = _frames_of(track, marks)
+    position, body, tail = track.position.copy(), track.body_angle.copy(), track.tail_phase.copy()
+    errors = [track.position_error.copy(), track.body_angle_error.copy(), track.tail_phase_error.copy()]
+    read = _positions(marks, ruled)
+    for axis in range(2):
+        known = np.isfinite(read[:, axis])
+        position[index[known], axis] = read[known, axis]
+    known = np.isfinite(read[:, 0])
+    errors[0][index[known]] = _CLICK * track.scale.length_per_pixel
+    for angle, by_hand, error in ((body, marks.body_angle, errors[1]), (tail, marks.tail_phase, errors[2])):
+        known = np.isfinite(by_hand)
+        angle[index[known]] = _nearest_turn(track.time, angle, index[known], by_hand[known])
+        error[index[known]] = _GLANCE
+    flag = Flag("corrected-by-hand", f"{index.size} frames carry readings by hand, from {marks.path.name}")
+    return replace(
+        track, position=position, body_angle=body, tail_phase=tail, position_error=errors[0],
+        body_angle_error=errors[1], tail_phase_error=errors[2], flags=(*track.flags, flag),
+    )  # fmt: skip
+
+
+def _frames_of(track: Track, marks: Marks) -> np.ndarray:
+    step = float(np.median(np.diff(track.time))) if track.time.size > 1 else np.inf
+    found = np.empty(marks.frame.size, dtype=np.int64)
+    for number, (frame, time) in enumerate(zip(marks.frame, marks.time, strict=True)):
+        by_frame = math.isfinite(frame)
+        distance = np.abs(track.frame - frame) if by_frame else np.abs(track.time - time)
+        nearest = int(np.argmin(distance)) if distance.size else 0
+        if not distance.size or distance[nearest] > (0 if by_frame else _NEAR * step):
+            line = marks.lines[number] if marks.lines else number
+            what = f"frame {frame:g}" if by_frame else f"time_s {time:g}"
+            raise InputError(f"{marks.path}, row {line}: {what} was not measured; allowed: a frame of the video")
+        found[number] = nearest
+    return found
+
+
+def _nearest_turn(time: Samples, angle: Samples, index: np.ndarray, by_hand: Samples) -> Samples:
+    known = np.isfinite(angle)
+    if not known.any():
+        return by_hand
+    expected = np.interp(time[index], time[known], angle[known])
+    return np.asarray(by_hand + 2 * np.pi * np.round((expected - by_hand) / (2 * np.pi)))

@@ -1,0 +1,74 @@
+"""Measured trials as rows of `observations.csv`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+
+from spirillum.measurement.observations import RATES
+from spirillum.measurement.trials import Trial
+from spirillum.robot.robot import Robot
+
+__all__ = ["observation_rows"]
+
+_KEYS = ("robot", "channel_diameter_mm", "wavelength_mm", "amplitude_mm", "trial")
+_SEEN = {
+    "forward_velocity": "forward_velocity_mm_s",
+    "tail_rotation_rate": "tail_rate_Hz",
+    "body_rotation_rate": "body_rate_Hz",
+}
+"""What a camera sees. The motor's rate follows from two of them; a column of its own would count them twice."""
+
+
+def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str | None:
+    """Text of an observations file, a row a trial, as `spirillum calibrate` reads it.
+
+    Args:
+        trials: the trials.
+        robot: the robot; channel and tail are its own.
+        setup: name of the setup file, for the comment.
+
+    Returns:
+        The text; None if the robot swims in no channel, or nothing was measured.
+    """
+    if robot.channel is None:
+        return None
+    kept = [trial for trial in trials if any(math.isfinite(trial.quantities[name].value) for name in _SEEN)]
+    if not kept:
+        return None
+    text = io.StringIO()
+    if any(trial.synthetic for trial in kept):
+        text.write("# SYNTHETIC: the videos say that they are computed; nothing was measured.\n")
+    text.write(f"# Measured from video with {_safe(setup)}: one row a trial, signed about the swimming direction.\n")
+    for trial in kept:
+        flags = ", ".join(flag.name for flag in trial.flags)
+        text.write(f"# trial {_safe(trial.name)}: {_safe(trial.video)}{'; flags: ' + flags if flags else ''}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow((*_KEYS, *_SEEN.values()))
+    where = [
+        _safe(robot.name),
+        *(f"{1e3 * length:.9g}" for length in (robot.channel.diameter, robot.tail.wavelength, robot.tail.amplitude)),
+    ]
+    for trial in kept:
+        cells = [_cell(trial.quantities[name].value, RATES[column]) for name, column in _SEEN.items()]
+        writer.writerow([*where, _trial(trial.name), *cells])
+    return text.getvalue()
+
+
+def _cell(value: float, factor: float) -> str:
+    """A value in the column's unit; empty where it was not measured."""
+    return f"{value / factor:.7g}" if math.isfinite(value) and value != 0 else ""
+
+
+def _trial(name: str) -> str:
+    """A trial's name; one that reads as a fraction would be taken for a slip of the column."""
+    safe = _safe(name)
+    return f"trial {safe}" if safe.replace(".", "", 1).isdigit() and not safe.isdigit() else safe
+
+
+def _safe(text: str) -> str:
+    """One printable line, and no comment sign at its beginning."""
+    line = "".join(c if c.isprintable() else " " for c in text).strip().lstrip("#").strip()
+    return line[:200] or "trial"

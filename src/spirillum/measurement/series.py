@@ -1,0 +1,120 @@
+"""The time series of a trial as labelled datasets: our own, and in the layout of the `movement` project."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.answer import versions
+from spirillum.measurement.trials import RATE_NAMES, Trial
+from spirillum.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["movement_dataset", "series_dataset"]
+
+_RESIDUAL_UNITS = ("m", "rad", "rad", "rad")
+
+
+def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
+    """What was seen on every frame and how far it lies from the fitted lines; SI, rates in rad/s.
+
+    Args:
+        trial: the trial.
+        robot: the robot, for the settings in the attributes.
+    """
+    import xarray as xr
+
+    track = trial.track
+    series = {
+        "frame": (track.frame, "1", "number of the frame in the video"),
+        "heading": (track.heading, "rad", "angle of the motor axis to the x axis in the plane of the picture"),
+        "body_angle": (track.body_angle, "rad", "angle by which the body has turned about +x, unwrapped"),
+        "tail_phase": (track.tail_phase, "rad", "phase of the tail about +x in the lab, unwrapped"),
+        "position_error": (track.position_error, "m", "estimated standard error of x"),
+        "body_angle_error": (track.body_angle_error, "rad", "estimated standard error of the body's angle"),
+        "tail_phase_error": (track.tail_phase_error, "rad", "estimated standard error of the tail's phase"),
+    }
+    for name, unit in zip(RATE_NAMES, _RESIDUAL_UNITS, strict=True):
+        residual = trial.fits[name].residual
+        if residual.size == track.time.size:
+            words = f"distance from the line that gives the {name.replace('_', ' ')}; NaN where left out"
+            series[f"{name}_residual"] = (residual, unit, words)
+    data: dict[str, Any] = {
+        "position": (
+            ("time", "space"), track.position,
+            {"units": "m", "long_name": "the body's mid-length from the middle of the picture, at the axis's height"},
+        ),
+        "pixel": (
+            ("time", "space"), track.picture[:, :2],
+            {"units": "pixel", "long_name": "the body's mid-length in the picture, u to the right and v down"},
+        ),
+    }  # fmt: skip
+    data |= {
+        name: ("time", values, {"units": unit, "long_name": words}) for name, (values, unit, words) in series.items()
+    }
+    for name, item in trial.quantities.items():
+        more = {"low": item.low, "high": item.high, "level": 0.95} if np.isfinite(item.low) else {}
+        reason = {"reason": item.reason} if item.reason else {}
+        data[name if name != "heading" else "mean_heading"] = ((), item.value, {"units": item.unit, **more, **reason})
+    return xr.Dataset(
+        data,
+        coords={
+            "time": ("time", track.time, {"units": "s", "long_name": "time in the video"}),
+            "space": ("space", ["x", "y"], {"long_name": "along the channel towards the nose, and across"}),
+        },
+        attrs={
+            "title": f"{trial.video}{' (synthetic)' if trial.synthetic else ''}: what was seen on every frame",
+            "synthetic": int(trial.synthetic),
+            "robot": robot.name,
+            "video": trial.video,
+            "length_per_pixel": track.scale.length_per_pixel,
+            "scale_relative_uncertainty": track.scale.relative_uncertainty,
+            "scale_sources": json.dumps(dict(track.scale.sources)),
+            "flags": "\n".join(f"{flag.name}: {flag.sentence}" for flag in trial.flags),
+            "setup": json.dumps(track.setup.model_dump(), sort_keys=True),
+            "settings": json.dumps(robot.model_dump(), sort_keys=True),
+            "versions": versions(),
+        },
+    )
+
+
+def movement_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
+    """The robot as an individual with two points, in pixels, as the `movement` project lays poses out.
+
+    Dimensions time, space, keypoints, individuals; variables `position` and `confidence`; u is its x, v its y.
+
+    Args:
+        trial: the trial.
+        robot: the robot, for its name.
+    """
+    import xarray as xr
+
+    track = trial.track
+    points = track.picture.reshape(-1, 2, 2)  # frame, point, coordinate
+    position = np.swapaxes(points, 1, 2)[..., None]
+    confidence = np.where(np.isfinite(points).all(axis=2), 1.0, np.nan)[..., None]
+    attributes: dict[str, Any] = {"source_software": "spirillum", "ds_type": "poses", "time_unit": "seconds"}
+    if track.time.size > 1:
+        attributes["fps"] = float(1.0 / np.median(np.diff(track.time)))
+    attributes |= {
+        "source_file": trial.video,
+        "synthetic": int(trial.synthetic),
+        "length_per_pixel": track.scale.length_per_pixel,
+    }
+    return xr.Dataset(
+        {
+            "position": (("time", "space", "keypoints", "individuals"), position, {"units": "pixel"}),
+            "confidence": (("time", "keypoints", "individuals"), confidence),
+        },
+        coords={
+            "time": ("time", track.time, {"units": "s"}),
+            "space": ["x", "y"],
+            "keypoints": ["centre", "nose"],
+            "individuals": [robot.name],
+        },
+        attrs=attributes,
+    )

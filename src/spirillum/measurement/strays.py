@@ -1,0 +1,98 @@
+"""What lies far from all others: frames of a series, and trials among trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from spirillum.arrays import Samples
+
+__all__ = ["GRUBBS_LEVEL", "outlying_trial", "stray_frames"]
+
+GRUBBS_LEVEL = 0.01
+"""Chance that Grubbs' test names one of trials that are all alike."""
+_WINDOW = 9
+_REACH = 6.0
+_MAD = 1.4826
+_LEAST = 0.25
+"""A step that is small against the whole series' own spread is no stray, however smooth its neighbours are."""
+
+
+def stray_frames(time: Samples, values: Samples) -> np.ndarray:
+    """Frames that lie more than six standard deviations (from the median deviation) from their neighbours.
+
+    First from the median of nine neighbours about a robust line, which finds single frames; then from the line
+    itself, which finds short bursts, unless the series bends away from it as a whole.
+
+    Args:
+        time: times, (n,).
+        values: the series, (n,); NaN where it was not measured.
+
+    Returns:
+        Truth values, (n,).
+    """
+    from scipy.ndimage import median_filter
+
+    found = np.zeros(values.shape, dtype=bool)
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
+    if known.size < 2 * _WINDOW:
+        return found
+    level = values[known] - _robust_line(time[known], values[known])
+    near = level - median_filter(level, _WINDOW, mode="nearest")
+    strays = _far(near, _LEAST * _spread(level))
+    kept = known[~strays]
+    found[known[strays]] = True
+    level = values[kept] - _robust_line(time[kept], values[kept])
+    bursts = _far(level)
+    if bursts.mean() < 0.1:
+        found[kept[bursts]] = True
+    return found
+
+
+def _spread(deviation: Samples) -> float:
+    return _MAD * float(np.median(np.abs(deviation - np.median(deviation))))
+
+
+def _far(deviation: Samples, least: float = 0.0) -> np.ndarray:
+    spread = max(_spread(deviation), least)
+    if spread <= 0:
+        return np.zeros(deviation.shape, dtype=bool)
+    return np.asarray(np.abs(deviation - np.median(deviation)) > _REACH * spread)
+
+
+def _robust_line(time: Samples, values: Samples) -> Samples:
+    """Siegel's line through the medians of some stretches: half of them may be wrong."""
+    from scipy.stats import siegelslopes
+
+    pieces = np.array_split(np.arange(time.size), min(60, time.size))
+    t = np.array([np.median(time[piece]) for piece in pieces])
+    y = np.array([np.median(values[piece]) for piece in pieces])
+    slope, start = siegelslopes(y, t)[:2]
+    return np.asarray(start + slope * time)
+
+
+def outlying_trial(values: Sequence[float]) -> int | None:
+    """The trial that does not fit in with the others, by Grubbs' test (1950), two-sided, at 1 %.
+
+    Args:
+        values: one value a trial; NaN is left out.
+
+    Returns:
+        Its index; None if all fit, or with fewer than three.
+    """
+    from scipy.stats import t
+
+    numbers = np.asarray(values, dtype=float)
+    known = np.flatnonzero(np.isfinite(numbers))
+    count = known.size
+    if count < 3:
+        return None
+    spread = float(numbers[known].std(ddof=1))
+    if spread <= 0:
+        return None
+    distance = np.abs(numbers[known] - numbers[known].mean()) / spread
+    quantile = float(t.ppf(1.0 - GRUBBS_LEVEL / (2 * count), count - 2))
+    bound = (count - 1) / np.sqrt(count) * np.sqrt(quantile**2 / (count - 2 + quantile**2))
+    worst = int(np.argmax(distance))
+    return int(known[worst]) if distance[worst] > bound else None

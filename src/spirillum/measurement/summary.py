@@ -1,0 +1,82 @@
+"""Over trials: means with Student's t, what all trials share, and trials that do not fit in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from spirillum.measurement.statistics import mean_with_interval
+from spirillum.measurement.strays import GRUBBS_LEVEL, outlying_trial
+from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, Measured, Trial
+from spirillum.tracking.track import Flag
+
+__all__ = ["Summary", "compared", "summary_of"]
+
+_NORMAL = 1.959964
+_LENGTHS = ("forward_velocity", "lateral_position")
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Means over trials."""
+
+    quantities: Mapping[str, Measured]
+    """By the names of `MEASURED`."""
+    counts: Mapping[str, int]
+    """Trials that each of them rests on."""
+    trials: int
+    """All trials."""
+    scale_uncertainty: float
+    """Relative standard uncertainty of lengths, which all trials share."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        found = {name: item.to_dict(n=self.counts[name]) for name, item in self.quantities.items()}
+        return {"n": self.trials, **found, "scale_uncertainty": self.scale_uncertainty}
+
+
+def summary_of(trials: Sequence[Trial]) -> Summary:
+    """Means over trials with Student's t; the scale, which they share, is added whole to lengths.
+
+    With one trial it is that trial's own interval.
+
+    Args:
+        trials: at least one.
+    """
+    shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
+    quantities, counts = {}, {}
+    for name in MEASURED:
+        measured = [trial.quantities[name] for trial in trials if math.isfinite(trial.quantities[name].value)]
+        counts[name] = len(measured)
+        quantities[name] = _mean(name, measured, trials, shared)
+    return Summary(quantities, counts, len(trials), shared)
+
+
+def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shared: float) -> Measured:
+    if not measured:
+        first = trials[0].quantities[name]
+        return replace(first, reason=first.reason or "no trial measured it")
+    if len(measured) == 1:
+        return measured[0]
+    mean = mean_with_interval([item.value for item in measured], LEVEL)
+    reach = mean.half_width
+    if name in _LENGTHS:
+        reach = math.hypot(reach, _NORMAL * shared * mean.value)
+    return Measured(mean.value, mean.value - reach, mean.value + reach, measured[0].unit)
+
+
+def compared(trials: Sequence[Trial]) -> list[Trial]:
+    """The same trials; one that does not fit in with the others carries a flag. None is dropped."""
+    found = list(trials)
+    for name in RATE_NAMES:
+        worst = outlying_trial([trial.quantities[name].value for trial in trials])
+        if worst is None:
+            continue
+        sentence = (
+            f"its {name.replace('_', ' ')} does not fit in with the other trials (Grubbs' test, {100 * GRUBBS_LEVEL:g} "
+            "%); it still counts in the means"
+        )
+        found[worst] = found[worst].flagged(Flag(f"outlier-{name.replace('_', '-')}", sentence))
+    return found

@@ -1,0 +1,337 @@
+"""From the track of one video to its speed, its rates and its wobble, each with a 95 % interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import Samples
+from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
+from spirillum.measurement.strays import stray_frames
+from spirillum.robot.robot import Robot
+from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.track import Flag, Track
+
+__all__ = [
+    "BY_HAND",
+    "LEVEL",
+    "MEASURED",
+    "RATE_NAMES",
+    "SYNTHETIC",
+    "WOBBLES",
+    "Measured",
+    "Trial",
+    "says_synthetic",
+    "trial_of",
+]
+
+LEVEL = 0.95
+"""Level of all intervals."""
+RATE_NAMES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate", "motor_rotation_rate")
+"""What is measured by a slope."""
+WOBBLES = (
+    "lateral_wobble_at_tail_rate",
+    "lateral_wobble_at_body_rate",
+    "heading_wobble_at_tail_rate",
+    "heading_wobble_at_body_rate",
+)
+"""Amplitudes of the motion across, and of the heading, that come back with tail or body."""
+MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
+"""All that a trial measures, and a summary over trials."""
+BY_HAND = "by-hand"
+"""Name of the flag of a track that was read by hand alone."""
+SYNTHETIC = "synthetic"
+"""The word by which computed videos are known, and the name of the flag."""
+_NORMAL = 1.959964
+_PIXEL_ERROR = 0.03
+"""Least usual size of errors of the position that come back with an angle or with each pixel, pixels."""
+_STRIPE_ERROR = math.radians(0.2)
+"""Usual size of errors of the body's angle that come back with every stripe, rad."""
+_PHASE_ERROR = math.radians(1.0)
+"""Usual size of errors of the tail's phase that come back once or twice a turn, rad."""
+_SLOW_PIXELS = 0.01
+"""Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
+_SLOW_ANGLE = math.radians(0.1)
+"""The same of an angle, rad."""
+_MANY_STRAYS = 0.02
+_FEW_TURNS = 2.0
+_DEGREE = 5
+_FEWEST = 12
+_UNSTEADY = 0.5
+"""rad, root mean square."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A number with its 95 % interval, SI; NaN where it was not measured, and then a reason."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    reason: str = ""
+
+    def to_dict(self, **more: Any) -> dict[str, Any]:
+        """As JSON: null with its reason where it was not measured, without an interval where there is none."""
+        if not math.isfinite(self.value):
+            return quantity(None, self.unit, reason=self.reason or "it was not seen", **more)
+        if not math.isfinite(self.low):
+            return quantity(self.value, self.unit, **more)
+        interval = {"low": self.low, "high": self.high, "kind": "interval", "level": LEVEL}
+        return quantity(self.value, self.unit, **interval, **more)
+
+    @classmethod
+    def missing(cls, unit: str, reason: str) -> Measured:
+        """What was not measured."""
+        return cls(math.nan, math.nan, math.nan, unit, reason)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One video, measured."""
+
+    track: Track = field(repr=False)
+    """What was seen on every frame."""
+    quantities: Mapping[str, Measured]
+    """By the names of `MEASURED`."""
+    fits: Mapping[str, Rate] = field(repr=False)
+    """The fitted lines by the names of `RATE_NAMES`, also of those that a flag spoils."""
+    flags: tuple[Flag, ...]
+    """What to know about it."""
+    name: str = ""
+    """Its name among the trials: that of its files."""
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether the video says of itself that it is synthetic."""
+        return any(flag.name == SYNTHETIC for flag in self.flags)
+
+    @property
+    def video(self) -> str:
+        """Name of the video."""
+        return self.track.video
+
+    def flagged(self, flag: Flag) -> Trial:
+        """The same trial with one more flag."""
+        return replace(self, flags=(*self.flags, flag))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        scale = self.track.scale
+        return {
+            "video": self.video,
+            "frames": int(self.track.time.size),
+            "frames_measured": int(np.isfinite(self.track.position[:, 0]).sum()),
+            "duration": quantity(float(np.ptp(self.track.time)) if self.track.time.size else 0.0, "s"),
+            **{name: item.to_dict() for name, item in self.quantities.items()},
+            "scale": {
+                "length_per_pixel": quantity(scale.length_per_pixel, "m"),
+                "relative_uncertainty": scale.relative_uncertainty,
+                "sources": dict(scale.sources),
+                "markers": scale.markers,
+            },
+            "flags": [{"name": f.name, "sentence": f.sentence, "spoils": list(f.spoils)} for f in self.flags],
+        }
+
+
+def trial_of(track: Track, robot: Robot, name: str = "") -> Trial:
+    """Measure one track.
+
+    Args:
+        track: what was seen on every frame.
+        robot: the robot, for its stripes.
+        name: name of the trial.
+    """
+    fits = _fits(track, robot)
+    flags = (*track.flags, *_own_flags(fits, track, robot))
+    velocity, *rates = RATE_NAMES
+    quantities = {velocity: _velocity(fits[velocity], track)}
+    quantities |= {name: _widened(fits[name], "rad/s", _slow(track, _SLOW_ANGLE)) for name in rates}
+    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m")
+    quantities["heading"] = _mean(track, track.heading, "rad")
+    quantities |= _wobbles(track)
+    if not any(flag.name == BY_HAND for flag in flags):
+        quantities = {name: _with_interval(item) for name, item in quantities.items()}
+    return Trial(track, _spoiled(quantities, flags), fits, flags, name)
+
+
+def _with_interval(item: Measured) -> Measured:
+    """No number of a camera stands without an interval; two readings by hand may."""
+    if math.isfinite(item.low) or not math.isfinite(item.value):
+        return item
+    return Measured.missing(item.unit, "it was seen on too few frames")
+
+
+def _fits(track: Track, robot: Robot) -> dict[str, Rate]:
+    time, pixel = track.time, track.scale.length_per_pixel
+    body, tail = _smooth(time, track.body_angle), _smooth(time, track.tail_phase)
+    x = track.position[:, 0]
+    stripes = track.setup.robot.stripes or (robot.seal.stripes if robot.seal else ())
+    around = max(len(stripes), 1)
+    repeats = round(2 * np.pi / pattern_period(stripes)) if stripes else 1
+    of_x = []
+    if math.isfinite(pixel):  # readings in millimetres know of no pixels
+        angles = (_smooth(time, 2 * np.pi * x / pixel), tail, body, around * body)
+        of_x = [Cycle(angle, _usual(track.position_error, _PIXEL_ERROR * pixel)) for angle in angles if _turns(angle)]
+    of_body = [
+        Cycle(multiple * body, _usual(track.body_angle_error, _STRIPE_ERROR))
+        for multiple in sorted({1, repeats, 2 * repeats, 3 * repeats, around})
+        if _turns(body)
+    ]
+    of_tail = [
+        Cycle(multiple * tail, _usual(track.tail_phase_error, _PHASE_ERROR)) for multiple in (1, 2) if _turns(tail)
+    ]
+    difference = track.tail_phase - track.body_angle
+    error = np.hypot(track.tail_phase_error, track.body_angle_error)
+    return {
+        "forward_velocity": rate_of(time, x, track.position_error, of_x),
+        "body_rotation_rate": rate_of(time, track.body_angle, track.body_angle_error, of_body),
+        "tail_rotation_rate": rate_of(time, track.tail_phase, track.tail_phase_error, of_tail),
+        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail]),
+    }
+
+
+def _smooth(time: Samples, angle: Samples) -> Samples:
+    """An angle without its own noise, which would else explain itself; straight over what was not measured.
+
+    A polynomial of low degree; where the angle is too unsteady for one, the angle as it was seen.
+    """
+    known = np.isfinite(angle) & ~stray_frames(time, angle)
+    if known.sum() < _FEWEST:
+        return np.zeros(angle.shape)
+    middle, half = 0.5 * (time[known][0] + time[known][-1]), 0.5 * float(np.ptp(time[known]))
+    s = np.clip((time - middle) / half, -1.0, 1.0)
+    coefficients = np.polynomial.legendre.legfit(s[known], angle[known], _DEGREE)
+    smooth = np.polynomial.legendre.legval(s, coefficients)
+    if float(np.std(angle[known] - smooth[known])) < _UNSTEADY:
+        return np.asarray(smooth)
+    return np.asarray(np.interp(time, time[known], angle[known]))
+
+
+def _usual(error: Samples, least: float) -> float:
+    """Usual size of errors that come back: a picture whose frames are worse to read is worse in this too."""
+    known = error[np.isfinite(error)]
+    return max(float(np.median(known)), least) if known.size else least
+
+
+def _turns(angle: Samples) -> bool:
+    return angle.size > 0 and float(np.ptp(angle)) > 0
+
+
+def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
+    """A rate whose interval holds standard errors beside that of the fit."""
+    if not rate.measured:
+        return Measured.missing(unit, "it was seen on too few frames")
+    reach = _NORMAL * math.hypot(*errors)
+    low = rate.value - math.hypot(rate.value - rate.low, reach)
+    return Measured(rate.value, low, rate.value + math.hypot(rate.high - rate.value, reach), unit)
+
+
+def _slow(track: Track, error: float) -> float:
+    """Standard error of a rate from an error that grows from one end to the other."""
+    return error / float(np.ptp(track.time)) if track.time.size > 1 else 0.0
+
+
+def _velocity(rate: Rate, track: Track) -> Measured:
+    """A velocity: the interval holds the scale's uncertainty too."""
+    pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
+    scale = track.scale.relative_uncertainty * abs(rate.value)
+    return _widened(rate, "m/s", _slow(track, _SLOW_PIXELS * pixel), scale)
+
+
+def _mean(track: Track, values: Samples, unit: str) -> Measured:
+    value, low, high = mean_of(track.time, values)
+    reason = "" if math.isfinite(value) else "it was not seen"
+    if unit == "m":
+        reach = _NORMAL * track.scale.relative_uncertainty * abs(value)
+        low, high = value - math.hypot(value - low, reach), value + math.hypot(high - value, reach)
+    return Measured(value, low, high, unit, reason)
+
+
+def _wobbles(track: Track) -> dict[str, Measured]:
+    """Least squares at the angle of tail or body itself, so that an unsteady rate does not smear the amplitude."""
+    found = {}
+    for series, values, unit in (("lateral", track.position[:, 1], "m"), ("heading", track.heading, "rad")):
+        for part, angle in (("tail", track.tail_phase), ("body", track.body_angle)):
+            found[f"{series}_wobble_at_{part}_rate"] = _amplitude(track.time, values, angle, unit, part)
+    return {name: found[name] for name in WOBBLES}
+
+
+def _amplitude(time: Samples, values: Samples, angle: Samples, unit: str, part: str) -> Measured:
+    known = np.isfinite(values) & np.isfinite(angle)
+    if known.sum() < 12 or np.ptp(angle[known]) < 2 * np.pi * _FEW_TURNS:
+        return Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
+    s = (time[known] - time[known].mean()) / np.ptp(time[known])
+    design = np.stack([np.ones_like(s), s, s**2, np.cos(angle[known]), np.sin(angle[known])], axis=1)
+    beta = np.linalg.lstsq(design, values[known], rcond=None)[0]
+    left = values[known] - design @ beta
+    again = float(np.clip(left[1:] @ left[:-1] / max(left @ left, 1e-300), 0.0, 0.99))
+    effective = max(known.sum() * (1 - again) / (1 + again) - 5, 1.0)
+    error = math.sqrt(2.0 * float(left.var()) / effective)
+    size = float(np.hypot(beta[3], beta[4]))
+    return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
+
+
+def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:
+    flags = []
+    if says_synthetic(track.words):
+        flags.append(Flag(SYNTHETIC, "the video says of itself that it is synthetic: nothing here is measured"))
+    for name in RATE_NAMES[:3]:
+        rate, words = fits[name], name.replace("_", " ")
+        if not rate.measured:
+            continue
+        if not rate.steady:
+            sentence = f"the {words} changes along the video; given is its mean from end to end"
+            flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
+        if rate.strays > _MANY_STRAYS * (rate.frames + rate.strays):
+            sentence = f"{rate.strays} frames lie far from their neighbours and were left out of the {words}"
+            flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
+    stripes = track.setup.robot.stripes or (robot.seal.stripes if robot.seal else ())
+    turned = _range(track.body_angle)
+    if stripes and fits["body_rotation_rate"].measured and turned < 2 * np.pi / len(stripes):
+        flags.append(
+            Flag(
+                "short-turn",
+                f"the body turned by {math.degrees(turned):.3g} deg, less than one stripe: errors that come back with "
+                "every stripe cannot be seen, so their usual size widens the interval of its rate",
+            )
+        )
+    return flags
+
+
+def says_synthetic(words: str) -> bool:
+    """Whether a file says of itself that it is synthetic.
+
+    Args:
+        words: its title and comment.
+    """
+    return SYNTHETIC in words.lower()
+
+
+def _range(values: Samples) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if known.size else 0.0
+
+
+def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dict[str, Measured]:
+    """Null what a flag spoils, and what follows from it."""
+    found = dict(quantities)
+    for flag in flags:
+        names = set(flag.spoils)
+        if names & {"tail_rotation_rate", "body_rotation_rate"}:
+            names.add("motor_rotation_rate")
+        names |= {
+            f"{kind}_wobble_at_{part}_rate"
+            for part in ("tail", "body")
+            for kind in ("lateral", "heading")
+            if f"{part}_rotation_rate" in flag.spoils
+        }
+        for name in names & set(found):
+            if math.isfinite(found[name].value) or not found[name].reason:
+                found[name] = Measured.missing(found[name].unit, flag.sentence)
+    return found

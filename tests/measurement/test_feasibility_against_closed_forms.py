@@ -1,0 +1,118 @@
+"""Before an experiment: Nyquist, sizes in the picture and the share of the depth, by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spirillum import InputError
+from spirillum.measurement.depth import apparent_distance, depth_shares
+from spirillum.measurement.feasibility import feasibility
+from spirillum.measurement.setup_template import new_setup_file, setup_answer
+from spirillum.tracking.setup import load_setup
+
+
+@pytest.fixture
+def setup_file(tmp_path: Path, setup_text: str) -> Path:
+    path = tmp_path / "setup.toml"
+    path.write_text(setup_text)
+    return path
+
+
+RATES = {"tail_rate": "1.2 Hz", "body_rate": "-0.1 Hz", "speed": "1 mm/s"}
+
+
+@pytest.mark.parametrize(("rate", "feasible"), [("14.9 Hz", True), ("-14.9 Hz", True), ("15.1 Hz", False)])
+def test_a_tail_needs_two_frames_a_turn(setup_file: Path, rate: str, feasible: bool) -> None:
+    found = feasibility(setup_file, **{**RATES, "tail_rate": rate}, frames_per_second=30.0)
+    assert found.feasible is feasible
+
+
+@pytest.mark.parametrize(("rate", "feasible"), [("7.4 Hz", True), ("7.6 Hz", False)])
+def test_stripes_that_repeat_after_half_a_turn_halve_the_limit(setup_file: Path, rate: str, feasible: bool) -> None:
+    assert feasibility(setup_file, **{**RATES, "body_rate": rate}).feasible is feasible
+    once = {"seal.stripes": ["red", "yellow", "green", "blue"]}
+    assert feasibility(setup_file, **{**RATES, "body_rate": rate}, overrides=once).feasible
+
+
+def test_a_robot_without_stripes_cannot_show_its_rotation(setup_file: Path) -> None:
+    found = feasibility(setup_file, **RATES, overrides={"seal.stripes": []})
+    assert not found.feasible
+    assert "no stripes" in found.warnings[0]
+
+
+def test_sizes_and_time_in_view(setup_file: Path) -> None:
+    """160 mm over 640 pixels: 0.25 mm each; the robot of 105 mm has 55 mm of room."""
+    checks = {c.name: c for c in feasibility(setup_file, **RATES, view_width="160 mm", duration="60 s").checks}
+    assert checks["wire-pixels"].value == pytest.approx(4.0)
+    assert checks["spacing-pixels"].value == pytest.approx(8.0)
+    assert checks["stripe-pixels"].value == pytest.approx(np.pi * 18 / 8 / 0.25)
+    assert checks["time-in-view"].value == pytest.approx(55.0)
+    assert not checks["time-in-view"].passed
+    coarse = feasibility(setup_file, **RATES, view_width="160 mm", picture_width=64)
+    assert coarse.feasible  # small pictures warn; only rates decide
+    assert "fewer than" in " ".join(coarse.warnings)
+
+
+def test_unknown_numbers_are_predicted_or_left_out(setup_file: Path) -> None:
+    found = feasibility(setup_file, tail_rate="1.2 Hz")
+    value, source = found.expected["forward_velocity"]
+    assert (value, source) == (pytest.approx(1.10233e-3, rel=1e-4), "predicted by sbt")
+    assert dict(found.intervals) == {}
+    assert "nothing says how large a pixel is" in found.warnings[-1]
+
+
+def test_intervals_shrink_with_time_and_frames(setup_file: Path) -> None:
+    def reach(**options: float) -> float:
+        return feasibility(setup_file, **RATES, view_width=0.16, **options).intervals["tail_rotation_rate"][0]
+
+    base = reach(duration=20.0, frames_per_second=30.0)
+    assert reach(duration=40.0, frames_per_second=30.0) == pytest.approx(base / 2**1.5, rel=1e-9)
+    assert reach(duration=20.0, frames_per_second=120.0) == pytest.approx(base / 2, rel=1e-9)
+
+
+def test_ten_millimetres_of_depth_are_seven_per_cent_of_scale(tmp_path: Path, setup_text: str) -> None:
+    """In air, at 150 mm: 10/150. Under oil a depth counts 1/n as much against the apparent distance."""
+    path = tmp_path / "air.toml"
+    text = setup_text.replace('[tank]\nsurface = "60 mm"\n', "").replace('"210 mm"', '"161.5 mm"')
+    path.write_text(
+        text.replace('_uncertainty = "1 mm"', '_uncertainty = "10 mm"').replace(
+            '"2 mm"\n\n[markers]', '"0 mm"\n\n[markers]'
+        )
+    )
+    shares = depth_shares(load_setup(path)[0])
+    assert shares["robot.axis_height"] == pytest.approx(10.0 / 150.0, rel=1e-6)
+    assert apparent_distance(0.0, 0.21, 0.06, 1.4) == pytest.approx(0.15 + 0.06 / 1.4)
+
+
+def test_shares_of_a_refracting_surface(setup_file: Path) -> None:
+    shares = depth_shares(load_setup(setup_file)[0])
+    axis, ruler = (0.15 + (0.06 - z) / 1.4 for z in (0.0115, 0.0))
+    assert shares["robot.axis_height"] == pytest.approx(1e-3 / 1.4 / axis, rel=1e-6)
+    assert shares["camera.height"] == pytest.approx(2e-3 * abs(1 / axis - 1 / ruler), rel=1e-5)
+
+
+def test_a_new_setup_file_is_valid_and_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "setup.toml"
+    new_setup_file(path)
+    answer = setup_answer(path)
+    assert answer["schema"] == "spirillum.setup-check/1"
+    assert answer["robot"] == "biorob2012-wide"
+    assert 0.001 < answer["scale_uncertainty"] < 0.05
+    with pytest.raises(InputError, match="exists; allowed: a new file, or --force"):
+        new_setup_file(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"duration": "0 s"}, "duration = 0 s"),
+        ({"frames_per_second": -1.0}, "fps = -1"),
+        ({"tail_rate": "6 1/s"}, "expect-tail-rate"),
+        ({"view_width": "3 s"}, "view-width"),
+        ({"picture_width": 3}, "width = 3"),
+    ],
+)
+def test_bad_expectations_are_one_sentence(setup_file: Path, options: dict, words: str) -> None:  # type: ignore[type-arg]
+    with pytest.raises(InputError, match=words):
+        feasibility(setup_file, **{**RATES, **options})

@@ -1,0 +1,175 @@
+"""What is written can be read: by `calibrate`, by xarray, and in the layout of the `movement` project."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from spirillum import InputError
+from spirillum.files import write_dataset
+from spirillum.measurement import read_observations
+from spirillum.measurement.measure import Measurement, measure
+from spirillum.measurement.rows import observation_rows
+from spirillum.measurement.series import movement_dataset, series_dataset
+from spirillum.measurement.trials import trial_of
+from spirillum.tracking.track import Flag, Track
+
+Make = Callable[..., Track]
+
+
+def test_observations_are_read_back(tmp_path: Path, make_track: Make, robot: Any) -> None:
+    flag = Flag("aliased-body", "too fast", ("body_rotation_rate",))
+    trials = [trial_of(make_track(seed=1), robot, "one"), trial_of(make_track(seed=2, flags=(flag,)), robot, "two")]
+    text = observation_rows(trials, robot, "setup.toml")
+    assert text is not None
+    path = tmp_path / "observations.csv"
+    path.write_text(text)
+    first, second = read_observations(path)
+    assert first.forward_velocity == pytest.approx(trials[0].quantities["forward_velocity"].value, rel=1e-6)
+    assert first.motor_rate == pytest.approx(7.7, rel=2e-3)
+    assert first.tail == (0.04, 0.025, 0.0025)
+    assert (first.trial, second.trial) == ("one", "two")
+    assert np.isnan(second.body_rate)
+
+
+def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robot: Any) -> None:
+    track = make_track()
+    path = tmp_path / "a.nc"
+    write_dataset(series_dataset(trial_of(track, robot, "a"), robot), path)
+    with xr.open_dataset(path, engine="h5netcdf") as found:
+        assert dict(found.sizes) == {"time": 300, "space": 2}
+        assert all("units" in variable.attrs for variable in found.data_vars.values())
+        assert np.array_equal(found["position"].values, track.position)
+        line = found["position"].values[:, 0] - found["forward_velocity_residual"].values
+        known = np.isfinite(line)
+        slope = np.polyfit(track.time[known], line[known], 1)[0]
+        assert slope == pytest.approx(float(found["forward_velocity"]), rel=1e-9)
+        assert found["forward_velocity"].attrs["low"] < float(found["forward_velocity"])
+        assert json.loads(found.attrs["setup"])["robot"]["axis_height"] == 0.0115
+
+
+def test_layout_of_movement(tmp_path: Path, make_track: Make, robot: Any) -> None:
+    """What its validator asks of poses: these dimensions and variables; and the attributes that its loaders set."""
+    track = make_track()
+    path = tmp_path / "a.movement.nc"
+    write_dataset(movement_dataset(trial_of(track, robot, "a"), robot), path)
+    with xr.open_dataset(path, engine="h5netcdf") as found:
+        assert found["position"].dims == ("time", "space", "keypoints", "individuals")
+        assert found["confidence"].dims == ("time", "keypoints", "individuals")
+        assert (found.attrs["ds_type"], found.attrs["time_unit"]) == ("poses", "seconds")
+        assert found.attrs["fps"] == pytest.approx(30.0)
+        nose = found["position"].sel(keypoints="nose", individuals=robot.name, space="x").values
+        assert np.array_equal(nose, track.picture[:, 2])
+
+
+@pytest.fixture
+def followed(monkeypatch: pytest.MonkeyPatch, make_track: Make) -> dict[str, Any]:
+    """The tracker replaced by tracks made by hand: by the video's name a track, or what it raises."""
+    tracks: dict[str, Any] = {}
+
+    def follow(video: Path, *_: Any, **__: Any) -> Track:
+        found = tracks[video.name]
+        if isinstance(found, BaseException):
+            raise found
+        assert isinstance(found, Track)
+        return found
+
+    import spirillum.tracking.follow as module
+
+    monkeypatch.setattr(module, "follow", follow)
+    return tracks
+
+
+@pytest.fixture
+def setup_file(tmp_path: Path, setup_text: str) -> Path:
+    path = tmp_path / "setup.toml"
+    path.write_text(setup_text)
+    return path
+
+
+def test_what_a_video_says_of_itself_stays_with_its_numbers(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    flag = Flag("synthetic", "the video says of itself that it is synthetic: nothing here is measured")
+    followed |= {"a.mp4": make_track(flags=(flag,)), "b.mp4": make_track(seed=1)}
+    found = measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
+    assert "a: the video says of itself that it is synthetic: nothing here is measured" in found.warnings
+    assert (tmp_path / "out" / "observations.csv").read_text().startswith("# SYNTHETIC: ")
+    for name, synthetic in (("a", 1), ("b", 0)):
+        with xr.open_dataset(tmp_path / "out" / f"{name}.nc", engine="h5netcdf") as series:
+            assert series.attrs["synthetic"] == synthetic
+
+
+def test_one_bad_video_does_not_stop_the_others(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    followed |= {
+        "a.mp4": make_track(),
+        "b.mp4": InputError("b.mp4 is empty; allowed: a film"),
+        "c.mp4": make_track(seed=3),
+    }
+    folder = tmp_path / "out"
+    found = measure([f"{name}.mp4" for name in "abc"], setup_file, folder, annotated=False, figures=False)
+    assert isinstance(found, Measurement)
+    answer = found.to_dict()
+    assert [trial["name"] for trial in answer["trials"]] == ["a", "c"]
+    assert answer["failures"] == [{"video": "b.mp4", "sentence": "b.mp4 is empty; allowed: a film"}]
+    assert answer["summary"]["n"] == 2
+    assert json.loads(json.dumps(answer, allow_nan=False))["schema"] == "spirillum.measurement/1"
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"a.nc", "a.movement.nc", "c.nc", "c.movement.nc", "observations.csv"} == set(answer["files"])
+
+
+def test_nothing_measured_is_an_error_with_the_first_sentence(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any]
+) -> None:
+    followed |= {"a.mp4": InputError("a.mp4 shows no robot; allowed: one")}
+    with pytest.raises(InputError, match=r"a\.mp4 shows no robot"):
+        measure("a.mp4", setup_file, tmp_path / "out", annotated=False)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interruption_keeps_what_was_finished(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    followed |= {"a.mp4": make_track(), "b.mp4": KeyboardInterrupt()}
+    with pytest.raises(KeyboardInterrupt):
+        measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"a.nc", "a.movement.nc", "observations.csv"}
+
+
+def test_the_report_stands_alone_and_says_flags_and_failures(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    flag = Flag("robot-left-the-view", "the robot left the view at 8 s <b>&", ("tail_rotation_rate",))
+    followed |= {
+        "b.mp4": make_track(seed=1, flags=(flag,)),
+        "c.mp4": InputError("c.mp4 is no film"),
+    }
+    measure(["b.mp4", "c.mp4"], setup_file, tmp_path / "out", annotated=False)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "the robot left the view at 8 s &lt;b&gt;&amp;" in page
+    assert "c.mp4 is no film" in page
+    assert "http" not in page.replace("http-equiv", "")
+    assert page.count("data:image/png;base64,") == 1
+    assert (tmp_path / "out" / "figures" / "series-b.svg").exists()
+    assert 'src="figures' not in page
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"tracking": False}, "--no-tracking without --marks"),
+        ({"start": 5.0, "end": 4.0}, "start = 5 s, end = 4.0 s"),
+        ({"track": "t.csv"}, "track = t.csv with 2 videos; allowed: one video"),
+        ({"overrides": {"tail.wavelength": "0 mm"}}, "tail.wavelength"),
+    ],
+)
+def test_bad_options_are_one_sentence(setup_file: Path, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        measure(["a.mp4", "b.mp4"], setup_file, **options)
+    assert words in str(caught.value)

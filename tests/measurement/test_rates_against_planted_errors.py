@@ -1,0 +1,163 @@
+"""Intervals of rates cover the truth, whatever the errors have in common."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.measurement.rates import Cycle, mean_of, rate_of
+from spirillum.measurement.strays import outlying_trial, stray_frames
+
+FRAMES = 300
+TIME = np.arange(FRAMES) / 30.0
+
+
+def autoregression(rng: np.random.Generator, rho: float) -> np.ndarray:
+    kicks = rng.normal(size=FRAMES) * np.sqrt(1.0 - rho**2)
+    values = np.empty(FRAMES)
+    values[0] = rng.normal()
+    for i in range(1, FRAMES):
+        values[i] = rho * values[i - 1] + kicks[i]
+    return values
+
+
+def white(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+    return rng.normal(size=FRAMES), []
+
+
+def short_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+    return autoregression(rng, 0.9) + rng.normal(size=FRAMES), []
+
+
+def long_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+    return autoregression(rng, 0.97), []
+
+
+def few_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+    """The stretch is a third of a period: nothing in the residuals shows it."""
+    angle = 2 * np.pi * 0.3 * TIME / TIME[-1]
+    returning = 1.4 * np.cos(angle + rng.uniform(0, 2 * np.pi))
+    return returning + rng.normal(size=FRAMES), [Cycle(angle, 1.0)]
+
+
+def many_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+    """Larger than usual, but seen often enough to be known."""
+    angle = 2 * np.pi * 2.7 * TIME / TIME[-1]
+    return 10.0 * np.cos(angle + rng.uniform(0, 2 * np.pi)) + rng.normal(size=FRAMES), [Cycle(angle, 1.0)]
+
+
+@pytest.mark.parametrize("errors", [white, short_memory, long_memory, few_cycles, many_cycles])
+def test_intervals_cover_the_truth_as_often_as_they_say(errors: Callable[..., Any]) -> None:
+    """30 series: at a level of 95 % fewer than 24 are covered less than once in a thousand times."""
+    rng = np.random.default_rng(5)
+    covered, trials = 0, 30
+    for _ in range(trials):
+        noise, cycles = errors(rng)
+        truth = rng.uniform(5.0, 20.0)
+        rate = rate_of(TIME, truth * TIME + 0.1 * noise, cycles=[Cycle(c.angle, 0.1 * c.amplitude) for c in cycles])
+        covered += rate.low <= truth <= rate.high
+        assert rate.steady
+    assert covered >= 24
+
+
+def test_white_noise_gives_the_interval_of_least_squares() -> None:
+    """sigma sqrt(12/n)/T, within the price of not knowing that it is white."""
+    rng = np.random.default_rng(1)
+    widths = []
+    for _ in range(10):
+        rate = rate_of(TIME, TIME + 0.01 * rng.normal(size=FRAMES))
+        widths.append(rate.high - rate.low)
+    ideal = 2 * 1.96 * 0.01 * np.sqrt(12.0 / FRAMES) / TIME[-1]
+    assert 0.9 * ideal < np.median(widths) < 1.35 * ideal
+
+
+def test_rate_scales_with_units_and_does_not_see_an_offset() -> None:
+    rng = np.random.default_rng(2)
+    values = 3.0 * TIME + 0.01 * rng.normal(size=FRAMES)
+    one, other = rate_of(TIME, values), rate_of(TIME + 7.0, 1e-3 * values + 5.0)
+    assert 1e3 * other.value == pytest.approx(one.value, rel=1e-9)
+    assert 1e3 * (other.high - other.low) == pytest.approx(one.high - one.low, rel=1e-4)
+
+
+def test_exact_lines_come_back_exactly() -> None:
+    rate = rate_of(TIME, 2.0 - 0.7 * TIME)
+    assert rate.value == pytest.approx(-0.7, rel=1e-12)
+    assert rate.high - rate.low < 1e-9
+
+
+def test_gaps_do_not_bias_a_rate_over_true_times() -> None:
+    rng = np.random.default_rng(3)
+    kept = (rng.uniform(size=FRAMES) > 0.05) & ~((TIME > 3.0) & (TIME < 5.0))
+    rate = rate_of(TIME[kept], 1.5 * TIME[kept] + 0.01 * rng.normal(size=int(kept.sum())))
+    assert rate.low <= 1.5 <= rate.high
+    assert rate.frames + rate.strays == int(kept.sum())
+
+
+def test_stray_frames_are_counted_and_do_not_move_the_rate() -> None:
+    rng = np.random.default_rng(4)
+    values = 1.5 * TIME + 0.01 * rng.normal(size=FRAMES)
+    without = rate_of(TIME, values)
+    spoiled = values.copy()
+    bad = np.array([7, 50, 51, 120, 200, 201, 202, 280])
+    spoiled[bad] += rng.choice([-1.0, 1.0], bad.size) * rng.uniform(0.3, 2.0, bad.size)
+    found = stray_frames(TIME, spoiled)
+    assert set(bad) <= set(np.flatnonzero(found))
+    rate = rate_of(TIME, spoiled)
+    assert rate.strays == found.sum() <= bad.size + 2
+    assert rate.value == pytest.approx(without.value, abs=0.2 * (without.high - without.low))
+    assert np.isnan(rate.residual[bad]).all()
+
+
+def test_a_changing_rate_is_seen_and_its_mean_is_from_end_to_end() -> None:
+    rng = np.random.default_rng(6)
+    span, covered = TIME[-1], 0
+    for _ in range(10):
+        values = TIME + 0.2 * span * (TIME / span) ** 2 + 0.002 * rng.normal(size=FRAMES)  # the rate rises by 40 %
+        rate = rate_of(TIME, values)
+        assert not rate.steady
+        assert rate.value == pytest.approx(1.2, rel=3e-3)
+        covered += rate.low <= 1.2 <= rate.high
+    assert covered >= 7
+
+
+def test_a_handful_of_readings_has_the_interval_of_the_textbook() -> None:
+    from scipy.stats import linregress, t
+
+    time, values = np.array([0.0, 1.0, 2.0, 4.0, 7.0]), np.array([0.1, 0.9, 2.2, 3.9, 7.1])
+    fit = linregress(time, values)
+    rate = rate_of(time, values)
+    assert rate.value == pytest.approx(fit.slope, rel=1e-12)
+    assert rate.high - rate.value == pytest.approx(t.ppf(0.975, 3) * fit.stderr, rel=1e-9)
+
+
+def test_two_readings_have_a_rate_but_no_interval_and_one_has_none() -> None:
+    two = rate_of(np.array([0.0, 4.0]), np.array([1.0, 3.0]))
+    assert two.value == pytest.approx(0.5)
+    assert np.isnan([two.low, two.high]).all()
+    assert not rate_of(np.array([0.0]), np.array([1.0])).measured
+    assert not rate_of(TIME, np.full(FRAMES, np.nan)).measured
+
+
+def test_mean_with_a_memory_is_less_sure_than_without() -> None:
+    rng = np.random.default_rng(8)
+    free, bound = rng.normal(size=FRAMES), autoregression(rng, 0.97)
+    widths = [np.diff(mean_of(TIME, values)[1:])[0] for values in (free, bound)]
+    assert widths[1] > 3.0 * widths[0]
+    assert widths[0] == pytest.approx(2 * 1.97 / np.sqrt(FRAMES), rel=0.4)
+
+
+def test_grubbs_test_against_its_table() -> None:
+    """Two-sided at 1 % for five trials the bound is 1.764: just above and just below."""
+    base = np.array([-1.0, 1.0, -0.5, 0.5])
+
+    def largest(value: float) -> float:
+        numbers = np.append(base, value)
+        return float(np.abs(numbers - numbers.mean()).max() / numbers.std(ddof=1))
+
+    assert largest(30.0) > 1.764
+    assert outlying_trial([*base, 30.0]) == 4
+    assert largest(8.0) < 1.764
+    assert outlying_trial([*base, 8.0]) is None
+    assert outlying_trial([1.0, 1.0, 9.0]) is None or outlying_trial([1.0, 1.0, 9.0]) == 2
+    assert outlying_trial([1.0, 9.0]) is None

@@ -1,0 +1,143 @@
+"""Readings by hand, and other programs' tracks, give the same statistics; bad tables one sentence each."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum import InputError
+from spirillum.measurement.imported import read_track
+from spirillum.measurement.marks import Ruled, corrected, read_marks, track_of_marks
+from spirillum.measurement.trials import trial_of
+from spirillum.tracking.track import Scale, Track
+
+PIXEL = 0.25e-3
+RULED = Ruled.plain(Scale(PIXEL, 0.0, {}, 80, 0.05), (640, 480), leftward=False)
+
+
+def seconds(frames: np.ndarray) -> np.ndarray:
+    return frames / 30.0
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "marks.csv"
+    path.write_text(text)
+    return path
+
+
+def test_a_few_readings_give_speed_and_rates(tmp_path: Path, make_track: Callable[..., Track], robot: Any) -> None:
+    """Every tenth frame of a robot at 1 mm/s with its tail at 0.5 Hz and its body at -0.05 Hz, exact."""
+    rows = [f"{f},{319.5 + 1e-3 * f / 30 / PIXEL:.9f},{180 * f / 30:.9f},{-18 * f / 30:.9f}" for f in range(0, 301, 10)]
+    path = written(tmp_path, "# by hand\nframe,x_px,tail_phase_deg,body_angle_deg\n" + "\n".join(rows))
+    track = track_of_marks(read_marks(path)[""], make_track().setup, "a.mp4", RULED, seconds)
+    found = trial_of(track, robot).quantities
+    assert found["forward_velocity"].value == pytest.approx(1e-3, rel=1e-6)
+    assert found["tail_rotation_rate"].value == pytest.approx(np.pi, rel=1e-6)
+    assert found["body_rotation_rate"].value == pytest.approx(-np.pi / 10, rel=1e-6)
+    assert found["motor_rotation_rate"].value == pytest.approx(1.1 * np.pi, rel=1e-6)
+    assert np.isnan(found["heading"].value)
+    assert track.flags[0].name == "by-hand"
+
+
+def test_angles_within_a_turn_are_counted_on_and_others_stay(tmp_path: Path) -> None:
+    within = read_marks(written(tmp_path, "frame,tail_phase_deg\n0,300\n10,350\n20,40\n30,90\n"))[""]
+    assert np.degrees(within.tail_phase) == pytest.approx([300, 350, 400, 450])
+    beyond = read_marks(written(tmp_path, "frame,tail_phase_deg\n0,0\n10,250\n20,500\n30,750\n"))[""]
+    assert np.degrees(beyond.tail_phase) == pytest.approx([0, 250, 500, 750])
+
+
+def test_a_corrected_frame_replaces_what_was_seen(tmp_path: Path, make_track: Callable[..., Track], robot: Any) -> None:
+    track = make_track(tail=7.0)
+    spoiled = track.tail_phase.copy()
+    spoiled[100:200] += 1.0  # a third of the track read wrongly
+    from dataclasses import replace
+
+    wrong = replace(track, tail_phase=spoiled)
+    degrees = np.degrees(7.0 * track.time[100:200]) % 360.0
+    rows = [f"{frame},{angle:.6f}" for frame, angle in zip(range(100, 200), degrees, strict=True)]
+    path = written(tmp_path, "frame,tail_phase_deg\n" + "\n".join(rows))
+    right = corrected(wrong, read_marks(path)[""], None)
+    assert right.tail_phase[100:200] == pytest.approx(7.0 * track.time[100:200], abs=1e-6)
+    assert np.array_equal(right.tail_phase[:100], track.tail_phase[:100])
+    item = trial_of(right, robot).quantities["tail_rotation_rate"]
+    assert item.low <= 7.0 <= item.high
+
+
+def test_trackpy_and_deeplabcut_give_the_same_speed(
+    tmp_path: Path, make_track: Callable[..., Track], robot: Any
+) -> None:
+    frames = np.arange(0, 120)
+    u = 200.0 + 1e-3 * frames / 30 / PIXEL
+    trackpy = tmp_path / "trackpy.csv"
+    trackpy.write_text(
+        ",y,x,mass,frame,particle\n" + "\n".join(f"{i},239.5,{x:.6f},9.0,{i},0" for i, x in zip(frames, u, strict=True))
+    )
+    lab = tmp_path / "dlc.csv"
+    lab.write_text(
+        "scorer,s,s,s,s,s,s\nbodyparts,nose,nose,nose,rear,rear,rear\ncoords,x,y,likelihood,x,y,likelihood\n"
+        + "\n".join(
+            f"{i},{x + 70:.6f},239.5,0.99,{x - 70:.6f},239.5,{0.1 if i == 50 else 0.99}"
+            for i, x in zip(frames, u, strict=True)
+        )
+    )
+    setup = make_track().setup
+    tracks = [read_track(path, setup, "a.mp4", RULED, seconds) for path in (trackpy, lab)]
+    for track in tracks:
+        found = trial_of(track, robot).quantities
+        assert found["forward_velocity"].value == pytest.approx(1e-3, rel=1e-5)
+        assert found["tail_rotation_rate"].to_dict()["value"] is None
+    assert np.isnan(tracks[1].position[50]).all()
+    assert tracks[1].heading[0] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("frame,x_pixel\n1,2\n", "column 'x_pixel' is unknown (did you mean x_px?)"),
+        ("x_px\n1\n", "neither column 'frame' nor 'time_s' is there"),
+        ("frame,video\n1,a\n", "holds no readings; allowed: at least one column of x_px"),
+        ("frame,x_px,x_px\n1,2,3\n", "column 'x_px' stands twice"),
+        ("frame,x_px\n1,2\n2,two\n", "row 3, column x_px: 'two'; allowed: a number, or empty"),
+        ("frame,x_px\n1,2\n2,1_0\n", "row 3, column x_px: '1_0'"),
+        ("frame,x_px\n1,inf\n", "row 2, column x_px: 'inf'"),
+        ("frame,x_px\n1.5,2\n", "row 2, column frame: '1.5'; allowed: a whole number from 0"),
+        ("frame,x_px\n1,2\n1,3\n", "rows 2 and 3 are of the same frame"),
+        ("frame,x_px\n1,2,3\n", "row 2: 3 cells; allowed: 2"),
+        ("frame,time_s,x_px\n,,3\n", "row 2: neither frame nor time_s"),
+        ("frame,x_px\n", "holds no readings"),
+        ("", "is empty"),
+    ],
+)
+def test_a_bad_table_of_readings_is_one_sentence(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_marks(written(tmp_path, text))
+    assert words in str(caught.value)
+    assert "marks.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x,y\n1,2\n", "column 'frame' is missing"),
+        ("x,y,frame,particle\n1,2,0,0\n1,2,1,1\n", "column particle: 2 particles; allowed: the robot's alone"),
+        ("x,y,frame\n1,2,0\n1,2,0\n", "frame 0 stands twice"),
+        ("x,y,frame\n1,2,-1\n", "row 2, column frame: '-1'"),
+        ("scorer,s,s\nbodyparts,eye,eye\ncoords,x,y\n0,1,2\n", "points eye; allowed: nose and rear, or centre"),
+        ("scorer,s,s\nindividuals,a,a\nbodyparts,nose,nose\n0,1,2\n", "holds several individuals"),
+        ("scorer,s,s\nbodyparts,centre,centre\ncoords,x,y\n0,1,far\n", "row 4, column centre y: 'far'"),
+    ],
+)
+def test_a_bad_track_of_others_is_one_sentence(
+    tmp_path: Path, make_track: Callable[..., Track], text: str, words: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        read_track(written(tmp_path, text), make_track().setup, "a.mp4", RULED, seconds)
+    assert words in str(caught.value)
+
+
+def test_a_reading_of_a_frame_that_is_not_there_is_refused(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    marks = read_marks(written(tmp_path, "frame,x_mm\n5,1\n9999,2\n"))[""]
+    with pytest.raises(InputError, match="row 3: frame 9999 was not measured"):
+        corrected(make_track(), marks, None)

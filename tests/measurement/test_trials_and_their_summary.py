@@ -1,0 +1,111 @@
+"""What a trial measures, what a flag spoils, and what all trials share."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import t
+
+from spirillum.measurement.summary import compared, summary_of
+from spirillum.measurement.trials import trial_of
+from spirillum.tracking.track import Flag, Track
+
+Make = Callable[..., Track]
+
+
+def test_motor_rate_is_tail_less_body_and_truth_is_inside(make_track: Make, robot: Any) -> None:
+    trial = trial_of(make_track(), robot, "a")
+    truth = {
+        "forward_velocity": 1e-3,
+        "body_rotation_rate": -0.7,
+        "tail_rotation_rate": 7.0,
+        "motor_rotation_rate": 7.7,
+    }
+    for name, value in truth.items():
+        item = trial.quantities[name]
+        assert item.low <= value <= item.high
+        assert item.value == pytest.approx(value, rel=2e-3)
+    assert trial.flags == ()
+
+
+def test_scale_widens_the_velocity_of_a_trial_and_not_its_rates(make_track: Make, robot: Any) -> None:
+    sure, unsure = (trial_of(make_track(scale_error=e), robot).quantities for e in (0.0, 0.07))
+    v, w = sure["forward_velocity"], unsure["forward_velocity"]
+    assert w.value == v.value
+    assert w.high - w.value == pytest.approx(np.hypot(v.high - v.value, 1.959964 * 0.07 * v.value), rel=1e-6)
+    assert sure["tail_rotation_rate"] == unsure["tail_rotation_rate"]
+
+
+def test_scale_does_not_shrink_with_the_number_of_trials(make_track: Make, robot: Any) -> None:
+    trials = [trial_of(make_track(seed=seed, scale_error=0.07), robot, f"{seed}") for seed in range(5)]
+    for count in (2, 5):
+        item = summary_of(trials[:count]).quantities["forward_velocity"]
+        values = np.array([trial.quantities["forward_velocity"].value for trial in trials[:count]])
+        student = t.ppf(0.975, count - 1) * values.std(ddof=1) / np.sqrt(count)
+        assert item.high - item.value == pytest.approx(np.hypot(student, 1.959964 * 0.07 * values.mean()), rel=1e-9)
+        assert item.high - item.value >= 1.95 * 0.07 * values.mean()
+
+
+def test_rates_over_trials_have_students_interval(make_track: Make, robot: Any) -> None:
+    trials = [trial_of(make_track(seed=k, tail=7.0 + 0.1 * k), robot) for k in range(5)]
+    item = summary_of(trials).quantities["tail_rotation_rate"]
+    half = t.ppf(0.975, 4) * np.std(0.1 * np.arange(5), ddof=1) / np.sqrt(5)
+    assert item.value == pytest.approx(7.2, rel=1e-3)
+    assert item.high - item.value == pytest.approx(half, rel=5e-2)
+
+
+def test_one_trial_keeps_its_own_interval(make_track: Make, robot: Any) -> None:
+    trial = trial_of(make_track(), robot)
+    assert summary_of([trial]).quantities["tail_rotation_rate"] == trial.quantities["tail_rotation_rate"]
+
+
+def test_a_flag_spoils_its_quantity_and_what_follows_from_it(make_track: Make, robot: Any) -> None:
+    flag = Flag("aliased-tail", "the tail turns too fast for this camera", ("tail_rotation_rate",))
+    trial = trial_of(make_track(flags=(flag,)), robot)
+    answer = trial.to_dict()
+    for name in ("tail_rotation_rate", "motor_rotation_rate", "lateral_wobble_at_tail_rate"):
+        assert answer[name]["value"] is None
+        assert answer[name]["reason"] == flag.sentence
+        assert "low" not in answer[name]
+    assert answer["body_rotation_rate"]["value"] is not None
+    both = summary_of([trial, trial_of(make_track(seed=1), robot)])
+    assert both.counts["tail_rotation_rate"] == 1
+    assert both.counts["body_rotation_rate"] == 2
+
+
+def test_wobble_has_its_amplitude_at_the_rate_of_its_part_only(make_track: Make, robot: Any) -> None:
+    found = trial_of(make_track(wobble=2e-4, body=-1.9), robot).quantities
+    tail, body = found["lateral_wobble_at_tail_rate"], found["lateral_wobble_at_body_rate"]
+    assert tail.low <= 2e-4 <= tail.high
+    assert tail.high - tail.low < 1e-5
+    assert body.low < 1e-5
+    assert body.value < 1e-5
+
+
+def test_a_body_that_hardly_turns_says_why_its_interval_is_wide(make_track: Make, robot: Any) -> None:
+    slow = trial_of(make_track(body=-0.02), robot)
+    assert "short-turn" in [flag.name for flag in slow.flags]
+    item, fast = slow.quantities["body_rotation_rate"], trial_of(make_track(), robot).quantities["body_rotation_rate"]
+    assert item.low <= -0.02 <= item.high
+    assert item.high - item.low > 2.0 * (fast.high - fast.low)
+
+
+def test_two_frames_of_a_camera_are_not_a_measurement(make_track: Make, robot: Any) -> None:
+    trial = trial_of(make_track(span=2 / 30), robot)
+    assert trial.track.time.size == 2
+    answer = trial.to_dict()
+    assert answer["forward_velocity"]["value"] is None
+    assert answer["forward_velocity"]["reason"] == "it was seen on too few frames"
+
+
+def test_an_outlying_trial_is_flagged_and_still_counts(make_track: Make, robot: Any) -> None:
+    trials = [trial_of(make_track(seed=k, tail=7.0 + 0.01 * k), robot) for k in range(5)]
+    trials.append(trial_of(make_track(seed=9, tail=9.0), robot))
+    judged = compared(trials)
+    names = [[flag.name for flag in trial.flags] for trial in judged]
+    assert "outlier-tail-rotation-rate" in names[5]
+    assert not any("outlier-tail-rotation-rate" in found for found in names[:5])
+    summary = summary_of(judged)
+    assert summary.counts["tail_rotation_rate"] == 6
+    assert summary.quantities["tail_rotation_rate"].value == pytest.approx((5 * 7.02 + 9.0) / 6, rel=1e-3)
