@@ -1,6 +1,10 @@
 """Draw the pictures of README and pages: the robot from its file, flat and in space, its wire, the flow around it."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import av
 
 import spirillum as sp
 from spirillum.plots.flow import flow_figure
@@ -9,6 +13,16 @@ from spirillum.plots.magnetic import magnetic_figure
 from spirillum.plots.robot import robot_figure
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
+
+
+def _frame(film: Path, number: int) -> Any:
+    """One frame of a film."""
+    with av.open(str(film)) as container:
+        for count, frame in enumerate(container.decode(video=0)):
+            if count == number:
+                return frame.to_image()
+    raise ValueError(number)
+
 
 if __name__ == "__main__":
     flow = sp.flow("biorob2012-wide", tail_rate="1.2 Hz")
@@ -23,6 +37,12 @@ if __name__ == "__main__":
         target = FOLDER / f"{name}.png"
         figure.savefig(target, dpi=dpi, metadata={"Software": None})
         print(target.name, target.stat().st_size, "bytes")
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        sp.render("biorob2012-wide", folder / "trial.mp4", tail_rate="1.2 Hz", duration="4 s", degradation="degraded")
+        sp.measure([folder / "trial.mp4"], folder / "trial.setup.toml", output=folder)
+        frame = _frame(folder / "trial.annotated.mp4", 60)
+        frame.save(FOLDER / "measured.png")
     target = FOLDER / "robot3d.png"
     sp.show("biorob2012-wide", target, phase="30 deg")
     print(target.name, target.stat().st_size, "bytes")

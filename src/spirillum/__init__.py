@@ -13,9 +13,13 @@ if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking, rank_models
     from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
+    from spirillum.drawing.film import Film, film
+    from spirillum.drawing.show import Picture3D, show
     from spirillum.errors import InputError
     from spirillum.exports.write import Export, export
     from spirillum.hydrodynamics.resistance import Resistance, resistance
+    from spirillum.measurement.feasibility import Feasibility, feasibility
+    from spirillum.measurement.measure import Measurement, measure
     from spirillum.motion.comparison import ModelComparison, compare_models
     from spirillum.motion.flow import Flow, flow
     from spirillum.motion.magnetic_sweep import magnetic_sweep
@@ -24,19 +28,21 @@ if TYPE_CHECKING:
     from spirillum.motion.settling import Settling, settle
     from spirillum.motion.simulation import simulate
     from spirillum.motion.swimming import swim
-    from spirillum.drawing.film import Film, film
-    from spirillum.drawing.show import Picture3D, show
     from spirillum.robot import Robot, RobotBatch, load
     from spirillum.studies import study
+    from spirillum.virtual.experiment import virtual_experiment
+    from spirillum.virtual.trial import render
 
     __version__: str
 
 __all__ = [
     "Calibrated",
     "Export",
+    "Feasibility",
     "Film",
     "Flow",
     "InputError",
+    "Measurement",
     "ModelComparison",
     "Picture3D",
     "Prediction",
@@ -51,12 +57,15 @@ __all__ = [
     "citation",
     "compare_models",
     "export",
+    "feasibility",
     "film",
     "flow",
     "load",
     "magnetic_sweep",
+    "measure",
     "predict",
     "rank_models",
+    "render",
     "resistance",
     "settle",
     "show",
@@ -64,14 +73,17 @@ __all__ = [
     "study",
     "suggest",
     "swim",
+    "virtual_experiment",
 ]
 
 _HOME = {
     "Calibrated": "spirillum.calibration.fit",
     "Export": "spirillum.exports.write",
+    "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.drawing.film",
     "Flow": "spirillum.motion.flow",
     "InputError": "spirillum.errors",
+    "Measurement": "spirillum.measurement.measure",
     "ModelComparison": "spirillum.motion.comparison",
     "Picture3D": "spirillum.drawing.show",
     "Prediction": "spirillum.motion.prediction",
@@ -86,12 +98,15 @@ _HOME = {
     "citation": "spirillum.citations",
     "compare_models": "spirillum.motion.comparison",
     "export": "spirillum.exports.write",
+    "feasibility": "spirillum.measurement.feasibility",
     "film": "spirillum.drawing.film",
     "flow": "spirillum.motion.flow",
     "load": "spirillum.robot",
     "magnetic_sweep": "spirillum.motion.magnetic_sweep",
+    "measure": "spirillum.measurement.measure",
     "predict": "spirillum.motion.prediction",
     "rank_models": "spirillum.calibration.ranking",
+    "render": "spirillum.virtual.trial",
     "resistance": "spirillum.hydrodynamics.resistance",
     "settle": "spirillum.motion.settling",
     "show": "spirillum.drawing.show",
@@ -99,6 +114,7 @@ _HOME = {
     "study": "spirillum.studies",
     "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.motion.swimming",
+    "virtual_experiment": "spirillum.virtual.experiment",
 }
 
 

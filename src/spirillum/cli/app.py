@@ -11,6 +11,7 @@ from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
+from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
 from spirillum.cli.options import (
@@ -41,7 +42,9 @@ from spirillum.cli.options import (
 )
 from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
+from spirillum.cli.setup_commands import setup_app
 from spirillum.cli.show_commands import film, show
+from spirillum.cli.virtual_commands import render, virtual_experiment
 
 __all__ = ["app"]
 
@@ -53,15 +56,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.add_typer(robot_app, name="robot")
-app.add_typer(observations_app, name="observations")
-app.command()(settle)
-app.command()(calibrate)
-app.command("rank-models")(rank_models)
-app.command()(suggest)
-app.command()(export)
-app.command()(show)
-app.command()(film)
 
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
@@ -85,7 +79,6 @@ def _root(
     """
 
 
-@app.command()
 def predict(
     robot: RobotArgument,
     model: Model = "sbt",
@@ -138,7 +131,6 @@ def predict(
     text.show(result.to_dict(), text.prediction, json=json)
 
 
-@app.command("compare-models")
 def compare_models(
     robot: RobotArgument,
     output: Picture = None,
@@ -194,7 +186,6 @@ def compare_models(
     text.show(comparison_text.comparison_answer(result, output), comparison_text.model_comparison, json=json)
 
 
-@app.command()
 def resistance(
     robot: RobotArgument,
     part: Annotated[
@@ -241,7 +232,6 @@ def resistance(
     text.show(result.to_dict(), text.resistance, json=json)
 
 
-@app.command()
 def study(
     source: Annotated[Path | None, typer.Argument(help="Study file (TOML); without one, the paper's study.")] = None,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
@@ -290,12 +280,6 @@ def study(
     text.show(text.study_answer(dataset, output), text.study, json=json)
 
 
-app.command()(simulate)
-app.command("magnetic-sweep")(magnetic_sweep)
-app.command()(flow)
-
-
-@app.command()
 def schema(
     name: Annotated[str, typer.Argument(autocompletion=complete_schemas, help="robot, study, calibration or setup.")],
 ) -> None:
@@ -309,7 +293,6 @@ def schema(
     typer.echo(as_json(schema_of(name)))
 
 
-@app.command()
 def citation(
     model: Annotated[str | None, typer.Argument(help="A model, for its references too.")] = None,
 ) -> None:
@@ -320,3 +303,30 @@ def citation(
     from spirillum.citations import citation as answer
 
     typer.echo(answer(model))
+
+
+for _command in (
+    predict,
+    compare_models,
+    resistance,
+    study,
+    simulate,
+    settle,
+    flow,
+    magnetic_sweep,
+    show,
+    film,
+    export,
+    render,
+    virtual_experiment,
+    measure,
+    calibrate,
+    rank_models,
+    suggest,
+    schema,
+    citation,
+):
+    app.command()(_command)
+app.add_typer(robot_app, name="robot")
+app.add_typer(setup_app, name="setup")
+app.add_typer(observations_app, name="observations")
