@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from spirillum.hydrodynamics.resistance import resistance
 from spirillum.robot.load import load
 from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
 from spirillum.tracking.unwrapping import contradictions, nyquist, unwrapped
@@ -102,6 +103,19 @@ def test_body_and_tail_cannot_turn_the_same_way() -> None:
         assert "tail_rotation_rate" in flag.spoils
     (flag,) = contradictions(time, np.full(300, np.nan), -7.0 * time, forward, robot)
     assert flag.name == "aliased-tail"
+
+
+def test_no_wire_advances_more_than_half_its_wavelength_a_turn() -> None:
+    time = np.arange(300) / FPS
+    robot = load("biorob2012-wide")
+    advance = 0.49 * robot.tail.wavelength * 3.0 / TURN
+    assert contradictions(time, -0.1 * time, 3.0 * time, advance * time, robot) == ()
+    (flag,) = contradictions(time, -0.1 * time, 3.0 * time, 1.05 * advance * time, robot)
+    assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
+    for amplitude in ("1 mm", "3 mm", "8 mm"):  # the tail alone, free of any body, by resistive force theory
+        tail = load("biorob2012-wide", **{"tail.amplitude": amplitude, "tail.wavelength": "15 mm"})
+        matrix = resistance(tail, part="tail", model="rft").matrix
+        assert 0.0 < -matrix[0, 3] / matrix[0, 0] * TURN < 0.5 * tail.tail.wavelength
 
 
 def test_largest_rates_are_half_a_period_a_frame() -> None:

@@ -16,6 +16,7 @@ from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
+from spirillum.units import show
 
 __all__ = ["Resolvable", "contradictions", "nyquist", "unwrapped"]
 
@@ -35,6 +36,9 @@ _DRIFT = 0.05
 """Change of the rate over a gap, relative, that has to be reckoned with."""
 _TURNED = 0.35
 """Least angle, rad, that counts as turning when two senses of rotation are compared."""
+
+_MOST_ADVANCE = 0.5
+"""Largest advance of a helix in a turn over its wavelength."""
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -238,7 +242,8 @@ def contradictions(
 ) -> tuple[Flag, ...]:
     """Rates that no free swimmer has: a sign of a rate too fast for the camera, or of a wrong robot file.
 
-    Without an outer torque the body turns against its tail; a tail that turns forward drives forward.
+    Without an outer torque the body turns against its tail; a tail that turns forward drives forward, by resistive
+    force theory at most by 1 - c_t/c_n < 1/2 of its wavelength a turn, whatever its amplitude (Gray and Hancock 1955).
 
     Args:
         time: s, (n,).
@@ -273,10 +278,19 @@ def contradictions(
         )
         return (Flag("aliased-tail", sentence),)
     far = abs(moved) > 0.05 * robot.body.length
-    if turns and far and moved * robot.hand * tail < 0:
-        sentence = (
-            "The robot moves against the sense in which its tail seems to turn: the tail is too fast for this frame "
-            "rate, tail.handedness is wrong, or something else moves the robot; the tail's rotation is not given."
-        )
-        return (Flag("aliased-tail", sentence, _RATES["tail"]),)
-    return ()
+    return _not_driven(moved, tail_turned, robot) if turns and far else ()
+
+
+def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
+    """A way that no tail drives which turns as this one seems to."""
+    advance = 2 * np.pi * moved / tail_turned
+    if advance * robot.hand < 0:
+        why = "moves against the sense in which its tail seems to turn"
+        what = "the tail is too fast for this frame rate, tail.handedness is wrong"
+    elif abs(advance) > _MOST_ADVANCE * robot.tail.wavelength:
+        why = f"advances {show(abs(advance), 'mm')} a turn of its tail, more than half a wavelength"
+        what = "the tail is too fast for this frame rate"
+    else:
+        return ()
+    sentence = f"The robot {why}: {what}, or something else moves the robot; the tail's rotation is not given."
+    return (Flag("aliased-tail", sentence, _RATES["tail"]),)
