@@ -40,6 +40,16 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER, *GOOD, "40,10,2.5,1,-1.0,1.2,-0.1"], "row 5, column forward_velocity_mm_s: the mean is backwards"),
         ([HEADER, *(row.rsplit(",", 1)[0] + "," for row in GOOD)], "free = 'body_rotation': nothing observed"),
         ([HEADER, *GOOD, "40,10,2.5,0.5,1.0,1.2,-0.1"], "row 5, column trial: '0.5'; allowed: a whole number"),
+        (
+            [HEADER.rsplit(",", 2)[0], *(row.rsplit(",", 2)[0] for row in GOOD)],
+            "row 2, column tail_rate_Hz: empty, as in all rows with a speed; allowed: tail_rate_Hz or motor_rate_Hz",
+        ),
+        (
+            [HEADER + ",tail_rate_Hz_ci95", *(f"{row},0.1" for row in GOOD)],
+            "row 2, column tail_rate_Hz_ci95: an interval of one trial; allowed: a column trials",
+        ),
+        ([row.replace(",", ";") for row in (HEADER, *GOOD)], "columns are separated by semicolons; allowed: commas"),
+        ([row.replace(",", "\t") for row in (HEADER, *GOOD)], "columns are separated by tabs; allowed: commas"),
     ],
 )
 def test_wrong_observations_name_row_and_column(
@@ -104,3 +114,19 @@ def test_a_robot_in_anothers_channel_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path, f"robot,{HEADER}", *(f"{WIDE},{row}" for row in GOOD), f"{WIDE},30,15,2.5,1,.8,1.2,-.14")
     with pytest.raises(InputError, match="row 5, column robot: 'biorob2012-wide', but its channel of 30 mm"):
         sp.calibrate(path, [WIDE, "biorob2012-narrow"], method="paper")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["calibrate", "observations.csv", WIDE, "-o", ""], "output = ''; allowed: a folder for the results"),
+        (["suggest", "posterior.nc", "--rows", "0"], "rows = 0; allowed: at least 1"),
+    ],
+)
+def test_wrong_options_are_refused_before_anything_is_read(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(arguments)
+    assert stopped.value.code == 2
+    assert words in capsys.readouterr().err

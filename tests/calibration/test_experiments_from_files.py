@@ -94,3 +94,21 @@ def test_correlation_of_the_errors_is_found(tmp_path: Path) -> None:
             )
     (tmp_path / "o.csv").write_text("\n".join(lines) + "\n")
     assert read_experiment(tmp_path / "o.csv", [load(WIDE)]).correlation == pytest.approx(-0.95, abs=1e-6)  # clipped
+
+
+def test_a_byte_order_mark_does_not_make_synthetic_data_measured(made: Callable[..., Path], tmp_path: Path) -> None:
+    path = tmp_path / "bom.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + made(**SMALL, seed=12).read_bytes())
+    assert read_experiment(path, [load(WIDE)]).synthetic
+
+
+def test_what_was_derived_is_not_counted_as_measured(tmp_path: Path) -> None:
+    from spirillum.measurement.template import observations_answer
+
+    path = tmp_path / "o.csv"
+    lines = ["channel_diameter_mm,wavelength_mm,amplitude_mm,trial,tail_rate_Hz,body_rate_Hz,motor_rate_Hz"]
+    # The row of commas is what a spreadsheet leaves of an empty one.
+    path.write_text("\n".join([*lines, "40,15,2.5,1,1.2,-0.1,", ",,,,,,", "40,15,2.5,2,1.2,-0.1,1.3"]) + "\n")
+    found = observations_answer(path)
+    assert found["rows"] == 2
+    assert found["measured"] == {"forward_velocity": 0, "tail_rate": 2, "body_rate": 2, "motor_rate": 1}

@@ -8,6 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
+from spirillum.robot import RobotBatch
 
 WIDE = "biorob2012-wide"
 PRESETS = (WIDE, "biorob2012-narrow")
@@ -125,3 +126,70 @@ def test_shares_are_written_without_powers_of_ten(share: float, words: str) -> N
     from spirillum.calibration.judgement import percent
 
     assert percent(share) == words
+
+
+def test_a_wrong_model_is_said_to_miss_without_repeated_trials_too(made: Callable[..., Path], tmp_path: Path) -> None:
+    path = made(presets=(WIDE,), trials=1, error=0.0, seed=21)
+    found = sp.calibrate(path, WIDE, model="rft", method="least-squares")
+    assert found.discrepancy["turning"].value > 0.1
+    assert any("observed once for each tail" in warning for warning in found.warnings)
+    assert any("model 'rft' misses the body rate from tail to tail" in warning for warning in found.warnings)
+    own = sp.calibrate(path, WIDE, model="sbt", method="least-squares")
+    assert not any("misses" in warning for warning in own.warnings)
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    means = [lines[0].replace("trial,", "trials,"), *(line.replace(",1,", ",3,", 1) for line in lines[1:])]
+    (tmp_path / "means.csv").write_text("\n".join(means) + "\n")
+    several = sp.calibrate(tmp_path / "means.csv", WIDE, method="least-squares").warnings
+    assert any("has means without the scatter of their trials" in warning for warning in several)
+    assert not any("observed once" in warning for warning in several)
+
+
+def test_a_number_that_was_pulled_far_is_not_called_unidentifiable(made: Callable[..., Path]) -> None:
+    found = sp.calibrate(made(**FOUR, seed=22, friction=3e-5), WIDE, method="least-squares", free="viscosity")
+    assert any("standard deviations from the middle of its prior" in warning for warning in found.warnings)
+    assert not any("hardly identifiable" in warning for warning in found.warnings)
+    assert any("the rotor's own B_m alone, for friction.effective is unset" in warning for warning in found.warnings)
+    rubbing = {"extends": WIDE, "friction": {"effective": "3e-5 N m s/rad"}}
+    known = sp.calibrate(made(**FOUR, seed=22, friction=3e-5), rubbing, method="least-squares", free="viscosity")
+    assert not any("B_m" in warning for warning in known.warnings)
+
+
+def test_friction_as_printed_says_that_it_does_not_give_the_rates_back(made: Callable[..., Path]) -> None:
+    """At the observed motor rate (19) turns the body at K_m I/(f E_x): held against `predict` with that reading."""
+    path = made(**FOUR, seed=23, error=0.0, trials=1)
+    found = sp.calibrate(path, WIDE, method="paper", friction="paper")
+    assert any("B_eff of this reading does not give the observed rates back" in words for words in found.warnings)
+    assert not any("(19)" in words for words in sp.calibrate(path, WIDE, method="paper").warnings)
+    z = found.problem.coordinate_of({name: np.array(item.value) for name, item in found.values.items()})
+    turning = found.problem.printed_turning(z[None])[0]
+    for place, robot in enumerate(found.experiment.robots):
+        factors = {"body_drag": found.values["body_drag"].value, "body_rotation": found.values["body_rotation"].value}
+        own = robot.calibration["sbt"].model_copy(update=factors)
+        calibrated = robot.model_copy(update={"calibration": {"sbt": own}})
+        seen = found.experiment
+        swum = sp.swim(
+            RobotBatch.of(calibrated),
+            tail_rate=seen.tail_rate[place : place + 1],
+            motor_rate=seen.motor_rate.mean[place : place + 1],
+            friction="paper",
+        )
+        if swum.valid[0]:
+            ratio = swum.body_rotation_rate[0] / swum.tail_rotation_rate[0]
+            assert turning[place] == pytest.approx(ratio, rel=1e-9)
+
+
+def test_rates_in_radians_are_suspected(made: Callable[..., Path], tmp_path: Path) -> None:
+    path = scaled(made(**FOUR, seed=24), tmp_path / "a.csv", "tail_rate_Hz", 2 * np.pi)
+    path = scaled(path, tmp_path / "b.csv", "body_rate_Hz", 2 * np.pi)
+    found = sp.calibrate(path, WIDE, method="least-squares")
+    assert any("are the rates in Hz, turns a second, and not in rad/s" in warning for warning in found.warnings)
+
+
+def test_every_value_lies_inside_its_interval(made: Callable[..., Path]) -> None:
+    free = "body_drag,viscosity,torque_constant,shared_friction"
+    found = sp.calibrate(made(**FOUR, seed=25), WIDE, method="least-squares", free=free)
+    items = [*found.values.values(), *found.discrepancy.values(), *found.friction]
+    assert all(item.low <= item.value <= item.high for item in items)
+    assert all(item.value > 0 for item in found.discrepancy.values())
+    for values, low, high in found.predicted.values():
+        assert np.all((low <= values) & (values <= high))

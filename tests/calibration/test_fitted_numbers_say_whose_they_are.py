@@ -132,10 +132,50 @@ def test_a_second_calibration_leaves_nothing_of_the_first(
 
     folder = tmp_path / "results"
     shutil.copytree(fitted, folder)
-    (folder / "figures").mkdir()
-    (folder / "figures" / "posterior.png").write_bytes(b"old")
+    (folder / "figures").mkdir(exist_ok=True)
     (folder / "figures" / "my-own.png").write_bytes(b"mine")
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
     sp.calibrate(made(**small, seed=4), WIDE, model="rft", method="least-squares").write(folder, figures=False)
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert found == {"calibration.toml", "predictions.csv", "figures/my-own.png"}
+
+
+def test_friction_of_another_models_torque_is_said(calibration: Path) -> None:
+    calibration.write_text(calibration.read_text().replace("synthetic = true", 'synthetic = true\nmodel = "sbt"'))
+    words = "B_eff was inferred with the torque of model 'sbt' and is used with 'rft'"
+    found = {model: sp.predict(WIDE, model=model, calibration=calibration).warnings for model in ("sbt", "rft")}
+    assert any(words in said for said in found["rft"])
+    assert not any("the torque of model" in said for said in found["sbt"])
+    at_rate = sp.predict(WIDE, model="rft", calibration=calibration, tail_rate="1 Hz").warnings
+    assert not any("the torque of model" in said for said in at_rate)
+    compared = sp.compare_models(WIDE, models=["sbt", "rft"], calibration=calibration).warnings
+    assert any(said.startswith("rft: ") and words in said for said in compared)
+    study = {"title": "t", "models": ["sbt", "rft"], "friction": ["rotor"], "robots": [WIDE]}
+    assert words in sp.study(study, calibration=calibration).attrs["warnings"]
+
+
+def test_a_calibration_that_does_nothing_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "gap.toml"
+    path.write_text(
+        '[provenance]\nobservations = "tube.csv"\nsynthetic = true\n[[placement]]\nchannel_diameter = "40 mm"\n'
+        '[placement.placement]\ngap = "0.4 mm"\n'
+    )
+    found = sp.predict(WIDE, model="sbt", calibration=path, tail_rate="1 Hz").warnings
+    assert any(f"nothing in {path} is for model 'sbt': the robot's own numbers are used" in said for said in found)
+    assert not any("rests on no measurement" in said for said in found)
+    study = {"title": "t", "models": ["sbt", "rft"], "friction": ["none"], "robots": [WIDE]}
+    warnings = sp.study(study, calibration=path).attrs["warnings"]
+    assert "is for model 'sbt'" in warnings
+    assert "is for model 'rft'" in warnings
+    path.write_text("[fitted]\nnormal_factor = 1.2\n")
+    assert any("is for model 'sbt'" in said for said in sp.predict(WIDE, calibration=path, tail_rate=6.0).warnings)
+    served = sp.predict(WIDE, model="rft", calibration=path, tail_rate=6.0).warnings
+    assert not any("nothing in" in said for said in served)
+
+
+def test_limits_are_spoken_of_only_where_there_are_some(calibration: Path) -> None:
+    study = {"title": "t", "models": ["rft"], "friction": ["rotor"], "robots": [WIDE, "biorob2012-narrow"]}
+    other = {"tail.wavelength": "13 mm"}
+    warnings = sp.study({**study, "robots": [WIDE]}, calibration=calibration, overrides=other).attrs["warnings"]
+    assert "B_eff of 1 of 1 tails was not fitted" in warnings
+    assert "intervals" not in warnings

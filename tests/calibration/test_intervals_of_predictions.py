@@ -70,6 +70,15 @@ def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> 
     assert found.high["forward_velocity"] == pytest.approx(high, rel=1e-12)
 
 
+def test_posterior_and_calibration_file_have_the_same_middle(fitted: Path) -> None:
+    one, other = (
+        sp.predict(WIDE, tail_rate=7.0, posterior=fitted / "posterior.nc"),
+        sp.predict(WIDE, tail_rate=7.0, calibration=fitted / "calibration.toml"),
+    )
+    assert one.forward_velocity == pytest.approx(other.forward_velocity, rel=1e-12)
+    assert one.body_rotation_rate == pytest.approx(other.body_rotation_rate, rel=1e-12)
+
+
 def test_json_says_kind_and_level(fitted: Path) -> None:
     answer = sp.predict(WIDE, posterior=fitted / "posterior.nc", tail_rate="1 Hz").to_dict()
     item = answer["forward_velocity"]

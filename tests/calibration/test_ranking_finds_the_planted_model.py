@@ -34,6 +34,10 @@ def test_failures_name_the_tails_with_the_largest_misfit(ranking: Any) -> None:
     sizes = [abs(row["standard_deviations"]["value"]) for row in worst]
     assert sizes == sorted(sizes, reverse=True)
     assert "tail" in worst[0]["tail"]
+    for item in ranking.ranked:
+        for row in ranking.failures(item):
+            more = row["observed_over_predicted"]["value"] - 1.0
+            assert more * row["standard_deviations"]["value"] > 0
     answer = ranking.to_dict()
     assert answer["models"][0]["difference"]["value"] == 0.0
 
@@ -61,6 +65,35 @@ def test_equal_models_are_not_told_apart(made: Callable[..., Path]) -> None:
     ranking = ranked_fits(fits)
     assert not ranking.clear
     assert "cannot be told apart" in ranking.verdict()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_few_tails_name_no_winner(ranking: Any, count: int) -> None:
+    from dataclasses import replace
+
+    few = tuple(
+        replace(item, pointwise=item.pointwise[:count], difference=-30.0 * place, difference_error=0.0)
+        for place, item in enumerate(ranking.ranked)
+    )
+    short = replace(ranking, ranked=few)
+    assert not short.clear
+    assert "too few to tell sbt and rft apart" in short.verdict()
+
+
+def test_failures_say_on_which_scale_they_are(ranking: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    from rich.console import Console
+
+    from spirillum.cli.calibration_text import ranking as table
+
+    table(ranking.to_dict(), Console(width=300))
+    printed = capsys.readouterr().out
+    assert "standard deviations" in printed
+    assert "misses motor rate by" not in printed
+
+
+def test_models_without_common_free_numbers_are_refused(made: Callable[..., Path]) -> None:
+    with pytest.raises(InputError, match="'tube' has no body_drag to fit, and models are ranked with the same free"):
+        sp.rank_models(made(), models=["tube", "sbt"])
 
 
 def test_a_single_model_is_no_ranking(made: Callable[..., Path]) -> None:

@@ -122,3 +122,27 @@ def test_wrong_candidates_are_refused_with_row_and_column(fitted: Path, rows: li
 def test_trials_have_to_be_some(fitted: Path) -> None:
     with pytest.raises(InputError, match="trials = 0"):
         sp.suggest(fitted / "posterior.nc", WIDE, trials=0)
+
+
+@pytest.mark.parametrize("robot", ["ecoli", "magnetic-helix"])
+def test_a_robot_without_channel_is_refused(fitted: Path, robot: str) -> None:
+    with pytest.raises(InputError, match="has no channel; allowed: robots with a channel"):
+        sp.suggest(fitted / "posterior.nc", robot)
+
+
+def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from spirillum.motion import posterior_file
+
+    assert len(sp.suggest(fitted / "posterior.nc").candidates) == 50
+    known = posterior_file.read_posterior(fitted / "posterior.nc")
+    for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):
+        monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path, one=changed: one)
+        with pytest.raises(InputError, match="allowed: ROBOT, one for each channel"):
+            sp.suggest("any")
+
+
+def test_another_geometry_is_said_and_a_tail_stands_once(fitted: Path) -> None:
+    other = {"extends": WIDE, "channel": {"diameter": "24 mm"}}
+    found = sp.suggest(fitted / "posterior.nc", other, candidates=candidates(fitted, "24,20,2.5", "24,20,2.5"))
+    assert any("used outside its geometry: channel.diameter = 24 mm" in warning for warning in found.warnings)
+    assert len(found.candidates) == 1

@@ -79,6 +79,8 @@ def test_a_file_without_factors_leaves_the_robot_its_own(tmp_path: Path) -> None
         ('[fitted]\nwire = "1 mm"\n', "fitted.wire is not a known field"),
         ('[fitted]\nviscosity = "3 mm"\n', '"mm" is not a unit of viscosity'),
         ("[calibration]\nsbt = 3\n", "calibration.sbt"),
+        (TABLES + '[provenance]\nfriction_reading = "foo"\n', "friction_reading"),
+        (TABLES.partition("[fitted]")[0] * 2, "calibration.sbt holds two entries for the same geometry"),
     ],
 )
 def test_wrong_files_are_refused(tmp_path: Path, text: str, words: str) -> None:

@@ -64,6 +64,14 @@ def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
             getattr(answer.intervals, end)["forward_velocity"], rel=1e-12
         )
         assert np.isnan(float(found.sel(model="rft")))
+    from spirillum.plots.evidence import Shown
+
+    shown = Shown.of(dataset).part(channel=1)
+    assert shown.with_intervals == ("sbt",)
+    for end, limit in zip(("low", "high"), shown.band("forward_velocity", "sbt"), strict=True):
+        stored = dataset[f"forward_velocity_interval_{end}"].sel(channel="narrow", model="sbt", friction="rotor")
+        assert limit == pytest.approx(stored.values)
+    assert "Shades: 95 % intervals of the posterior (sbt, friction reading 'rotor')" in shown.place_words
     low, high = (dataset[f"forward_velocity_interval_{end}"].sel(model="sbt") for end in ("low", "high"))
     middle = dataset["forward_velocity"].sel(model="sbt")
     assert bool(((low < middle) & (middle < high)).all())

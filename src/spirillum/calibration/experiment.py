@@ -144,6 +144,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
     for group in items:
         _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
+    _check_rates(path, observations, ratios)
     content = path.read_bytes()
     return Experiment(
         robots=tuple(
@@ -166,7 +167,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
 
 
 def _comments(content: bytes) -> str:
-    lines = content.decode("utf-8", "replace").splitlines()
+    lines = content.decode("utf-8-sig", "replace").splitlines()
     return " ".join(line.lower() for line in lines if line.lstrip().startswith("#"))
 
 
@@ -279,6 +280,16 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
             "way that its tail drives"
         )
     return found
+
+
+def _check_rates(path: Path, observations: Sequence[Observation], found: Sequence[_Seen]) -> None:
+    """Speeds alone say nothing of the fluid: how fast the tail turned has to be known too."""
+    speeds = [item for item in observations if np.isfinite(item.forward_velocity)]
+    if speeds and not any(np.isfinite(seen.advance.mean) for seen in found):
+        raise InputError(
+            f"{path}, row {speeds[0].row}, column tail_rate_Hz: empty, as in all rows with a speed; allowed: "
+            "tail_rate_Hz or motor_rate_Hz beside each speed, which is compared per rate"
+        )
 
 
 def _of_trials(values: Samples) -> _Trials:

@@ -16,6 +16,7 @@ from spirillum.calibration.judgement import (
     check_believable,
     common_warnings,
     far_warnings,
+    friction_warnings,
     misfit_warnings,
     plain_misfit_warnings,
     stray_warnings,
@@ -197,6 +198,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
             *stray_warnings(problem, z),
             *far_warnings(problem, z),
             *plain_misfit_warnings(problem, z),
+            *friction_warnings(problem, z, reading),
             *common_warnings(problem, friction),
         ),
     )
@@ -211,9 +213,12 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     values = {name: _fitted(float(best[name][0]), draws[name]) for name in best}
     friction = _friction(problem, z, fit.z, fit.error, reading, rng)
     predicted = _predicted(problem, fit.z, z, tau, rng)
-    discrepancy = {name: _fitted(value, tau[name]) for name, value in fit.discrepancy.items()}
+    # Where the moments give none, as where the fit misses less than the trials' errors, the middle of what may be.
+    discrepancy = {
+        name: _fitted(value or float(np.median(tau[name])), tau[name]) for name, value in fit.discrepancy.items()
+    }
     warnings = [
-        *_of_the_fit(problem, fit, report),
+        *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit.left),
         *common_warnings(problem, friction),
     ]
@@ -254,7 +259,7 @@ def _by_posterior(
     wrong = [f"the posterior may not be used: {problem_found}" for problem_found in posterior.problems()]
     warnings = [
         *wrong,
-        *_of_the_fit(problem, fit, report),
+        *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit.left),
         *common_warnings(problem, friction),
     ]
@@ -275,8 +280,13 @@ def _by_posterior(
     )
 
 
-def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability) -> list[str]:
-    return [*stray_warnings(problem, fit.z), *report.warnings, *far_warnings(problem, fit.z)]
+def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> list[str]:
+    return [
+        *stray_warnings(problem, fit.z),
+        *report.warnings,
+        *far_warnings(problem, fit.z),
+        *friction_warnings(problem, fit.z, reading),
+    ]
 
 
 def limits(draws: Samples) -> tuple[Samples, Samples]:
@@ -286,8 +296,8 @@ def limits(draws: Samples) -> tuple[Samples, Samples]:
 
 
 def _fitted(value: float, draws: Samples) -> Fitted:
-    low, high = limits(draws)
-    return Fitted(value, float(low), float(high))
+    low, high = (float(end) for end in limits(draws))
+    return Fitted(value, min(low, value), max(high, value))
 
 
 def _middle(draws: Samples) -> Fitted:
@@ -312,6 +322,7 @@ def _friction(
     draws = problem.friction(z, rates, reading)
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
     low, high = limits(draws)
+    low, high = np.minimum(low, middle), np.maximum(high, middle)  # NaN where no motor rate was observed
     return tuple(Fitted(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))
 
 
@@ -327,5 +338,6 @@ def _predicted(
     for name, values in draws.items():
         tau = np.reshape(np.asarray(discrepancy[name], dtype=float), (-1, 1))
         spread = values * (1.0 + tau * rng.normal(size=values.shape))
-        found[name] = (middle[name][0], *limits(spread))
+        low, high = limits(spread)
+        found[name] = (middle[name][0], np.minimum(low, middle[name][0]), np.maximum(high, middle[name][0]))
     return found

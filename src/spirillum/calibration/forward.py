@@ -20,7 +20,7 @@ from spirillum.motion.balance import force_free, friction_torques, rates_per_tor
 from spirillum.motion.motor import steady_current
 from spirillum.robot.batch import Electrics, RobotBatch
 
-__all__ = ["Draws", "Forward", "Predicted", "Table", "axis_points", "kinematics", "tabulated"]
+__all__ = ["Draws", "Forward", "Predicted", "Table", "TableError", "axis_points", "kinematics", "tabulated"]
 
 Draws = Mapping[str, Samples]
 """Parameter to values, (draws, robots) or (draws, 1)."""
@@ -59,6 +59,23 @@ class Table:
     """D_x of each robot, N s/m."""
     rotation: Samples
     """E_x of each robot, N m s."""
+
+
+@dataclass(frozen=True)
+class TableError:
+    """Largest relative errors of what a table predicts, at a place between its points; zeros without a table."""
+
+    interpolation: float = 0.0
+    """Against the model solved there as finely as at the points."""
+    resolution: float = 0.0
+    """Of the model solved as finely as at the points, against its own resolution."""
+    whole: float = 0.0
+    """Of the table, against the model at its own resolution."""
+
+    @property
+    def largest(self) -> float:
+        """What no prediction is taken to be better than; the parts may happen to cancel at one place."""
+        return max(self.interpolation, self.resolution, self.whole)
 
 
 def _three(axial: Samples) -> Samples:
@@ -230,8 +247,30 @@ class Forward:
             tail_share: observed omega/omega_m of each robot; None or NaN: as the model turns the body.
             reading: `rotor`, or `paper`, in which the body's torque row holds -K_m I.
         """
-        motor, m = self._motor(draws), self.matrices(draws)
+        m = self.matrices(draws)
         found = kinematics(m)
+        torque, tail, rate = self._at_motor_rate(found, draws, motor_rate, tail_share)
+        if reading == "rotor":
+            joint: Samples = (torque - found.load * tail) / rate
+            return joint
+        body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
+        body = _printed_body(m, torque, tail)
+        load = (m[..., 2, 1] + m[..., 2, 0] * body_u) * body + (m[..., 2, 2] + m[..., 2, 0] * rotor_u) * tail
+        printed: Samples = (torque - load) / rate
+        return printed
+
+    def printed_turning(self, draws: Draws, motor_rate: Samples, tail_share: Samples) -> Samples:
+        """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates; arguments as `friction`."""
+        m = self.matrices(draws)
+        torque, tail, _ = self._at_motor_rate(kinematics(m), draws, motor_rate, tail_share)
+        found: Samples = _printed_body(m, torque, tail) / tail
+        return found
+
+    def _at_motor_rate(
+        self, found: Predicted, draws: Draws, motor_rate: Samples, tail_share: Samples | None
+    ) -> tuple[Samples, Samples, Samples]:
+        """K_m I of (17), the tail's rate and the motor's, all in the motor's own sense."""
+        motor = self._motor(draws)
         own = 1.0 / (1.0 - found.turning)
         share = own if tail_share is None else np.where(np.isnan(tail_share), own, tail_share)
         shape = np.broadcast_shapes(share.shape, np.shape(motor_rate), *_motor_shapes(motor))
@@ -239,15 +278,7 @@ class Forward:
         flat_motor = _flat(motor, shape)
         emf = flat_motor.back_emf_constant * rate.reshape(-1)
         torque = motor.torque_constant * steady_current(flat_motor, emf, np.zeros(1)).reshape(shape)
-        tail = share * rate
-        if reading == "rotor":
-            joint: Samples = (torque - found.load * tail) / rate
-            return joint
-        body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
-        body = -(torque + (m[..., 1, 2] + m[..., 1, 0] * rotor_u) * tail) / (m[..., 1, 1] + m[..., 1, 0] * body_u)
-        load = (m[..., 2, 1] + m[..., 2, 0] * body_u) * body + (m[..., 2, 2] + m[..., 2, 0] * rotor_u) * tail
-        printed: Samples = (torque - load) / rate
-        return printed
+        return torque, share * rate, rate
 
     def _motor(self, draws: Draws) -> Electrics:
         if self.electrics is None:
@@ -279,6 +310,13 @@ def kinematics(m: Samples) -> Predicted:
     turning = (force[..., 2] * torque[..., 0] - force[..., 0] * torque[..., 2]) / determinant
     load = m[..., 2, 0] * advance + m[..., 2, 1] * turning + m[..., 2, 2]
     return Predicted(advance, turning, load)
+
+
+def _printed_body(m: Samples, torque: Samples, tail: Samples) -> Samples:
+    """Omega from the body's torque row with -K_m I in it, as (15) with (19) is printed."""
+    body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
+    found: Samples = -(torque + (m[..., 1, 2] + m[..., 1, 0] * rotor_u) * tail) / (m[..., 1, 1] + m[..., 1, 0] * body_u)
+    return found
 
 
 def _motor_shapes(motor: Electrics) -> list[tuple[int, ...]]:

@@ -21,6 +21,8 @@ __all__ = ["Identifiability", "Profile", "identified", "profiles"]
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
 _POOR = 3.0
+_FAR = 3.0
+"""Standard deviations of the prior beyond which the observations have overruled it."""
 _MEMBER = 0.25
 """Least share of a direction, over that of the first, at which a number is named."""
 _LEAST_ERROR = 1e-3
@@ -70,13 +72,14 @@ def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
     information = jacobian.T @ jacobian
     covariance = np.linalg.pinv(information, rcond=1e-14)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    said = [_words(problem, fit.z, s, d) for s, d in zip(singular, directions, strict=True) if s < _POOR]
     return Identifiability(
         labels=labels,
         sensitivity=np.sqrt(np.mean(relative**2, axis=0)) / np.maximum(np.abs(slope), 1e-12),
         singular=singular,
         directions=directions,
         correlation=covariance / np.outer(size, size),
-        warnings=tuple(_words(problem, fit.z, s, d) for s, d in zip(singular, directions, strict=True) if s < _POOR),
+        warnings=tuple(words for words in said if words),
     )
 
 
@@ -94,7 +97,7 @@ def _slopes(problem: Problem, z: Samples) -> Samples:
 
 
 def _words(problem: Problem, z: Samples, singular: float, direction: Samples) -> str:
-    """A poorly known direction in plain words."""
+    """A poorly known direction in plain words; none for a number that the observations took far from its prior."""
     # By the change of the numbers themselves, and of their coordinates: a wide prior makes a large change small there.
     relative = np.abs(direction * _slopes(problem, z))
     share = np.maximum(np.abs(direction), relative / max(float(relative.max()), 1e-300))
@@ -102,6 +105,8 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     labels = [problem.coordinates[place].label for place in named]
     known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
     if len(named) == 1:
+        if abs(z[named[0]]) > _FAR:
+            return ""
         return (
             f"{labels[0]} is hardly identifiable: the observations say {known} about it, for they hardly change "
             "with it, "

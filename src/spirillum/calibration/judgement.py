@@ -10,6 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import FEWEST_LEFT
+from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
 
@@ -20,6 +21,7 @@ __all__ = [
     "check_believable",
     "common_warnings",
     "far_warnings",
+    "friction_warnings",
     "misfit_warnings",
     "percent",
     "plain_misfit_warnings",
@@ -28,8 +30,12 @@ __all__ = [
 
 _WORDS: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 _LARGE_MISFIT = 0.03
+_BEYOND_TRIALS = 2.0 * ERROR_SCALE
+"""Discrepancy that no error of a single trial explains."""
 _SENSELESS = 10.0
 """Factor of a typical misfit beyond which observations and model differ in robot or units."""
+_PRINTED = 0.1
+"""Relative difference of the body's rates beyond which a reading of the friction does not fit the observations."""
 _FAR = 3.0
 _SENSELESSLY_FAR = 5.0
 _WIDE = 0.5
@@ -123,10 +129,18 @@ def misfit_warnings(
                 f"much model '{problem.model.name}' misses, and the intervals take what models of this kind miss by"
             )
         elif not problem.ratio(name).freedom.sum() > 0:
+            once = not np.any(problem.ratio(name).trials > 1)
+            why = "was observed once for each tail" if once else "has means without the scatter of their trials"
             found.append(
-                f"the {_WORDS[name]} was observed once for each tail: the errors of trials and of the model "
-                "cannot be told apart, and the discrepancy holds both"
+                f"the {_WORDS[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
+                "discrepancy holds both"
             )
+            if size.value > _BEYOND_TRIALS:
+                found.append(
+                    f"the discrepancy of the {_WORDS[name]}, {percent(size.value)}, is more than trials are off by: "
+                    f"model '{problem.model.name}' misses the {_WORDS[name]} from tail to tail, its fitted numbers "
+                    "stand for what it lacks, and hold for these tails"
+                )
         elif size.value > _LARGE_MISFIT:
             found.append(
                 f"model '{problem.model.name}' misses the {_WORDS[name]} by {percent(size.value)} from tail to tail, "
@@ -150,6 +164,35 @@ def plain_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
     return found
 
 
+def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
+    """What a fit takes for granted of the friction.
+
+    Args:
+        problem: the fit.
+        z: coordinates of the best fit.
+        reading: reading of the friction under which B_eff follows from (18).
+    """
+    unset = all(robot.friction.effective is None for robot in problem.experiment.robots)
+    if problem.by_motor_rate and unset and "shared_friction" not in problem.free:
+        return [
+            "the motor rate is predicted with the rotor's own B_m alone, for friction.effective is unset: what the "
+            f"joint rubs more goes into {', '.join(name for name in problem.free if name != 'friction')}; allowed: "
+            "shared_friction free too"
+        ]
+    if reading != "paper" or "friction" not in problem.free:
+        return []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = problem.printed_turning(z[None])[0] / problem.experiment.turning.mean
+    known = ratio[np.isfinite(ratio)]
+    if known.size == 0 or np.all(np.abs(known - 1.0) < _PRINTED):
+        return []
+    return [
+        f"friction reading 'paper': with (19) as printed the body turns at {np.median(known):.2g} times its observed "
+        f"rate (median of the tails, {known.min():.2g} to {known.max():.2g}) where the motor turns as observed: B_eff "
+        "of this reading does not give the observed rates back, for the factors follow from (15) without (19)"
+    ]
+
+
 def common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
     """What has to be said of any method's answer."""
     experiment = problem.experiment
@@ -163,9 +206,17 @@ def common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
             f"{experiment.labels()[negative[0]]}: the model's torque exceeds what the motor gives; a prediction of "
             "these tails takes zero"
         )
+        if 2 * len(negative) > len(friction):
+            found.append(
+                "a motor that is too weak for most tails is most often a unit: are the rates in Hz, turns a second, "
+                "and not in rad/s (6.3 times larger)?"
+            )
     if problem.interpolation_error > 0:
+        error = problem.table_error
+        parts = f" (interpolation {percent(error.interpolation)}, coarse resolution of the table "
+        parts += f"{percent(error.resolution)})"
         found.append(
-            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction, "
-            "checked between the points of the table"
+            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction"
+            f"{parts if error.resolution > 0 else ''}, checked at one place between the points of the table"
         )
     return found

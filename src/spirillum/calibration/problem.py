@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
-from spirillum.calibration.forward import Draws, Forward, axis_points, tabulated
+from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, tabulated
 from spirillum.calibration.parameters import PARAMETERS, Coordinate, LogNormal, LogUniform, Parameter, Uniform
 from spirillum.errors import InputError
 from spirillum.hydrodynamics import find_swimmer_model
@@ -42,10 +42,15 @@ class Problem:
     coordinates: tuple[Coordinate, ...]
     """Free numbers; friction tail by tail is none, for it follows from the others."""
     forward: Forward
-    interpolation_error: float
-    """Largest relative error of tabulated resistances in what they predict; 0 without a table."""
+    table_error: TableError
+    """Largest relative errors of tabulated resistances in what they predict."""
     fixed_friction: Samples
     """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
+
+    @property
+    def interpolation_error(self) -> float:
+        """Relative error that no prediction is taken to be better than; 0 without a table."""
+        return self.table_error.largest
 
     @cached_property
     def by_motor_rate(self) -> bool:
@@ -132,6 +137,13 @@ class Problem:
             share = seen.tail_rate / seen.motor_rate.mean
             return self.forward.friction(self.draws(z), motor_rate, share, reading)
 
+    def printed_turning(self, z: Samples) -> Samples:
+        """Omega/omega of every robot by (19) as printed, at its observed motor rate, (draws, robots)."""
+        seen = self.experiment
+        with np.errstate(invalid="ignore"):
+            share = seen.tail_rate / seen.motor_rate.mean
+            return self.forward.printed_turning(self.draws(z), seen.motor_rate.mean[None], share)
+
     @property
     def start(self) -> Samples:
         """Coordinates at the middle of every prior."""
@@ -168,7 +180,7 @@ def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Pro
         free=tuple(free),
         coordinates=(),
         forward=forward,
-        interpolation_error=error,
+        table_error=error,
         fixed_friction=np.broadcast_to(friction, (experiment.size,)),
     )
     laid: dict[str, list[Coordinate]] = {}
@@ -212,8 +224,8 @@ def _forward(
     batch: RobotBatch,
     parameters: Sequence[Parameter],
     tell: Progress,
-) -> tuple[Forward, dict[str, tuple[float, float]], float]:
-    """Resistances, over a table where the geometry is free; the table's ranges, and its error."""
+) -> tuple[Forward, dict[str, tuple[float, float]], TableError]:
+    """Resistances, over a table where the geometry is free; the table's ranges, and its errors."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
     names = [item.name for item in parameters if item.tabulated]
     viscosity = batch.viscosity
@@ -224,7 +236,7 @@ def _forward(
         tell(f"{model.name}, {experiment.size} robots", 0, 1)
     if not names and not model.placed:
         table = tabulated([batch], model, coefficients=coefficients)
-        return Forward(table, batch.electrics, viscosity, factors), {}, 0.0
+        return Forward(table, batch.electrics, viscosity, factors), {}, TableError()
     if model.placed:
         from spirillum.calibration.tube_table import tube_forward
 
@@ -246,7 +258,7 @@ def _forward(
     alone = tabulated([at(between)], model, coefficients=coefficients)
     exact = Forward(alone, batch.electrics, viscosity, factors)
     error = forward.interpolation_error(exact, {"wire_diameter": np.full((1, 1), between)})
-    return forward, {"wire_diameter": (own / reach, own * reach)}, error
+    return forward, {"wire_diameter": (own / reach, own * reach)}, TableError(error, 0.0, error)
 
 
 def _coordinates(

@@ -20,6 +20,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.fit import Calibrated, RobotSource, calibrate
 from spirillum.calibration.netcdf import posterior_tree
+from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
@@ -30,6 +31,8 @@ _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
 _PARETO = 0.7
 """Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
+FEWEST_ROBOTS = 4
+"""Below that number a standard error over the robots is chance, and no model is named the better."""
 _WORST = 3
 _MODELS = ("sbt", "rft")
 
@@ -74,7 +77,8 @@ class Ranking:
     def clear(self) -> bool:
         """Whether the best is better than the second beyond doubt."""
         second = self.ranked[1] if len(self.ranked) > 1 else None
-        return second is not None and -second.difference > _CLEAR * second.difference_error
+        enough = self.best.pointwise.size >= FEWEST_ROBOTS
+        return enough and second is not None and -second.difference > _CLEAR * second.difference_error
 
     def verdict(self) -> str:
         """The ranking in a sentence."""
@@ -82,6 +86,10 @@ class Ranking:
         if len(names) == 1:
             return f"only {names[0]} was fitted"
         second = self.ranked[1]
+        count = self.best.pointwise.size
+        if count < FEWEST_ROBOTS:
+            few = "1 tail is" if count == 1 else f"{count} tails are"
+            return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {FEWEST_ROBOTS} are needed"
         how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
         if self.clear:
             return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
@@ -94,7 +102,7 @@ class Ranking:
         for name, (values, low, high) in item.fit.predicted.items():
             seen = item.fit.problem.ratio(name).mean
             spread = np.abs(high - low) / (2.0 * 1.96)
-            off = (seen - values) / spread
+            off = (seen - values) / spread * np.sign(values)  # positive where more was observed, as their ratio says
             found += [
                 {
                     "tail": experiment.labels()[place],
@@ -163,12 +171,31 @@ def rank_models(
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
     # Every model with the same free factors: else one would be praised for its freedom in what another was denied.
     chosen = free or "body_drag,body_rotation"
+    _check_common(names, chosen)
     fits = {}
     for name in names:
         fits[name] = calibrate(
             observations, robots, model=name, free=chosen, method="posterior", sampling=sampling, progress=progress
         )
     return ranked_fits(fits)
+
+
+def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:
+    """Refuse models that have no common set of free numbers: the freer one would win by its freedom.
+
+    Raises:
+        InputError: naming the model and what it lacks.
+    """
+    listed = [name.strip() for name in (free.split(",") if isinstance(free, str) else free)]
+    for model in models:
+        lacking = [name for name in listed if name in PARAMETERS and model not in PARAMETERS[name].models]
+        if lacking and model in DEFAULT_FREE:
+            known = [PARAMETERS[name].models for name in listed if name in PARAMETERS]
+            able = [name for name in DEFAULT_FREE if all(name in having for having in known)]
+            raise InputError(
+                f"models = {', '.join(models)}: '{model}' has no {lacking[0]} to fit, and models are ranked with the "
+                f"same free numbers ({', '.join(listed)}); allowed: {', '.join(able) or 'other free numbers'}"
+            )
 
 
 def ranked_fits(fits: dict[str, Calibrated]) -> Ranking:
@@ -212,12 +239,13 @@ def _cautions(ranked: Sequence[Ranked]) -> list[str]:
         if bad:
             said.append(
                 f"{item.model}: leaving out {bad} of {item.pareto.size} robots by importance sampling cannot be "
-                "trusted "
-                f"(Pareto k above {_PARETO:g}): each of them decides its own fit"
+                f"trusted (Pareto k above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
             )
         said += [f"{item.model}: {sentence}" for sentence in item.fit.warnings if "may not be used" in sentence]
     if ranked[0].fit.experiment.size < 10:
-        said.append(f"only {ranked[0].fit.experiment.size} robots: differences of their log density are hardly known")
+        count = ranked[0].fit.experiment.size
+        robots = "1 robot" if count == 1 else f"{count} robots"
+        said.append(f"only {robots}: differences of the log density are hardly known")
     if ranked[0].fit.experiment.synthetic:
         said.append(f"{ranked[0].fit.experiment.source} says that its numbers are synthetic: nothing here is measured")
     return said

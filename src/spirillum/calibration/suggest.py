@@ -32,6 +32,7 @@ from spirillum.files import read_text
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.intervals import drawn_kinematics
 from spirillum.motion.posterior_file import PosteriorFile, read_posterior
+from spirillum.motion.prediction import calibration_warnings
 from spirillum.motion.swimming import requirements
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -44,6 +45,7 @@ _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
 _DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
 _DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
 _MOST = 2000
+_PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Suggestion:
 
 def suggest(
     posterior: str | Path,
-    robots: RobotSource | Sequence[RobotSource] = ("biorob2012-wide", "biorob2012-narrow"),
+    robots: RobotSource | Sequence[RobotSource] | None = None,
     *,
     candidates: str | Path | None = None,
     trials: int = 5,
@@ -101,7 +103,8 @@ def suggest(
 
     Args:
         posterior: file of a calibration's posterior.
-        robots: a robot for each channel that might be used.
+        robots: a robot for each channel that might be used; None: the paper's two, if the posterior is of their
+            channels and body.
         candidates: file of channels and tails (CSV); None: tails of 10 to 30 mm wavelength and 1.5 to 3.5 mm amplitude
             in every robot's channel.
         trials: of each candidate.
@@ -112,7 +115,10 @@ def suggest(
     if not 1 <= trials <= 10**6:
         raise InputError(f"trials = {trials}; allowed: 1 to 1000000")
     known = read_posterior(posterior)
-    loaded = [known.central(robot) for robot in given_robots(robots)]
+    given = _papers_robots(known) if robots is None else given_robots(robots)
+    for robot in given:
+        _check_channel(robot)
+    loaded = [known.central(robot) for robot in given]
     listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
     found, left_out = [], []
     numbers, names = _numbers(known)
@@ -128,12 +134,39 @@ def suggest(
         known,
         trials,
         tuple(sorted(found, key=lambda item: -item.gain)),
-        (*_cautions(known), *left_out[:5]),
+        (*_cautions(known, loaded), *left_out[:5]),
     )
 
 
-def _cautions(known: PosteriorFile) -> list[str]:
-    said = []
+def _papers_robots(known: PosteriorFile) -> list[Robot]:
+    """The paper's robots, for a posterior of these.
+
+    Raises:
+        InputError: if it is of others.
+    """
+    robots = given_robots(_PRESETS)
+    channels = [robot.channel.diameter for robot in robots if robot.channel]
+    body = (robots[0].body.diameter, robots[0].body.length)
+    strange = [c for c in known.channels if not np.any(np.isclose(c, channels, rtol=1e-6, atol=0.0))]
+    if strange or not np.allclose(body, known.body, rtol=1e-6, atol=0.0):
+        sizes = ", ".join(f"{1e3 * channel:g} mm" for channel in known.channels)
+        diameter, length = (1e3 * size for size in known.body)
+        raise InputError(
+            f"{known.source} is of channels of {sizes} and a body of {diameter:g} x {length:g} mm, which are not the "
+            "paper's; allowed: ROBOT, one for each channel that might be used"
+        )
+    return robots
+
+
+def _check_channel(robot: Robot) -> None:
+    if robot.channel is None:
+        raise InputError(
+            f"robot {robot.name} has no channel; allowed: robots with a channel, in which one more tail may be measured"
+        )
+
+
+def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[str]:
+    said = [f"{robot.name}: {words}" for robot in robots for words in calibration_warnings(robot, known.model)]
     if known.synthetic:
         said.append(f"{known.observations} says that its numbers are synthetic: nothing here is measured")
     return said
@@ -217,7 +250,7 @@ def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
                 f"{path}, row {number}, column channel_diameter_mm: {row[_COLUMNS[0]]}; allowed: {allowed}"
             )
         found.append(with_tail(robot, wavelength, amplitude))
-    return found
+    return list({_words(robot): robot for robot in found}.values())  # a tail that stands twice is one candidate
 
 
 def _length(path: Path, number: int, name: str, text: str) -> float:

@@ -2,8 +2,10 @@
 
 Such a model takes seconds for each tail and place, far too long for every draw. It is solved at Chebyshev points over
 the places that are possible, for all robots of the experiment, and interpolated between them by polynomials, over the
-logarithm of the gap. At one more place in between it is solved too: how far the interpolated predictions are off there
-is the stated error. The model keeps what it has solved, so that the next fit of the same robots starts at once.
+logarithm of the gap. The points are solved as coarsely as a band. At one more place in between it is solved too, as
+coarsely and as finely as `predict` does: how far the interpolated predictions are off there is the stated error, in
+which both the interpolation and the resolution are. The model keeps what it has solved, so that the next fit of the
+same robots starts at once.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from spirillum.calibration.forward import Forward, axis_points, tabulated
+from spirillum.calibration.forward import Forward, TableError, axis_points, tabulated
 from spirillum.errors import InputError
 from spirillum.hydrodynamics.model import SwimmerModel
 from spirillum.motion.band import at_place, band_places
@@ -48,8 +50,8 @@ def place_ranges(batch: RobotBatch, model: SwimmerModel) -> Ranges:
 
 def tube_forward(
     model: SwimmerModel, batch: RobotBatch, names: Sequence[str], tell: Callable[[str, int, int], None]
-) -> tuple[Forward, Ranges, float]:
-    """Solve the model over the places, and check the interpolation.
+) -> tuple[Forward, Ranges, TableError]:
+    """Solve the model over the places, and check interpolation and resolution.
 
     Args:
         model: a model that computes the walls.
@@ -58,7 +60,7 @@ def tube_forward(
         tell: told what is being computed.
 
     Returns:
-        The forward model, the ranges of what is free, and the largest relative error of a prediction.
+        The forward model, the ranges of what is free, and the largest relative errors of a prediction.
 
     Raises:
         InputError: if the robots share no place.
@@ -66,7 +68,7 @@ def tube_forward(
     viscosity = batch.viscosity
     if not names:
         tell(f"{model.name}, {batch.size} robots", 0, 1)
-        return Forward(tabulated([_at(batch, {})], model), batch.electrics, viscosity), {}, 0.0
+        return Forward(tabulated([_at(batch, {})], model), batch.electrics, viscosity), {}, TableError()
     ranges = {name: ends for name, ends in place_ranges(batch, model).items() if name in names}
     for name, (low, high) in ranges.items():
         if not low < high:
@@ -79,22 +81,32 @@ def tube_forward(
 
     def points() -> Iterator[RobotBatch]:
         for done, place in enumerate(every):
-            tell(f"{model.name}, {_words(place)}", done, len(every) + 1)
+            tell(f"{model.name}, {_words(place)}", done, len(every) + 2)
             yield _at(batch, place)
 
     table = tabulated(points(), model, ordered, [nodes for nodes, _ in axes])
     forward = Forward(table, batch.electrics, viscosity)
     between = {name: _between(name, *ranges[name]) for name in ordered}
-    tell(f"{model.name}, {_words(between)}: a check", len(every), len(every) + 1)
-    exact = Forward(tabulated([_at(batch, between)], model), batch.electrics, viscosity)
-    error = forward.interpolation_error(exact, {name: np.full((1, 1), value) for name, value in between.items()})
+    there = {name: np.full((1, 1), value) for name, value in between.items()}
+    tell(f"{model.name}, {_words(between)}: a check", len(every), len(every) + 2)
+    coarse = Forward(tabulated([_at(batch, between)], model), batch.electrics, viscosity)
+    tell(f"{model.name}, {_words(between)}: a check at full resolution", len(every) + 1, len(every) + 2)
+    fine = Forward(tabulated([batch.placed(_place(between))], model), batch.electrics, viscosity)
+    error = TableError(
+        interpolation=forward.interpolation_error(coarse, there),
+        resolution=coarse.interpolation_error(fine, {}),
+        whole=forward.interpolation_error(fine, there),
+    )
     return forward, ranges, error
 
 
 def _at(batch: RobotBatch, place: dict[str, float]) -> RobotBatch:
     """The robots at a place, resolved as finely as a band needs."""
-    known = Placement().model_copy(update={"pitch": 0.0, **place})
-    return at_place(batch, known)
+    return at_place(batch, _place(place))
+
+
+def _place(place: dict[str, float]) -> Placement:
+    return Placement().model_copy(update={"pitch": 0.0, **place})
 
 
 def _between(name: str, low: float, high: float) -> float:

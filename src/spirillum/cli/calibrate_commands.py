@@ -9,6 +9,7 @@ import typer
 
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Json, Model, Settings, complete_models, complete_robots
+from spirillum.errors import InputError
 
 __all__ = ["calibrate", "rank_models", "suggest"]
 
@@ -39,9 +40,9 @@ def calibrate(
     friction: Annotated[
         str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
     ] = "rotor",
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
-        "spirillum-calibration"
-    ),
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
+    ] = "spirillum-calibration",
     no_figures: Annotated[
         bool, typer.Option("--no-figures", help="Draw no figures, which takes some seconds.")
     ] = False,
@@ -53,12 +54,15 @@ def calibrate(
 
     Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
     """
-    from spirillum.calibration.files import check_folder
+    from spirillum.calibration.files import check_folder, earlier_results
     from spirillum.calibration.fit import calibrate as answer
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import calibration_text, text
 
-    check_folder(output)
+    if not output.strip():
+        raise InputError("output = ''; allowed: a folder for the results (-o DIR)")
+    folder = Path(output)
+    check_folder(folder)
     robots = [loaded_robot(name, settings) for name in robot]
     with text.progress_bar(quiet=json) as progress:
         found = answer(
@@ -71,8 +75,9 @@ def calibrate(
             sampling=Sampling(seed=seed),
             progress=progress,
         )
-        written = found.write(output, figures=not no_figures, progress=progress)
-    content = calibration_text.calibration_content(found.to_dict(), output, written)
+        replaced = earlier_results(folder)
+        written = found.write(folder, figures=not no_figures, progress=progress)
+    content = calibration_text.calibration_content(found.to_dict(), folder, written, replaced)
     text.show(content, calibration_text.calibration, json=json)
     if not found.converged:
         raise typer.Exit(1)
@@ -86,7 +91,7 @@ def rank_models(
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(autocompletion=complete_models, help="A model to rank; repeatable. Without it, sbt and rft."),
+        typer.Option(autocompletion=complete_models, help="sbt, rft or slender; repeatable. Without it, sbt and rft."),
     ] = None,
     free: Annotated[
         str | None,
@@ -140,6 +145,9 @@ def suggest(
     from spirillum.calibration.suggest import suggest as answer
     from spirillum.cli import calibration_text, text
 
-    names = robot or ["biorob2012-wide", "biorob2012-narrow"]
-    found = answer(posterior, [loaded_robot(name, settings) for name in names], candidates=candidates, trials=trials)
+    if rows < 1:
+        raise InputError(f"rows = {rows}; allowed: at least 1")
+    names = robot or (["biorob2012-wide", "biorob2012-narrow"] if settings else [])
+    robots = [loaded_robot(name, settings) for name in names] or None
+    found = answer(posterior, robots, candidates=candidates, trials=trials)
     text.show(found.to_dict(), lambda content, console: calibration_text.suggestion(content, console, rows), json=json)

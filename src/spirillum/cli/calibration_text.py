@@ -18,11 +18,24 @@ __all__ = ["calibration", "calibration_content", "ranking", "suggestion"]
 Answer = Mapping[str, Any]
 
 
-def calibration_content(answer: Mapping[str, Any], folder: Path, written: Sequence[Path]) -> dict[str, Any]:
-    """The answer with the files that were written; warnings stay last."""
+def calibration_content(
+    answer: Mapping[str, Any], folder: Path, written: Sequence[Path], replaced: Sequence[Path] = ()
+) -> dict[str, Any]:
+    """The answer with the files that were written; warnings stay last.
+
+    Args:
+        answer: the answer.
+        folder: the folder of its files.
+        written: the files.
+        replaced: files of an earlier calibration, which are gone.
+    """
     content = {name: item for name, item in answer.items() if name != "warnings"}
     content |= {"folder": str(folder), "files": sorted(str(path.relative_to(folder)) for path in written)}
-    return {**content, "warnings": answer["warnings"]}
+    gone = [path.relative_to(folder) for path in replaced if path not in written]
+    pictures = sum(1 for path in gone if len(path.parts) > 1)
+    names = [str(path) for path in gone if len(path.parts) == 1] + ([_counted(pictures, "figure")] if pictures else [])
+    said = [f"{folder} held an earlier calibration: its {' and '.join(names)} are gone"] if names else []
+    return {**content, "warnings": [*answer["warnings"], *said]}
 
 
 def _counted(number: int, word: str) -> str:
@@ -80,34 +93,59 @@ def _show_friction(answer: Answer, console: Console) -> None:
     ]
     if values:
         console.print(
-            f"B_eff of {len(values)} tails (friction reading {answer['friction']}): {min(values):.4g} to "
-            f"{max(values):.4g} "
+            f"B_eff of {_counted(len(values), 'tail')} (friction reading {answer['friction']}): {_range(values)} "
             "N m s/rad, tail by tail in predictions.csv",
             highlight=False,
             soft_wrap=True,
         )
 
 
+def _range(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.4g}", f"{max(values):.4g}"
+    return low if low == high else f"{low} to {high}"
+
+
 def ranking(answer: Answer, console: Console) -> None:
     """Table of `rank-models`."""
     synthetic = " (synthetic)" if answer["synthetic"] else ""
-    title = f"{answer['observations']}{synthetic}: {len(answer['models'])} models, {answer['robots']} robots"
+    title = (
+        f"{answer['observations']}{synthetic}: {_counted(len(answer['models']), 'model')}, "
+        f"{_counted(answer['robots'], 'robot')}"
+    )
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
-    table = grid("", "model", "log density", "difference", "misses speed by", "misses body rate by")
+    compared = [name for name in _MISSES if any(name in item["discrepancy"] for item in answer["models"])]
+    table = grid("", "model", "log density", "difference", *(f"misses {_MISSES[name]} by" for name in compared))
     for item in answer["models"]:
         difference = item["difference"]
         apart = "-" if difference["value"] == 0 else f"{difference['value']:.1f} +- {difference['standard_error']:.1f}"
-        misses = [item["discrepancy"].get(name) for name in ("advance", "turning")]
+        misses = [item["discrepancy"].get(name) for name in compared]
         shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
         table.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
     console.print(table)
     console.print(f"{escape(answer['verdict'])}", highlight=False, soft_wrap=True)
     for item in answer["models"]:
-        places = [
-            f"{row['tail']} ({row['quantity']}: observed {100 * (row['observed_over_predicted']['value'] - 1):+.0f} %)"
-            for row in item["fails_most_at"]
-        ]
-        console.print(escape(f"{item['model']} fails most at {'; '.join(places)}"), highlight=False, soft_wrap=True)
+        console.print(escape(_failures(item)), highlight=False, soft_wrap=True)
+
+
+_MISSES = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
+_STANDS_OUT = 2.5
+"""Standard deviations below which the worst of some tens of means is as far off as chance makes it."""
+
+
+def _failures(item: Answer) -> str:
+    """Where a model fails, on the scale of what its own fit expects of a tail."""
+    rows = item["fails_most_at"]
+    places = [
+        f"{row['tail']} ({row['quantity'].replace('_', ' ')}: observed "
+        f"{100 * (row['observed_over_predicted']['value'] - 1):+.0f} %, "
+        f"{abs(row['standard_deviations']['value']):.1f} standard deviations)"
+        for row in rows
+    ]
+    largest = max((abs(row["standard_deviations"]["value"]) for row in rows), default=0.0)
+    words = f"{item['model']} is furthest off at {'; '.join(places)}"
+    if largest < _STANDS_OUT:
+        return f"{words}: no tail stands out from what it misses everywhere"
+    return words
 
 
 def suggestion(answer: Answer, console: Console, rows: int = 10) -> None:
@@ -117,7 +155,7 @@ def suggestion(answer: Answer, console: Console, rows: int = 10) -> None:
     )
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
     table = grid("", "channel (mm)", "tail (mm)", "information (bit)", "narrows most")
-    for item in answer["candidates"][: max(rows, 1)]:
+    for item in answer["candidates"][:rows]:
         sizes = [f"{1e3 * item[name]['value']:g}" for name in ("channel_diameter", "wavelength", "amplitude")]
         name, share = min(item["narrowing"].items(), key=lambda pair: pair[1]["value"])
         told = f"{name} to {100 * share['value']:.0f} %"

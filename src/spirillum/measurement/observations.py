@@ -56,6 +56,8 @@ class Observation:
     """Half widths of a mean's 95 % intervals in the same order."""
     trial: str = ""
     """Number or name of the trial, where the file gives one."""
+    motor_derived: bool = False
+    """Whether the motor's rate was not observed itself."""
 
     @property
     def tail(self) -> tuple[float, float, float]:
@@ -94,7 +96,8 @@ def read_observations(path: str | Path) -> list[Observation]:
 def _csv_table(path: Path) -> list[tuple[int, list[str]]]:
     """Cells of header and rows, each with its line number."""
     text = read_text(path, _WHAT, _LARGEST)
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    # A row of commas alone, as spreadsheets write, is an empty one.
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
     if len(lines) < 2:
         raise InputError(f"{path} holds no observations; allowed: a header line and at least one row")
@@ -107,6 +110,9 @@ def _csv_table(path: Path) -> list[tuple[int, list[str]]]:
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
     for name in header:
+        if name not in COLUMNS and len(header) == 1 and any(mark in name for mark in ";\t"):
+            mark = "semicolons" if ";" in name else "tabs"
+            raise InputError(f"{path}: columns are separated by {mark}; allowed: commas, and points in numbers")
         if name not in COLUMNS:
             raise InputError(
                 f"{path}: column '{name[:40]}' is unknown{did_you_mean(name, COLUMNS)}; allowed: {', '.join(COLUMNS)}"
@@ -131,12 +137,20 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
     if all(math.isnan(value) for value in rates):
         raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
     velocity, tail, body, motor = rates
+    motor_derived = math.isnan(motor)
     motor = _motor_rate(place, tail, body, motor)
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
     _check_trial(place, row.get("trial", ""))
     a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
+    trials = _trials(path, number, row)
+    widths = [name for name in _INTERVALS if row.get(name, "")]
+    if widths and trials < 2:
+        raise InputError(
+            f"{place}, column {widths[0]}: an interval of one trial; allowed: a column trials with the number of "
+            "trials (2 or more) that the mean is over, or empty"
+        )
     return Observation(
         row=number,
         robot=row.get("robot", ""),
@@ -147,9 +161,10 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         tail_rate=tail,
         body_rate=body,
         motor_rate=motor,
-        trials=_trials(path, number, row),
+        trials=trials,
         intervals=(a, b, c, d),
         trial=row.get("trial", ""),
+        motor_derived=motor_derived,
     )
 
 

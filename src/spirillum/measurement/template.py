@@ -9,7 +9,7 @@ from typing import Any
 from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import output_target, write_text
-from spirillum.measurement.observations import COLUMNS, read_observations
+from spirillum.measurement.observations import COLUMNS, Observation, read_observations
 
 __all__ = ["new_observations_file", "observations_answer"]
 
@@ -55,6 +55,11 @@ def observations_answer(path: str | Path) -> dict[str, Any]:
         "rows": len(items),
         "tails": len({item.tail for item in items}),
         "channels": len({item.tail[0] for item in items}),
-        "measured": {name: sum(math.isfinite(getattr(item, name)) for item in items) for name in names},
+        "measured": {name: sum(_measured(item, name) for item in items) for name in names},
     }
     return envelope("observations", content, ())
+
+
+def _measured(item: Observation, name: str) -> bool:
+    """Whether a row holds a quantity itself: a motor rate may be tail less body rate."""
+    return math.isfinite(getattr(item, name)) and not (name == "motor_rate" and item.motor_derived)

@@ -178,16 +178,15 @@ def compare_models(
     Raises:
         InputError: for wrong input, or if no model answers.
     """
-    ready = load(robot)
+    own = load(robot)
     factors = calibration is not None if calibrated is None else calibrated
-    if calibration is not None:
-        ready = with_calibration(ready, calibration)
     if accuracy is not None:
-        ready = with_accuracy(ready, accuracy)
+        own = with_accuracy(own, accuracy)
     if tolerance is not None:
-        ready = with_tolerance(ready, tolerance)
+        own = with_tolerance(own, tolerance)
     if phases is not None:
-        ready = with_phases(ready, phases)
+        own = with_phases(own, phases)
+    ready = own if calibration is None else with_calibration(own, calibration)
     reading = friction_reading(friction or ready.friction.reading)
     names = _chosen(models)
     place = Placement.of(placement)
@@ -199,12 +198,13 @@ def compare_models(
             progress(f"model {name}", done, len(names))
         try:
             predictions[name] = predict(
-                ready,
+                own,
                 model=name,
                 tail_rate=tail_rate,
                 friction=reading,
                 calibrated=factors,
-                placement=place if find_swimmer_model(name).placed else None,
+                calibration=calibration,
+                placement=place if find_swimmer_model(name).placed and place != Placement() else None,
                 band=False,
             )
         except InputError as error:

@@ -2,8 +2,9 @@
 
 A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
 discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
-discrepancy then goes onto speed and body rate, independently for each draw, for a tail that was not observed may be
-missed by as much as those that were. An interval is of the robot's own motion, not of a single measured trial.
+discrepancy then goes onto speed and rates, independently for each draw, for a tail that was not observed may be missed
+by as much as those that were; torques, currents, powers and efficiencies are computed from the rates and speeds that it
+leaves. An interval is of the robot's own motion, not of a single measured trial.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ import numpy as np
 
 from spirillum.arrays import Axial, PerRobot, Samples
 from spirillum.hydrodynamics.model import SwimmerModel
+from spirillum.motion.balance import friction_torques
+from spirillum.motion.motor import battery_voltage, run_time, steady_current
 from spirillum.motion.posterior_file import PosteriorFile
 from spirillum.motion.quantities import Swimming
-from spirillum.motion.swimming import swim
+from spirillum.motion.swimming import friction_reading, swim
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.robot import Robot
 
@@ -69,7 +72,7 @@ def intervals_of(
     drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
     rates = None if tail_rate is None else np.full(size, tail_rate)
     swum = swim(batch, drawn, tail_rate=rates, friction=friction)
-    values = _with_discrepancy(swum, posterior, rng, own_drive=tail_rate is None)
+    values = _with_discrepancy(swum, batch, posterior, rng, own_drive=tail_rate is None, friction=friction)
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
     limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
     nan = float("nan")
@@ -190,27 +193,92 @@ class _Drawn(SwimmerModel):
 
 
 def _with_discrepancy(
-    swum: Swimming, posterior: PosteriorFile, rng: np.random.Generator, *, own_drive: bool
+    swum: Swimming,
+    batch: RobotBatch,
+    posterior: PosteriorFile,
+    rng: np.random.Generator,
+    *,
+    own_drive: bool,
+    friction: str,
 ) -> dict[str, Samples]:
-    """All quantities, (draws,), with the model's discrepancy on speed and rates."""
+    """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
     values = {f.name: getattr(swum, f.name) for f in fields(Swimming) if f.name != "valid"}
+    size = swum.forward_velocity.size
+    one = np.ones(size)
 
     def off(name: str) -> Samples:
         tau = posterior.discrepancy.get(name)
-        size = swum.forward_velocity.size
-        return np.ones(size) if tau is None else 1.0 + tau * rng.normal(size=size)
+        return one if tau is None else 1.0 + tau * rng.normal(size=size)
 
     advance, turning, motor = off("advance"), off("turning"), off("motor_rate")
-    pace = motor if own_drive else np.ones(motor.size)
+    # A fixed joint turns body and tail alike, and a drive that prescribes the rate is not missed by the model.
+    turning = one if batch.joint == "fixed" else turning
+    pace = motor if own_drive and batch.drive == "dc-motor" else one
     tail = values["tail_rotation_rate"] * pace
     body = values["body_rotation_rate"] * turning * pace
+    speed = advance * pace
     values |= {
-        "forward_velocity": values["forward_velocity"] * advance * pace,
+        "forward_velocity": values["forward_velocity"] * speed,
         "advance_per_radian": values["advance_per_radian"] * advance,
-        "reynolds_number": values["reynolds_number"] * np.abs(advance * pace),
-        "hydrodynamic_efficiency": values["hydrodynamic_efficiency"] * advance**2,
+        "reynolds_number": values["reynolds_number"] * np.abs(speed),
+        "tail_reynolds_number": values["tail_reynolds_number"] * np.abs(pace),
+        "propulsive_power": values["propulsive_power"] * speed**2,
         "tail_rotation_rate": tail,
         "body_rotation_rate": body,
         "motor_rotation_rate": tail - body,
     }
-    return values
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if batch.joint != "fixed":
+            values |= _torques_and_powers(swum, values, batch, pace, own_drive=own_drive, friction=friction)
+        return values | _over_speed(swum, values, speed)
+
+
+def _torques_and_powers(
+    swum: Swimming,
+    values: dict[str, Samples],
+    batch: RobotBatch,
+    pace: Samples,
+    *,
+    own_drive: bool,
+    friction: str,
+) -> dict[str, Samples]:
+    """Torques are linear in the rates, the current follows from (17), B_eff at a prescribed rate from (18)."""
+    tail, body, slip = (values[f"{name}_rotation_rate"] for name in ("tail", "body", "motor"))
+    drive = swum.drive_torque * pace
+    on_body = (swum.dissipated_power - swum.drive_torque * swum.tail_rotation_rate) / swum.body_rotation_rate
+    found = {
+        "drive_torque": drive,
+        "tail_torque": np.abs(drive),
+        "shaft_power": drive * slip,
+        "dissipated_power": np.where(body == 0.0, drive * tail, drive * tail + on_body * pace * body),
+    }
+    effective, motor = swum.effective_friction, batch.electrics
+    rotor = motor.rotor_friction if motor is not None else np.zeros(1)
+    if motor is not None and batch.drive == "dc-motor":
+        emf = motor.back_emf_constant * motor.polarity * slip
+        current = motor.polarity * steady_current(motor, emf, np.zeros(1))
+        voltage = battery_voltage(motor, current)
+        found |= {
+            "motor_current": current,
+            "battery_voltage": voltage,
+            "electrical_power": motor.duty * motor.polarity * current * voltage,
+            "battery_run_time": run_time(motor, current),
+        }
+        spare = motor.torque_constant * current - drive
+        if not own_drive and friction in ("rotor", "paper"):
+            effective = spare / slip
+        elif not own_drive:
+            found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
+    torques = friction_torques(friction_reading(friction), effective, rotor)
+    return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}
+
+
+def _over_speed(swum: Swimming, values: dict[str, Samples], speed: Samples) -> dict[str, Samples]:
+    """Efficiencies and the cost of transport: powers over powers, or over weight times speed."""
+    shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
+    spent = np.where(np.isnan(electrical), shaft, electrical)
+    return {
+        "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
+        "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
+        "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
+    }

@@ -19,6 +19,7 @@ from spirillum.robot.calibration_file import (
     FittedValues,
     calibrated_robot,
     friction_of_tails,
+    nearest_channel,
 )
 from spirillum.robot.options import Calibration, FittedTo
 from spirillum.robot.robot import Robot
@@ -48,6 +49,8 @@ class PosteriorFile:
     """Diameter and length of the fitted body, m."""
     draws: Mapping[str, Samples]
     """Parameter to (draws, channels), or (draws, 1)."""
+    middle: Mapping[str, Samples]
+    """Their medians before thinning, (channels,) or (1,): those of `calibration.toml` too."""
     discrepancy: Mapping[str, Samples]
     """Quantity to (draws,)."""
     error: Mapping[str, Samples]
@@ -62,7 +65,7 @@ class PosteriorFile:
         factors = [name for name in ("body_drag", "body_rotation") if name in self.draws]
         entries = []
         for place, diameter in enumerate(self.channels if factors else ()):
-            middle = {name: float(np.median(self._column(name, place))) for name in factors}
+            middle = {name: float(self._column(name, place, self.middle)) for name in factors}
             own = robot.calibration.get(self.model)
             kept = {name: getattr(own, name) for name in ("body_drag", "body_rotation")} if own else {}
             fitted_to = FittedTo.model_construct(
@@ -71,7 +74,7 @@ class PosteriorFile:
             entries.append(Calibration.model_construct(**(kept | middle), source=self.source, fitted_to=fitted_to))
         names = {"shared_friction": "friction"}
         values: dict[str, Any] = {
-            names.get(name, name): float(np.median(self.draws[name]))
+            names.get(name, name): float(self._column(name, 0, self.middle))
             for name in self.draws
             if names.get(name, name) in FittedValues.model_fields
         }
@@ -90,18 +93,18 @@ class PosteriorFile:
         ]
         return tuple(FittedFriction.model_construct(**tail) for tail in tails)
 
-    def _column(self, name: str, channel: int) -> Samples:
-        columns = self.draws[name]
-        return columns[:, min(channel, columns.shape[1] - 1)]
+    def _column(self, name: str, channel: int, values: Mapping[str, Samples] | None = None) -> Samples:
+        columns = (self.draws if values is None else values)[name]
+        return columns[..., min(channel, columns.shape[-1] - 1)]
 
     def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
-        """Draws for one robot: those of the nearest channel, and B_eff.
+        """Draws for one robot: those of the nearest channel, of which `central` takes the middle, and B_eff.
 
         That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
         with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
         """
         diameter = robot.channel.diameter if robot.channel else np.inf
-        nearest = int(np.argmin([abs(np.log(diameter / channel)) for channel in self.channels]))
+        nearest = nearest_channel(robot, self.channels)
         found = {name: self._column(name, nearest) for name in self.draws}
         for item in self.friction:
             keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
@@ -211,9 +214,11 @@ def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Sample
     size = min(array.size for array in flat.values())
     kept = np.linspace(0, size - 1, min(size, _DRAWS)).round().astype(int)
     draws: dict[str, Samples] = {}
+    middle: dict[str, Samples] = {}
     for name in dict.fromkeys(item["parameter"] for item in listed):
         columns = sorted((item for item in listed if item["parameter"] == name), key=lambda item: item["channel"] or 0)
         draws[name] = np.stack([flat[item["label"]][kept] for item in columns], axis=1)
+        middle[name] = np.array([np.median(flat[item["label"]]) for item in columns])
     quantities = json.loads(attributes["quantities"])
     body = json.loads(attributes["settings"])[0]["body"]
     if not (draws and channels and all(_possible(name, array) for name, array in draws.items())):
@@ -230,6 +235,7 @@ def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Sample
         channels=channels,
         body=(float(body["diameter"]), float(body["length"])),
         draws=draws,
+        middle=middle,
         discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in quantities},
         error={name: flat[f"error_{name}"][kept] for name in quantities},
         friction=tuple(json.loads(attributes["friction"])),

@@ -206,9 +206,11 @@ def predict(
     left_out = () if over is None else over.left_out
     known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
     fitted = fitted_of(calibration, drawn)
+    warnings += fitted.idle_warnings([ready], [chosen])
     if rate is None:
         warnings += [*fitted.tail_warnings(ready), *fitted.reading_warnings([reading])]
-    warnings += fitted.origin_warnings()
+        warnings += fitted.model_warnings([chosen.name], [reading])
+    warnings += fitted.origin_warnings([ready], [chosen])
     return Prediction(
         ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
     )

@@ -56,9 +56,21 @@ def _source(found: Calibrated) -> str:
     return f"{plain(found.experiment.source, 40)} ({what})"
 
 
-def _fit_words(found: Calibrated) -> str:
-    values = [f"{plain(name)} {item.value:.3g}" for name, item in found.values.items()]
+def _fit_words(found: Calibrated, channel: int | None = None) -> str:
+    """The fitted numbers that act, in one channel or in all, with their units; a name and its channel stay together."""
+    values = [
+        f"{plain(item.label)} {_with_unit(found.values[item.label].value, item.parameter.unit)}".replace(" ", "\u00a0")
+        for item in found.problem.coordinates
+        if channel is None or item.channel in (None, channel)
+    ]
     return f"model {label_of_model(found.problem.model.name)}, method {found.method}: {', '.join(values)}"
+
+
+def _with_unit(value: float, unit: str) -> str:
+    if not unit:
+        return f"{value:.3g}"
+    scale = Scale.of(np.abs(np.array([value])), unit)
+    return f"{value / scale.factor:.3g} {scale.unit}"
 
 
 def observed_figure(found: Calibrated, channel: int) -> Figure:
@@ -84,7 +96,7 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, label=label_of_model(model)),
             Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label=f"{label}, 95 % interval of the mean"),
         ]
-        notes = [_fit_words(found)]
+        notes = [_fit_words(found, channel)]
         if any(np.any(np.isfinite(row["low"])) for row in rows):
             notes.append("Shades: 95 % of a tail's own mean as the fit expects it, the model's discrepancy included.")
         if found.friction:
@@ -109,15 +121,22 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             axes_row[0].set_ylabel(row["label"])
             for axes in axes_row:
                 axes.set_xlim(*ends)
-            if np.all(row["positive"]):
-                tops = np.concatenate([row[name][inside] for name in ("values", "high", "seen")])
-                axes_row[0].set_ylim(0.0, 1.08 * float(np.nanmax(tops)))
+            _from_zero(axes_row[0], row, inside)
         for amplitude, axes in zip(columns, panels[0], strict=True):
             axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
         for axes in panels[-1]:
             axes.set_xlabel(r"wavelength $\lambda$ (mm)")
         _alike_ticks(panels, np.unique(waves.round(6)))
         return figure
+
+
+def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
+    """Start the axis at zero where all is of one sign; that of a left-handed robot's rates is negative."""
+    ends = np.concatenate([row[name][inside] for name in ("values", "low", "high", "seen")])
+    if np.all(row["positive"]):
+        axes.set_ylim(0.0, 1.08 * float(np.nanmax(ends)))
+    elif not np.any(row["positive"]):
+        axes.set_ylim(1.08 * float(np.nanmin(ends)), 0.0)
 
 
 def _alike_ticks(panels: Sequence[Sequence[Axes]], wavelengths: Samples) -> None:

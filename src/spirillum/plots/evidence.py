@@ -160,9 +160,20 @@ class Shown:
         known = self.whole["forward_velocity_low"]
         return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
 
+    @cached_property
+    def with_intervals(self) -> tuple[str, ...]:
+        """Names of the models that have intervals of a posterior."""
+        if "forward_velocity_interval_low" not in self.whole:
+            return ()
+        known = self.whole["forward_velocity_interval_low"]
+        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+
     def band(self, name: str, model: str) -> tuple[Values, Values]:
-        """Least and largest value of a quantity of free swimming, SI; NaN without a band."""
+        """Limits of a quantity of free swimming, of a posterior or over the open places, SI; NaN without them."""
         reading = self.own_drive_readings[0]
+        if model in self.with_intervals:
+            named = {"model": model, "friction": self.own_drive_readings[-1]}
+            return self.values(f"{name}_interval_low", **named), self.values(f"{name}_interval_high", **named)
         if model not in self.banded:
             unknown = np.full_like(self.values(name, model=model, friction=reading), np.nan)
             return unknown, unknown
@@ -171,12 +182,18 @@ class Shown:
 
     @property
     def place_words(self) -> str:
-        """Where robots lie for models that compute the walls, and what their bands are; empty without such models."""
+        """Where robots lie for models that compute the walls, and what is shaded; empty without either."""
         computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
         if not computed:
-            return ""
+            return self._interval_words()
         where = f"{', '.join(computed)}: {reference_place(json.loads(self.whole.attrs.get('settings', '{}')))}."
-        return f"{where} {self._band_words()}".strip()
+        return f"{where} {self._band_words()} {self._interval_words()}".strip()
+
+    def _interval_words(self) -> str:
+        if not self.with_intervals:
+            return ""
+        names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
+        return f"Shades: 95 % intervals of the posterior ({names}, friction reading '{reading}'), discrepancy included."
 
     def _band_words(self) -> str:
         if not self.banded:

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.plots.sheet import Sheet
-from spirillum.plots.style import COLOURS, look_of_model, new_figure, plain, styled
+from spirillum.plots.style import COLOURS, Scale, look_of_model, new_figure, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.fit import Calibrated
@@ -135,19 +135,23 @@ def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
             columns,
             panel=(1.72, 1.3),
             notes=[
-                "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the "
-                "number has no "
-                "limit there. The model's discrepancy is held.",
+                "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
+                "no limit there. The model's discrepancy is held; the wider intervals of the table do not hold it.",
             ],
             labelled_rows=frozenset(range(rows - 1)),
         )
         figure, panels = sheet.draw()
         every = [axes for row in panels for axes in row]
+        units = {item.label: item.parameter.unit for item in found.problem.coordinates}
         for axes, profile in zip(every, profiles, strict=False):
-            axes.plot(profile.values, profile.misfit, color=COLOURS["blue"], marker="o", markersize=2.5)
+            scale = Scale.of(np.abs(profile.values), units[profile.label]) if units[profile.label] else None
+            values, unit = (
+                (profile.values, "") if scale is None else (profile.values / scale.factor, f" ({scale.unit})")
+            )
+            axes.plot(values, profile.misfit, color=COLOURS["blue"], marker="o", markersize=2.5)
             axes.axhline(_LIMIT, color="#444444", linewidth=0.8, linestyle=":")
             axes.set_ylim(0.0, 3.2 * _LIMIT)
-            axes.set_xlabel(_label(profile.label).replace("\n", " "), fontsize=7.5)
+            axes.set_xlabel(_label(profile.label).replace("\n", " ") + unit, fontsize=7.5)
             axes.xaxis.set_major_locator(MaxNLocator(3))
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         for axes in every[len(profiles) :]:

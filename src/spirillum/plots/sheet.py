@@ -21,7 +21,7 @@ _NARROWEST = 5.2
 _LINE = 0.17
 _LEGEND_LINE = 0.21
 _LETTERS_PER_INCH = 16.0
-_WORDS = re.compile(r"(?:(?<!\\)\$.*?(?<!\\)\$|\S)+")
+_WORDS = re.compile(r"(?:(?<!\\)\$.*?(?<!\\)\$|\S|\u00a0)+")
 
 
 def _letter(number: int) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -36,6 +36,8 @@ __all__ = [
     "calibrated_placement",
     "calibrated_robot",
     "friction_of_tails",
+    "nearest_channel",
+    "placement_in",
     "read_calibration",
     "with_calibration",
 ]
@@ -113,7 +115,7 @@ class Provenance(Section):
     """Method of the fit."""
     free: Annotated[tuple[_Word, ...], Field(max_length=100)] = ()
     """Parameters that were free."""
-    friction_reading: _Word = ""
+    friction_reading: Literal["", "rotor", "paper"] = ""
     """Reading of the friction under which B_eff was inferred."""
     synthetic: Annotated[bool, Field(strict=True)] = False
     """Whether the observations said that a program made them."""
@@ -142,7 +144,21 @@ class CalibrationFile(Section):
         if not (self.calibration or self.friction or self.placement or self.fitted != FittedValues()):
             sentence = "nothing is calibrated; allowed: at least one [calibration.<model>] table"
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+        self._each_once()
         return self
+
+    def _each_once(self) -> None:
+        """Refuse two entries for the same thing: neither would be the right one."""
+        listed: dict[str, list[tuple[Any, ...]]] = {
+            f"calibration.{model}": [(entry.fitted_to,) for entry in entries]
+            for model, entries in self.calibration.items()
+        }
+        listed["friction"] = [(item.channel_diameter, item.wavelength, item.amplitude) for item in self.friction]
+        listed["placement"] = [(place.channel_diameter,) for place in self.placement]
+        twice = [name for name, keys in listed.items() if len(set(keys)) < len(keys)]
+        if twice:
+            sentence = f"{twice[0]} holds two entries for the same geometry; allowed: one for each"
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
 
 
 def read_calibration(path: str | Path) -> CalibrationFile:
@@ -178,8 +194,9 @@ def with_calibration(robot: Robot, path: str | Path) -> Robot:
 def calibrated_robot(robot: Robot, file: CalibrationFile) -> Robot:
     """The robot with fitted factors, fields and friction; of several geometries the one nearest to it is taken.
 
-    A file without factors leaves the robot its own. A tail whose B_eff was not fitted gets the middle of the fitted
-    tails in its channel: they say more about it than the rotor's own B_m, which is a lower bound.
+    A file without factors leaves the robot its own; factors for some models take the place of all. A tail whose B_eff
+    was not fitted gets the middle of the fitted tails in its channel: they say more about it than the rotor's own B_m,
+    which is a lower bound.
     """
     changed = _with_fitted(robot, file.fitted)
     factors = {
@@ -215,8 +232,13 @@ def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
     Raises:
         InputError: as `read_calibration`.
     """
+    return placement_in(read_calibration(path), robot)
+
+
+def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:
+    """The same of a file that was read before."""
     diameter = robot.channel.diameter if robot.channel else float("inf")
-    own = [place.placement for place in read_calibration(path).placement if _alike(diameter, place.channel_diameter)]
+    own = [place.placement for place in file.placement if _alike(diameter, place.channel_diameter)]
     return own[0] if own else None
 
 
@@ -224,10 +246,25 @@ def _alike(value: float, fitted: float) -> bool:
     return abs(value - fitted) <= _SAME * fitted
 
 
+_OPEN = 1e3
+"""Diameter that stands for an unbounded fluid, m: the widest channel is the nearest to it."""
+
+
+def nearest_channel(robot: Robot, channels: Sequence[float]) -> int:
+    """Place of the channel that is nearest to a robot's own; an open robot is nearest to the widest.
+
+    Args:
+        robot: the robot.
+        channels: diameters, m.
+    """
+    own = robot.channel.diameter if robot.channel else _OPEN
+    return int(np.argmin([abs(np.log(own / diameter)) for diameter in channels]))
+
+
 def _distance(robot: Robot, entry: Calibration) -> float:
-    """How far a robot is from the geometry that factors were fitted to; an open robot is far from every channel."""
+    """How far a robot is from the geometry that factors were fitted to."""
     fitted = entry.fitted_to
-    channel = robot.channel.diameter if robot.channel else 1e3
+    channel = robot.channel.diameter if robot.channel else _OPEN
     pairs = (
         (channel, fitted.channel_diameter),
         (robot.body.diameter, fitted.body_diameter),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from spirillum.answer import as_json
 from spirillum.errors import InputError
 from spirillum.files import output_folder, write_dataset, write_text
+from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.comparison import uneven_models
 from spirillum.motion.prediction import calibration_warnings
 from spirillum.studies.dataset import assembled, read_dataset
@@ -132,8 +133,11 @@ def _computed(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
-    warnings += loaded.fitted.origin_warnings()
+    asked = [find_swimmer_model(name) for name in loaded.study.models]
+    warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
+    warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
+    warnings += loaded.fitted.model_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
         warnings += loaded.fitted.tails_warnings([loaded.robot_at(place) for place in range(loaded.count)])
     models = loaded.study.models

@@ -228,7 +228,7 @@ def load_study(
         raise InputError(f"{name}: {error}") from error
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
-    known = fitted_of(fitted, drawn)
+    known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
     friction = known.friction
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     if friction:

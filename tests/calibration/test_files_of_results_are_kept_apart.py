@@ -1,0 +1,69 @@
+"""What a calibration writes, in which order, and what it never touches."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import spirillum as sp
+from spirillum import InputError
+from spirillum.calibration.files import check_folder, earlier_results
+
+WIDE = "biorob2012-wide"
+
+
+@pytest.fixture(scope="module")
+def found(made: Callable[..., Path]) -> Any:
+    small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
+    return sp.calibrate(made(**small, seed=4), WIDE, method="least-squares")
+
+
+def small_figures(_found: Any) -> dict[str, Any]:
+    from matplotlib.figure import Figure
+
+    return {"residuals": Figure(figsize=(1, 1)), "profiles": Figure(figsize=(1, 1))}
+
+
+@pytest.mark.parametrize("name", ["posterior.nc", "predictions.csv", "calibration.toml", "figures/residuals.png"])
+def test_a_file_that_no_calibration_wrote_is_refused_and_stays(found: Any, tmp_path: Path, name: str) -> None:
+    foreign = tmp_path / name
+    foreign.parent.mkdir(exist_ok=True)
+    foreign.write_bytes(b"my own\n")
+    with pytest.raises(InputError, match=f"holds {name} of unknown origin; allowed: a new folder"):
+        check_folder(tmp_path)
+    with pytest.raises(InputError, match="unknown origin"):
+        found.write(tmp_path, figures=False)
+    assert foreign.read_bytes() == b"my own\n"
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [foreign]
+
+
+def test_numbers_are_written_before_the_figures(found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_found: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("spirillum.plots.calibration.calibration_figures", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        found.write(tmp_path)
+    assert {path.name for path in tmp_path.glob("*.*")} == {"calibration.toml", "predictions.csv"}
+    assert sp.predict(WIDE, tail_rate="1 Hz", calibration=tmp_path / "calibration.toml").calibrated
+
+
+def test_figures_of_an_earlier_run_go_and_changed_ones_stay(
+    found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spirillum.plots.calibration.calibration_figures", small_figures)
+    found.write(tmp_path)
+    (tmp_path / "figures" / "my-own.png").write_bytes(b"mine")
+    assert {path.name for path in earlier_results(tmp_path)} == {
+        "calibration.toml",
+        "predictions.csv",
+        *(f"{name}{suffix}" for name in ("residuals", "profiles") for suffix in (".png", ".svg")),
+    }
+    found.write(tmp_path, figures=False)
+    kept = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
+    assert kept == {"calibration.toml", "predictions.csv", "figures/my-own.png"}
+    found.write(tmp_path)
+    (tmp_path / "figures" / "residuals.png").write_bytes(b"drawn anew by hand")
+    with pytest.raises(InputError, match=r"figures/residuals\.png of unknown origin"):
+        check_folder(tmp_path)
