@@ -68,4 +68,4 @@ def test_a_template_has_every_column_and_no_row(tmp_path: Path) -> None:
         new_observations_file(path)
     path.write_text(f"{text}a,40,25,2.5,1,1.0,1.2,-0.1,,,,,,\n")
     answer = observations_answer(path)
-    assert (answer["rows"], answer["measured"]["motor_rate"]) == (1, 1)
+    assert (answer["rows"], answer["measured"]["tail_rate"], answer["measured"]["motor_rate"]) == (1, 1, 0)

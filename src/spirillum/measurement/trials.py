@@ -57,7 +57,7 @@ _PHASE_ERROR = math.radians(1.0)
 _SLOW_PIXELS = 0.01
 """Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
 _SLOW_ANGLE = math.radians(0.1)
-"""The same of an angle, rad."""
+"""The same of an angle, rad; at least the standard error of a frame, of which glare makes a slow one."""
 _MANY_STRAYS = 0.02
 _FEW_TURNS = 2.0
 _DEGREE = 5
@@ -151,7 +151,7 @@ def trial_of(track: Track, robot: Robot, name: str = "") -> Trial:
     flags = (*track.flags, *_own_flags(fits, track, robot))
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
-    quantities |= {name: _widened(fits[name], "rad/s", _slow(track, _SLOW_ANGLE)) for name in rates}
+    quantities |= {name: _widened(fits[name], "rad/s", *_slow_angles(track, name)) for name in rates}
     quantities["lateral_position"] = _mean(track, track.position[:, 1], "m")
     quantities["heading"] = _mean(track, track.heading, "rad")
     quantities |= _wobbles(track)
@@ -235,6 +235,14 @@ def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
 def _slow(track: Track, error: float) -> float:
     """Standard error of a rate from an error that grows from one end to the other."""
     return error / float(np.ptp(track.time)) if track.time.size > 1 else 0.0
+
+
+def _slow_angles(track: Track, name: str) -> list[float]:
+    """Standard errors of a rotation rate from slow errors of the angles that it comes from, rad/s."""
+    errors = {"body_rotation_rate": (track.body_angle_error,), "tail_rotation_rate": (track.tail_phase_error,)}
+    both = (track.body_angle_error, track.tail_phase_error)
+    read = any(flag.name == BY_HAND for flag in track.flags)  # an eye's errors do not hang together
+    return [_slow(track, _SLOW_ANGLE if read else _usual(error, _SLOW_ANGLE)) for error in errors.get(name, both)]
 
 
 def _velocity(rate: Rate, track: Track) -> Measured:

@@ -10,12 +10,16 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.mesh import STRIPE_COLOURS
 
-__all__ = ["colour_classes", "named_colours", "named_rightly", "order_seen", "pattern_period"]
+__all__ = ["colour_classes", "named_colours", "named_rightly", "order_seen", "pattern_period", "without_glare"]
 
 _MANY = 6
 """More classes than this are matched to names by the least total distance alone."""
 _PAIRS = 3
 """Kinds of neighbouring stripes that have to be seen before their order is judged."""
+_GLARE = 240.0
+"""Brightness of glare to begin with."""
+_PALE = 0.7
+"""Share of the strongest channel in the weakest one from which on a bright colour is glare."""
 _FITS = 0.7
 """Share of neighbouring stripes that have to stand in a given order."""
 
@@ -40,32 +44,58 @@ def _opponent(colours: Samples) -> Samples:
     return np.stack([0.35 * (red + green + blue) / 3.0, red - green, 0.5 * (red + green) - blue], axis=-1)
 
 
-def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Samples]:
+def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Samples, Samples]:
     """Colours of the named classes in a picture.
 
     Starts from the named colours under a lamp that gives the samples' mean, then moves each class to the mean of the
-    samples that are nearest to it (k-means), held by its start where few samples are.
+    samples that are nearest to it (k-means), held by its start where few samples are. Glare, which is white whatever
+    is below it, has a class of its own, so that it does not become a stripe's colour.
 
     Args:
         samples: colours of pixels of the stripes, (m, 3).
         names: distinct names of colours.
 
     Returns:
-        The classes' colours in the picture, (classes, 3), and the named colours under the same lamp.
+        The classes' colours in the picture, (classes, 3), the named colours under the same lamp, and the colour of
+        glare, (1, 3), or (0, 3) where a stripe is white itself.
     """
     named = named_colours(names)
-    lamp = np.clip(samples.mean(axis=0) / named.mean(axis=0), 0.2, 5.0)
+    glary = np.zeros(len(samples), dtype=bool) if "white" in names else _glary(samples)
+    lamp = np.clip(samples[~glary].mean(axis=0) / named.mean(axis=0), 0.2, 5.0)
     lamp = np.mean(lamp) * (lamp / np.mean(lamp)) ** 0.5  # not all stripes show: believe half of the tint
     start = named * lamp
     palette = start.copy()
+    glare = np.full((0 if "white" in names else 1, 3), _GLARE)
     held = 0.02 * len(samples) / len(names)
     for _ in range(12):
-        nearest = _nearest(samples, palette)
+        nearest = _nearest(samples, np.concatenate([palette, glare]))
         for index in range(len(names)):
             mine = samples[nearest == index]
             total = mine.sum(axis=0) if len(mine) else np.zeros(3)
             palette[index] = (total + held * start[index]) / (len(mine) + held)
-    return palette, start
+        shining = samples[nearest == len(names)]
+        if len(glare) and len(shining):
+            glare[0] = (shining.sum(axis=0) + held * _GLARE) / (len(shining) + held)
+    return palette, start, glare
+
+
+def without_glare(profiles: Samples, palettes: tuple[Samples, Samples, Samples]) -> Samples:
+    """Colours with NaN where they are nearer to glare than to any stripe.
+
+    Args:
+        profiles: colours, (..., 3).
+        palettes: what `colour_classes` found.
+    """
+    palette, _, glare = palettes
+    nearest = _nearest(np.nan_to_num(profiles), np.concatenate([palette, glare]))
+    return np.asarray(np.where((nearest < len(palette))[..., None], profiles, np.nan))
+
+
+def _glary(samples: Samples) -> np.ndarray:
+    """Which samples are bright without a colour; none if all are."""
+    brightest, least = samples.max(axis=1), samples.min(axis=1)
+    found = (least > _PALE * brightest) & (brightest > np.median(brightest))
+    return np.asarray(found if not found.all() else np.zeros(len(samples), dtype=bool))
 
 
 def _nearest(samples: Samples, palette: Samples) -> np.ndarray:
@@ -75,23 +105,27 @@ def _nearest(samples: Samples, palette: Samples) -> np.ndarray:
 
 
 def order_seen(
-    profiles: Samples, angles: Samples, palette: Samples, start: Samples, stripes: Sequence[str], names: Sequence[str]
+    profiles: Samples,
+    angles: Samples,
+    palettes: tuple[Samples, Samples, Samples],
+    stripes: Sequence[str],
+    names: Sequence[str],
 ) -> tuple[Samples, str]:
     """Check the order of the stripes by which colours are seen side by side.
 
     Args:
         profiles: colours along the angle about the axis, from +z towards -y, for some frames, (f, n, 3).
         angles: these angles, rad, (n,).
-        palette: colours of the classes, (classes, 3).
-        start: named colours under this lamp, (classes, 3).
+        palettes: what `colour_classes` found.
         stripes: names in the order given.
         names: distinct names, one a class.
 
     Returns:
         The classes' colours by the names that fit them best, and `given`, `reversed`, `other` or `unseen`.
     """
+    palette, start, glare = palettes
     count = len(names)
-    seen = _neighbours(profiles, angles, palette, 2.0 * np.pi / len(stripes))
+    seen = _neighbours(profiles, angles, palette, glare, 2.0 * np.pi / len(stripes))
     if seen.sum() < 3 or np.count_nonzero(seen) < min(_PAIRS, count):
         return palette, "unseen"
     order = [names.index(name) for name in stripes]
@@ -143,13 +177,14 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
     return by_name
 
 
-def _neighbours(profiles: Samples, angles: Samples, palette: Samples, width: float) -> Samples:
+def _neighbours(profiles: Samples, angles: Samples, palette: Samples, glare: Samples, width: float) -> Samples:
     """How often a class is seen next to another one, towards larger angles, (classes, classes)."""
     seen = np.zeros((len(palette), len(palette)))
     step = float(angles[1] - angles[0])
     for profile in profiles:
         good = np.isfinite(profile).all(axis=1)
-        classes = np.where(good, _nearest(np.nan_to_num(profile), palette), -1)
+        classes = np.where(good, _nearest(np.nan_to_num(profile), np.concatenate([palette, glare])), -1)
+        classes = np.where(classes < len(palette), classes, -1)
         bounds = np.flatnonzero(np.diff(classes)) + 1
         runs = np.split(classes, bounds)
         wide = [int(run[0]) for run in runs if len(run) * step > 0.35 * width]

@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.pictures import even_loss, profile_of_rows, stripe_losses, stripe_step, stripes_at
 from spirillum.robot.robot import Robot
-from spirillum.tracking.colours import colour_classes, named_rightly, order_seen, pattern_period
+from spirillum.tracking.colours import colour_classes, named_rightly, order_seen, pattern_period, without_glare
 from spirillum.tracking.optics import Optics, Pose, seen
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
@@ -33,6 +33,8 @@ _CUT, _EDGE = 4.7, 0.35
 stripes, so that edges a part of a pixel away still pull."""
 _FIRST_RESIDUAL = 18.0
 _REPEATS = 6
+_WITHOUT_GLARE = 2
+"""Repeats in which what looks like glare is left out."""
 _HUMPS = 15
 """Humps of what shines along the angle."""
 _HELD, _TINTED, _ROUGH = 0.05, 2.0, 0.2
@@ -121,10 +123,12 @@ class Stripes:
         scales = np.array([scale for _, scale in found])
         steep = scales > 0.45 * scales.max(axis=1, keepdims=True)
         facing = profiles[steep & np.isfinite(profiles).all(axis=2)]
-        palette, start = colour_classes(facing, self.names)
+        palettes = colour_classes(facing, self.names)
+        start = palettes[1]
         seen_steep = np.where(steep[..., None], profiles, np.nan)
-        palette, verdict = order_seen(seen_steep, self.angles, palette, start, self.stripes, self.names)
-        looks = [self._refined(profiles, scales, first) for first in (palette, start)]
+        palette, verdict = order_seen(seen_steep, self.angles, palettes, self.stripes, self.names)
+        clear = without_glare(profiles, (palette, *palettes[1:]))
+        looks = [self._refined(profiles, clear, scales, first) for first in (palette, start)]
         losses = [self._typical_loss(profiles, scales, look) for look in looks]
         best = int(np.argmin(losses))
         self.look = looks[best]
@@ -229,8 +233,8 @@ class Stripes:
         spread = float(scores @ np.convolve(scores, window, mode="same")) / information**2
         return float(np.sqrt(max(plain, spread)))
 
-    def _refined(self, profiles: Samples, scales: Samples, palette: Samples) -> _Look:
-        """Colours, shading and blur with which the stripes fit best."""
+    def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Look:
+        """Colours, shading and blur with which the stripes fit best; what shines is learnt once the stripes are."""
         even = np.column_stack([np.ones((self.angles.size, 3)), np.zeros((self.angles.size, 3))])
         look = _Look(palette, even, 1.0, _FIRST_RESIDUAL, np.ones(self.angles.size))
         for repeat in range(_REPEATS):
@@ -240,7 +244,7 @@ class Stripes:
                     trial = _Look(look.palette, look.shade, blur, look.residual, look.trust)
                     losses.append(np.nansum([self._fit(p, s, trial)[2] for p, s in zip(profiles, scales, strict=True)]))
                 look.blur = _BLURS[int(np.argmin(losses))]
-            look = self._relearned(profiles, scales, look)
+            look = self._relearned(clear if repeat < _WITHOUT_GLARE else profiles, scales, look)
         return look
 
     def _relearned(self, profiles: Samples, scales: Samples, look: _Look) -> _Look:
