@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import spirillum as sp
+from spirillum.measurement.joining import join_observations
 
 TRUE_DRAG, TRUE_ROTATION = 2.4, 0.8
 TAILS = ((15, 2.0), (15, 3.0), (25, 2.5))
@@ -42,16 +43,15 @@ with tempfile.TemporaryDirectory() as name:
         study, folder / "films", trials=2, duration="5 s", tail_rate="1.2 Hz", size="320x240", fps=15, seed=1
     )
 
-    rows: list[str] = []
+    files = []
     for robot in sorted(path for path in (folder / "films").iterdir() if path.is_dir()):
         films = sorted(robot.glob("trial-*.mp4"))
         measured = sp.measure(films, robot / "setup.toml", output=folder / "measured" / robot.name, annotated=False)
         speed = measured.to_dict()["summary"]["forward_velocity"]
         print(f"{robot.name}: {1e3 * speed['value']:.4f} mm/s from {speed['n']} trials")
-        lines = (folder / "measured" / robot.name / "observations.csv").read_text(encoding="utf-8").splitlines()
-        rows += [line for line in lines if line not in rows]
+        files.append(folder / "measured" / robot.name / "observations.csv")
     observations = folder / "observations.csv"
-    observations.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    join_observations(files, observations)
 
     found = sp.calibrate(observations, "biorob2012-wide", model="sbt", method="least-squares")
     for parameter, item in found.values.items():

@@ -1,4 +1,4 @@
-"""The commands `spirillum observations new` and `observations check`."""
+"""The commands `spirillum observations new`, `observations check` and `observations join`."""
 
 from __future__ import annotations
 
@@ -42,6 +42,21 @@ def check(
     from spirillum.measurement.template import observations_answer
 
     text.show(observations_answer(file), _table, json=json)
+
+
+@observations_app.command("join")
+def join(
+    files: Annotated[list[Path], typer.Argument(help="Observations files (CSV or Parquet), two or more.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File to write (.csv).")],
+) -> None:
+    """Join several observations files, such as one of each robot, to one for `calibrate`.
+
+    Example: `spirillum observations join measured/*/observations.csv -o all.csv`
+    """
+    from spirillum.measurement.joining import join_observations
+
+    rows = join_observations(files, output)
+    typer.echo(f"{output}: {rows} rows of {len(files)} files")
 
 
 def _table(answer: object, console: object) -> None:

@@ -16,7 +16,16 @@ from spirillum.measurement.parquet import parquet_table
 from spirillum.measurement.statistics import Mean, mean_with_interval
 from spirillum.units import Hz
 
-__all__ = ["COLUMNS", "RATES", "Observation", "Observed", "check_signs", "read_observations", "summarised"]
+__all__ = [
+    "COLUMNS",
+    "RATES",
+    "Observation",
+    "Observed",
+    "check_signs",
+    "observation_table",
+    "read_observations",
+    "summarised",
+]
 
 _MM = 1e-3
 _KEYS = {"channel_diameter_mm": _MM, "wavelength_mm": _MM, "amplitude_mm": _MM}
@@ -85,7 +94,7 @@ def read_observations(path: str | Path) -> list[Observation]:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
     path = Path(path)
-    numbered = parquet_table(path, _WHAT) if path.suffix == ".parquet" else _csv_table(path)
+    _, numbered = observation_table(path)
     header = [name.strip() for name in numbered[0][1]]
     _check_header(path, header)
     found = [_observation(path, number, header, cells) for number, cells in numbered[1:]]
@@ -93,9 +102,19 @@ def read_observations(path: str | Path) -> list[Observation]:
     return found
 
 
-def _csv_table(path: Path) -> list[tuple[int, list[str]]]:
-    """Cells of header and rows, each with its line number."""
+def observation_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Comment lines of an observations file, and the cells of header and rows, each with its line number.
+
+    Args:
+        path: CSV, or Parquet, which has no comments.
+
+    Raises:
+        InputError: if the file cannot be read as a table.
+    """
+    if path.suffix == ".parquet":
+        return [], parquet_table(path, _WHAT)
     text = read_text(path, _WHAT, _LARGEST)
+    comments = [line.strip() for line in text.splitlines() if line.lstrip().startswith("#")]
     # A row of commas alone, as spreadsheets write, is an empty one.
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
@@ -105,7 +124,7 @@ def _csv_table(path: Path) -> list[tuple[int, list[str]]]:
         table = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
     except csv.Error as error:
         raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
-    return list(zip((number for number, _ in lines), table, strict=False))
+    return comments, list(zip((number for number, _ in lines), table, strict=False))
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:

@@ -24,7 +24,7 @@ _SECOND = 0.75
 """Score of a second robot over that of the first."""
 _CLEAR = 1.3
 """The same over the next best place."""
-_TURNED = 1.1
+_TURNED = 1.15
 """Score of a robot the other way round over that of the stated direction."""
 _OFTEN = 0.6
 """Share of the frames in which something has to be seen to be said."""

@@ -1,0 +1,57 @@
+"""Several observation files, one a robot, as one file for `calibrate`."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+from spirillum.errors import InputError
+from spirillum.files import output_target, whole_file
+from spirillum.measurement.observations import COLUMNS, observation_table, read_observations
+
+__all__ = ["join_observations"]
+
+_TABLES = {".csv": "an observations file"}
+
+
+def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
+    """Write the rows of several observation files to one, with all their comments.
+
+    Args:
+        files: observation files (CSV or Parquet), two or more.
+        output: the new file (.csv); it may not be one of them.
+
+    Returns:
+        Number of rows.
+
+    Raises:
+        InputError: if a file is wrong, or the files contradict each other, as by a trial that stands twice.
+    """
+    paths = [Path(file) for file in files]
+    if len(paths) < 2:
+        raise InputError(f"{len(paths)} file of observations; allowed: two or more to join")
+    target = output_target(Path(output), _TABLES, "observations.csv")
+    if any(path.exists() and target.exists() and path.samefile(target) for path in paths):
+        raise InputError(f"{target} is one of the files to join; allowed: another file")
+    rows: list[dict[str, str]] = []
+    comments: list[str] = []
+    for path in paths:
+        read_observations(path)
+        found, table = observation_table(path)
+        comments += [line for line in found if line not in comments]
+        header = [name.strip() for name in table[0][1]]
+        rows += [dict(zip(header, cells, strict=False)) for _, cells in table[1:]]
+    used = [name for name in COLUMNS if any(row.get(name, "").strip() for row in rows)]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with whole_file(target) as temporary:
+        temporary.write_text("".join(f"{line}\n" for line in comments) + text.getvalue(), encoding="utf-8")
+        try:
+            read_observations(temporary)
+        except InputError as error:
+            raise InputError(str(error).replace(str(temporary), "the joined file")) from error
+    return len(rows)
