@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.tracking.body import Body
+from spirillum.tracking.body import BodyFinder
 from spirillum.tracking.contour import GROUPS, contour_of
-from spirillum.tracking.optics import Optics, Pose
+from spirillum.tracking.optics import BodyPose, Optics
 from spirillum.tracking.search import candidates
 from spirillum.tracking.track import Flag
 from spirillum.tracking.warnings import gaps_of
@@ -23,7 +23,7 @@ def test_the_silhouette_of_a_sphere_against_its_tangent_cone():
     body = {"shape": "sphere", "length": "18 mm", "front": "none", "rear": "none"}
     contour = contour_of(load("biorob2012-wide", body=body, seal="none", coupling={"diameter": "0 mm"}), AIR)
     for x in (-0.06, 0.0, 0.035):
-        points = contour.points(Pose(x, 0.0, 0.0))
+        points = contour.points(BodyPose(x, 0.0, 0.0))
         centre, half = np.arctan(x / DEEP), np.arcsin(radius / np.hypot(x, DEEP))
         front = points[contour.group == GROUPS.index("front")]
         assert front[:, 0].max() == pytest.approx(DEEP * np.tan(centre + half) - x, abs=1e-5)
@@ -39,7 +39,7 @@ def test_the_seals_edge_is_where_its_circle_is_seen():
     contour = contour_of(robot, AIR)
     assert robot.seal is not None
     x, radius = robot.seal.length - 0.5 * robot.body.length, 0.5 * robot.body.diameter
-    pose = Pose(0.03, 0.004, 0.05)
+    pose = BodyPose(0.03, 0.004, 0.05)
     points = contour.points(pose)[contour.group == GROUPS.index("seal")]
     angle = -1.0 + np.arange(len(points)) * max(1.2 * AIR.length_per_pixel, 1.8 * radius / 80) / radius
     circle = np.stack([np.full(angle.size, x), radius * np.sin(angle), radius * np.cos(angle)], axis=1)
@@ -59,11 +59,11 @@ def frames(flat_pictures):
 
 def test_places_follow_the_truth(frames):
     film, pictures = frames
-    body = Body(film.robot, AIR, (0, 0, 320, 240))
+    body = BodyFinder(film.robot, AIR, (0, 0, 320, 240))
     truth = film.truth(film.times)
     off = np.random.default_rng(3).normal(0.0, 1.0, (len(pictures), 3)) * np.array([2e-4, 2e-4, 0.01])
-    starts = [Pose(float(x), float(y), 0.0) for x, y in zip(truth["x"], truth["y"], strict=True)]
-    starts = [Pose(*(np.array(pose) + change).tolist()) for pose, change in zip(starts, off, strict=True)]
+    starts = [BodyPose(float(x), float(y), 0.0) for x, y in zip(truth["x"], truth["y"], strict=True)]
+    starts = [BodyPose(*(np.array(pose) + change).tolist()) for pose, change in zip(starts, off, strict=True)]
     found = body.learn(pictures, starts, film.times)
     assert all(one.known for one in found)
     again = [body.place(picture, start) for picture, start in zip(pictures, starts, strict=True)]
@@ -77,16 +77,16 @@ def test_places_follow_the_truth(frames):
 
 def test_the_robot_is_found_without_a_hint_and_its_place_is_no_place_without_it(frames):
     film, pictures = frames
-    body = Body(film.robot, AIR, (0, 0, 320, 240))
+    body = BodyFinder(film.robot, AIR, (0, 0, 320, 240))
     still = np.full((240, 320, 3), 0.0)
     best, *others = candidates(pictures[0], still, body.contour, AIR, (0, 0, 320, 240))
     assert (best.pose.x, best.pose.y) == pytest.approx((0.01, 0.003), abs=2.5e-3)
     assert best.score > 1.5 * others[0].score
     truth = film.truth(film.times)
-    starts = [Pose(float(x), float(y), 0.0) for x, y in zip(truth["x"], truth["y"], strict=True)]
+    starts = [BodyPose(float(x), float(y), 0.0) for x, y in zip(truth["x"], truth["y"], strict=True)]
     body.learn(pictures, starts, film.times)
     assert not body.place(np.full((240, 320, 3), 150, dtype=np.uint8), starts[0]).known
-    assert not body.place(pictures[0], Pose(starts[0].x, 0.04, 0.0)).known
+    assert not body.place(pictures[0], BodyPose(starts[0].x, 0.04, 0.0)).known
 
 
 def test_frames_that_are_missing_are_counted():

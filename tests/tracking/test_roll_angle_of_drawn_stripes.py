@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 
 from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.optics import Optics, Pose, optics_of
+from spirillum.tracking.optics import BodyPose, Optics, optics_of
 from spirillum.tracking.roll import Stripes
 from spirillum.tracking.setup import load_setup
 
 PRESET = ("red", "yellow", "green", "blue") * 2
 
 
-def learnt(film: Any, folder: Path, **changes: str) -> tuple[Stripes, list[tuple[np.ndarray, Pose]], np.ndarray]:
+def learnt(film: Any, folder: Path, **changes: str) -> tuple[Stripes, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
     path = folder / "setup.toml"
     path.write_text(film.setup_text(**changes))
     setup, robot = load_setup(path)
     optics = optics_of(setup, film.size, film.focal)
     true = film.truth(film.times)
     pictures = [
-        (picture, Pose(float(x), float(y), film.heading))
+        (picture, BodyPose(float(x), float(y), film.heading))
         for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
     ]
     stripes = Stripes(robot, setup, optics)
@@ -31,7 +31,7 @@ def learnt(film: Any, folder: Path, **changes: str) -> tuple[Stripes, list[tuple
 
 
 def errors(
-    stripes: Stripes, pictures: list[tuple[np.ndarray, Pose]], angle: np.ndarray
+    stripes: Stripes, pictures: list[tuple[np.ndarray, BodyPose]], angle: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     read = np.array([stripes.read(*picture) for picture in pictures])
     half = 0.5 * stripes.period
@@ -113,7 +113,7 @@ def test_an_even_picture_is_not_read(flat_pictures: ModuleType, tmp_path: Path) 
 
 def test_stripes_out_of_the_picture_are_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
     stripes, pictures, _ = learnt(film(flat_pictures), tmp_path)
-    assert np.isnan(stripes.read(pictures[0][0], Pose(-0.5, 0.0, 0.0))).all()
+    assert np.isnan(stripes.read(pictures[0][0], BodyPose(-0.5, 0.0, 0.0))).all()
 
 
 def test_periods_of_patterns() -> None:
@@ -133,5 +133,5 @@ def test_a_robot_without_stripes_says_so(flat_pictures: ModuleType) -> None:
     )
     robot = load("biorob2012-wide", seal="none")
     stripes = Stripes(robot, setup, Optics(size=(64, 64), focal=100.0, height=0.2, axis_height=0.01))
-    stripes.learn([(np.zeros((64, 64, 3), dtype=np.uint8), Pose(0.0, 0.0, 0.0))])
+    stripes.learn([(np.zeros((64, 64, 3), dtype=np.uint8), BodyPose(0.0, 0.0, 0.0))])
     assert [flag.name for flag in stripes.flags] == ["no-stripes"]

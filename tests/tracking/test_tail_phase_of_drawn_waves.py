@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.tracking.optics import Pose, optics_of
+from spirillum.tracking.optics import BodyPose, optics_of
 from spirillum.tracking.setup import load_setup
 from spirillum.tracking.tail import Wire
 
 
-def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tuple[np.ndarray, Pose]], np.ndarray]:
+def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
     path = folder / "setup.toml"
     path.write_text(film.setup_text())
     setup, robot = load_setup(path)
@@ -21,7 +21,7 @@ def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tu
         robot = load("biorob2012-wide", **robot_changes)
     true = film.truth(film.times)
     pictures = [
-        (picture, Pose(float(x), float(y), film.heading))
+        (picture, BodyPose(float(x), float(y), film.heading))
         for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
     ]
     wire = Wire(robot, setup, optics_of(setup, film.size, film.focal))
@@ -29,7 +29,7 @@ def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tu
     return wire, pictures, true["tail_phase"]
 
 
-def errors(wire: Wire, pictures: list[tuple[np.ndarray, Pose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def errors(wire: Wire, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     read = np.array([wire.read(*picture) for picture in pictures])
     return (read[:, 0] - phase + np.pi) % (2 * np.pi) - np.pi, read[:, 1]
 
@@ -94,4 +94,4 @@ def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> No
 
 def test_a_tail_out_of_view_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
     wire, pictures, _ = learnt(film(flat_pictures, frames=8), tmp_path)
-    assert np.isnan(wire.read(pictures[0][0], Pose(-0.1, 0.0, 0.0))).all()
+    assert np.isnan(wire.read(pictures[0][0], BodyPose(-0.1, 0.0, 0.0))).all()

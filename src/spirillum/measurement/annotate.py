@@ -19,7 +19,7 @@ from spirillum.extras import required
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from spirillum.tracking.optics import Optics, Pose
+    from spirillum.tracking.optics import BodyPose, Optics
 
 __all__ = ["Annotator", "Seen", "annotated_film"]
 
@@ -40,7 +40,7 @@ class Seen(Protocol):
         """Time in the video, s."""
 
     @property
-    def pose(self) -> Pose | None:
+    def pose(self) -> BodyPose | None:
         """Where the body is; None where it was not seen."""
 
     @property

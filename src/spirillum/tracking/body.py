@@ -11,9 +11,9 @@ from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles
 from spirillum.robot.robot import Robot
 from spirillum.tracking.contour import GROUPS, Contour, contour_of
-from spirillum.tracking.optics import Optics, Pose
+from spirillum.tracking.optics import BodyPose, Optics
 
-__all__ = ["Body", "Placed", "grey_part"]
+__all__ = ["BodyFinder", "Placed", "grey_part"]
 
 _HALF = 6
 """Reach of the brightness that is compared, pixels on either side of an edge."""
@@ -40,8 +40,8 @@ _WORST = 0.7
 class Placed(NamedTuple):
     """Where the body is on a frame."""
 
-    pose: Pose
-    error: Pose
+    pose: BodyPose
+    error: BodyPose
     """Standard errors, m and rad."""
     share: float
     """Share of the edges that fit, 0 to 1."""
@@ -54,7 +54,7 @@ class Placed(NamedTuple):
         return bool(np.isfinite(self.error.x))
 
 
-class Body:
+class BodyFinder:
     """A robot's body in front of a camera; learns what its edges look like, then places it frame by frame."""
 
     def __init__(self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int]) -> None:
@@ -76,7 +76,7 @@ class Body:
         self._trust = self.contour.floor.copy()
         self.margin = int(_HALF + 4 * _BLUR + 4)
 
-    def learn(self, images: list[np.ndarray], poses: list[Pose], times: Samples) -> list[Placed]:
+    def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
         """Learn the edges' looks from frames with about known places; the places again, better.
 
         Args:
@@ -102,7 +102,7 @@ class Body:
                 poses = _smooth(poses, times)
         return found
 
-    def place(self, image: np.ndarray, guess: Pose) -> Placed:
+    def place(self, image: np.ndarray, guess: BodyPose) -> Placed:
         """The body on a frame, near a guess; errors are NaN where it is not seen well enough.
 
         Args:
@@ -111,7 +111,7 @@ class Body:
         """
         return self._place(self._part(image, guess), guess)
 
-    def _part(self, image: np.ndarray, pose: Pose) -> tuple[Samples, Samples]:
+    def _part(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
         pixels = self.contour.places(pose, self.optics)[0]
         low, high = pixels.min(axis=0) - self.margin, pixels.max(axis=0) + self.margin
         left, top, right, bottom = self.bounds
@@ -184,13 +184,13 @@ class Body:
         variance = (np.maximum(misses, _ROUNDING) / np.maximum(np.abs(strengths) * self._steep, 1e-9)) ** 2
         return shifts - self._offset, known, np.where(known, variance + self._trust**2, np.inf)
 
-    def _place(self, part: tuple[Samples, Samples], guess: Pose) -> Placed:
+    def _place(self, part: tuple[Samples, Samples], guess: BodyPose) -> Placed:
         count = len(self.contour.group)
         used, change, level = np.empty(count), np.empty(3), 1.0
         pose = np.array(guess)
-        lost = Placed(guess, Pose(np.nan, np.nan, np.nan), 0.0, 0.0)
+        lost = Placed(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
         for step in range(_STEPS):
-            pixels, normals, size, slopes = self.contour.places(Pose(*pose), self.optics)
+            pixels, normals, size, slopes = self.contour.places(BodyPose(*pose), self.optics)
             shifts, known, variance = self._shifts(part, pixels, normals)
             inside = np.isfinite(shifts)
             if known.sum() < 12:
@@ -206,8 +206,8 @@ class Body:
         fitting = float(np.sum(used > 0.0) / max(1, inside.sum()))
         share = float(inside.mean())
         if fitting < _FEWEST or not errors[0] * float(np.median(size)) < _WORST or share < 0.2:
-            return Placed(Pose(*pose), lost.error, fitting, share)
-        return Placed(Pose(*(float(v) for v in pose)), Pose(*(float(v) for v in errors)), fitting, share)
+            return Placed(BodyPose(*pose), lost.error, fitting, share)
+        return Placed(BodyPose(*(float(v) for v in pose)), BodyPose(*(float(v) for v in errors)), fitting, share)
 
 
 def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:
@@ -218,7 +218,7 @@ def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float)
     return np.asarray(cv2.GaussianBlur(grey, (0, 0), blur), dtype=float)
 
 
-def _smooth(poses: list[Pose], times: Samples) -> list[Pose]:
+def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:
     """Places that follow a straight and steady way where they are far from it (Theil and Sen's, of each coordinate)."""
     if len(poses) < 4:
         return poses
@@ -230,4 +230,4 @@ def _smooth(poses: list[Pose], times: Samples) -> list[Pose]:
     line += np.median(numbers - line, axis=0)
     off = np.abs(numbers - line)
     bound = np.maximum(3.0 * np.median(off, axis=0), np.array([1e-3, 5e-4, 0.01]))
-    return [Pose(*row) for row in np.where(off > bound, line, numbers).tolist()]
+    return [BodyPose(*row) for row in np.where(off > bound, line, numbers).tolist()]

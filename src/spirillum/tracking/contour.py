@@ -17,7 +17,7 @@ from spirillum.kernels.contours import edge_places, edge_points
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Line, Outline
 from spirillum.robot.robot import Robot
-from spirillum.tracking.optics import Optics, Pose, placed
+from spirillum.tracking.optics import BodyPose, Optics, placed
 
 __all__ = ["GROUPS", "Contour", "contour_of"]
 
@@ -51,13 +51,13 @@ class Contour:
     """Polynomials of the points, and of those of a flat end's lower rim, (2, n, 2, a, b)."""
     _reach: Samples = field(repr=False)
 
-    def points(self, pose: Pose) -> Samples:
+    def points(self, pose: BodyPose) -> Samples:
         """The edge points on the plane through the axis, in the body's frame, m, (n, 2)."""
         out = np.empty((len(self.group), 2))
         edge_points(np.array(pose, dtype=float), self._factors, self.normals, self._reach, out)
         return out
 
-    def places(self, pose: Pose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
+    def places(self, pose: BodyPose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
         """Where the edges are in the picture.
 
         Returns:
@@ -100,7 +100,7 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     upright = Optics(optics.size, 1.0, optics.height, optics.axis_height, optics.surface, optics.index)
 
     def on_plane(points: Samples, x: float, y: float) -> Samples:
-        moved = placed(points, Pose(-x, -y, 0.0), optics.axis_height)
+        moved = placed(points, BodyPose(-x, -y, 0.0), optics.axis_height)
         found = upright.points(upright.pixels(moved), optics.axis_height)[:, :2]
         return np.asarray(found + np.array([x, y]))
 

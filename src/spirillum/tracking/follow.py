@@ -11,10 +11,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
-from spirillum.tracking.body import Body, Placed
+from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
 from spirillum.tracking.frames import Video
-from spirillum.tracking.optics import Optics, Pose, placed
+from spirillum.tracking.optics import BodyPose, Optics, placed
 from spirillum.tracking.roll import Stripes
 from spirillum.tracking.ruler import still_picture
 from spirillum.tracking.scale import Sight
@@ -39,7 +39,7 @@ class Seen(NamedTuple):
 
     time: float
     """s."""
-    pose: Pose | None
+    pose: BodyPose | None
     """Where the body is in the camera's frame; None where it was not seen."""
     body_angle: float
     """rad, modulo the stripes' period; NaN where it could not be read."""
@@ -88,7 +88,7 @@ def follow(
     still = still_picture(images)
     sight = sight_of(video, setup, still, folder)
     bounds = bounds_of(setup, video)
-    body = Body(robot, sight.optics, bounds)
+    body = BodyFinder(robot, sight.optics, bounds)
     start = first_look(video.name, body, frames, still)
     stripes, wire = Stripes(robot, setup, sight.optics), Wire(robot, setup, sight.optics)
     stripes.learn(start.seen)
@@ -117,7 +117,7 @@ def follow(
     return _track(video, setup, robot, sight, rows, stripes.period, wire.handedness(), every)
 
 
-def _guess(rows: _Row, time: float, start: Start) -> Pose:
+def _guess(rows: _Row, time: float, start: Start) -> BodyPose:
     """Where the body should be, from the frames before."""
     last = [(at, one.pose) for at, one in zip(rows.time[-_MEMORY:], rows.placed[-_MEMORY:], strict=True) if one.known]
     if len(last) < 2 or not rows.placed[-1].known:
@@ -125,12 +125,12 @@ def _guess(rows: _Row, time: float, start: Start) -> Pose:
     return on_the_way(last, time)
 
 
-def _placed(body: Body, image: np.ndarray, guess: Pose, expected: Pose) -> Placed:
+def _placed(body: BodyFinder, image: np.ndarray, guess: BodyPose, expected: BodyPose) -> Placed:
     """The body near a guess, or else where it should be; not seen if it would have jumped."""
     found = body.place(image, guess)
     far = 4.0 * body.optics.length_per_pixel
     if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) > far:
-        found = found._replace(error=Pose(np.nan, np.nan, np.nan))
+        found = found._replace(error=BodyPose(np.nan, np.nan, np.nan))
     if not found.known and guess is not expected:
         again = body.place(image, expected)
         if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
@@ -138,7 +138,7 @@ def _placed(body: Body, image: np.ndarray, guess: Pose, expected: Pose) -> Place
     return found
 
 
-def _searched(body: Body, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
+def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
     """The body anywhere in a picture."""
     for candidate in candidates(image, still, body.contour, body.optics, body.bounds)[:2]:
         better = refined(image, still, candidate, body.contour, body.optics, body.bounds)
@@ -195,5 +195,5 @@ def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
     axis = np.array([[0.0, 0.0, 0.0], [0.5 * robot.body.length, 0.0, 0.0]])
     out = np.full((len(pose), 4), np.nan)
     for k in np.flatnonzero(np.isfinite(pose[:, 0])):
-        out[k] = optics.pixels(placed(axis, Pose(*pose[k].tolist()), optics.axis_height)).ravel()
+        out[k] = optics.pixels(placed(axis, BodyPose(*pose[k].tolist()), optics.axis_height)).ravel()
     return out

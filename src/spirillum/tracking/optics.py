@@ -15,10 +15,10 @@ from spirillum.tracking.setup import Setup
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["Optics", "Pose", "optics_of", "placed", "seen"]
+__all__ = ["BodyPose", "Optics", "optics_of", "placed", "seen"]
 
 
-class Pose(NamedTuple):
+class BodyPose(NamedTuple):
     """Where the body's mid-length is in the camera's frame, at the height of the robot's axis."""
 
     x: float
@@ -136,13 +136,13 @@ def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
     )
 
 
-def placed(points: Samples, pose: Pose, axis_height: float) -> Samples:
+def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
     """Points (k, 3) of the body's frame in the camera's frame, m."""
     cos, sin = np.cos(pose.heading), np.sin(pose.heading)
     x, y, z = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, axis_height + z], axis=1)
 
 
-def seen(points: Samples, pose: Pose, optics: Optics) -> Samples:
+def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
     """Pixels (k, 2) of points (k, 3) of the body's frame, m."""
     return optics.pixels(placed(points, pose, optics.axis_height))

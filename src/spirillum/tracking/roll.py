@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import even_loss, profile_of_rows, stripe_losses, stripe_step, stripes_at
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import colour_classes, named_rightly, order_seen, pattern_period, without_glare
-from spirillum.tracking.optics import Optics, Pose, seen
+from spirillum.tracking.optics import BodyPose, Optics, seen
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 
@@ -45,6 +45,8 @@ _LOCKED = 0.05
 """How far an edge's place depends on where it lies within a pixel, pixels."""
 _UNREADABLE = 0.6
 """Loss over that of one even colour, above which nothing is read."""
+_GOOD = 0.3
+"""The same, below which the colours found are believed without trying the named ones."""
 _DOUBT = 1.0
 """How much less an angle counts at which frames differ from what is expected by more than usual."""
 _STEPS = 8
@@ -104,7 +106,7 @@ class Stripes:
             ]
         )
 
-    def learn(self, samples: Sequence[tuple[np.ndarray, Pose]]) -> None:
+    def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Find colours, shading and blur of the stripes in some frames of the video.
 
         Args:
@@ -128,11 +130,13 @@ class Stripes:
         seen_steep = np.where(steep[..., None], profiles, np.nan)
         palette, verdict = order_seen(seen_steep, self.angles, palettes, self.stripes, self.names)
         clear = without_glare(profiles, (palette, *palettes[1:]))
-        looks = [self._refined(profiles, clear, scales, first) for first in (palette, start)]
-        losses = [self._typical_loss(profiles, scales, look) for look in looks]
-        best = int(np.argmin(losses))
-        self.look = looks[best]
-        if losses[best] < 0.5 and named_rightly(self.look.palette, start):
+        self.look = self._refined(profiles, clear, scales, palette)
+        least = self._typical_loss(profiles, scales, self.look)
+        if least > _GOOD:
+            other = self._refined(profiles, clear, scales, start)
+            loss = self._typical_loss(profiles, scales, other)
+            self.look, least = (other, loss) if loss < least else (self.look, least)
+        if least < 0.5 and named_rightly(self.look.palette, start):
             return  # the order given fits, with the colours that belong to its names
         if verdict in ("reversed", "other"):
             how = "in the reversed order" if verdict == "reversed" else "in another order"
@@ -147,7 +151,7 @@ class Stripes:
         fits = [self._fit(p, s, look) for p, s in zip(profiles, scales, strict=True)]
         return float(np.median([a[2] / a[4] if np.isfinite(a[0]) else 1.0 for a in fits]))
 
-    def read(self, image: np.ndarray, pose: Pose) -> tuple[float, float]:
+    def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
         """Angle by which the body has turned about +x and its standard error, rad; NaN where it cannot be read.
 
         The angle is modulo `period`.
@@ -169,7 +173,7 @@ class Stripes:
         sentence = "The stripes are in no frame's view, so that the body's rotation is not given."
         return Flag("stripes-unreadable", sentence, ("body_rotation_rate",))
 
-    def _profile(self, image: np.ndarray, pose: Pose) -> tuple[Samples, Samples]:
+    def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
         """Colours along the angle, (n, 3), and how many pixels a radian is there, (n,); 0 where it faces away."""
         ends = seen(self._surface, pose, self.optics).reshape(2, -1, 2)
         first, last = self._between @ ends[0], self._between @ ends[1]

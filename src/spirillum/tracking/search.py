@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
 from spirillum.tracking.contour import GROUPS, Contour
-from spirillum.tracking.optics import Optics, Pose
+from spirillum.tracking.optics import BodyPose, Optics
 
 __all__ = ["Candidate", "candidates", "most_likely", "refined"]
 
@@ -30,7 +30,7 @@ _ROOM = 24
 class Candidate(NamedTuple):
     """A place where a body may be."""
 
-    pose: Pose
+    pose: BodyPose
     score: float
     """How clear its edges are there, over the picture's usual gradient."""
 
@@ -55,7 +55,7 @@ def candidates(
         turn: added to all headings that are tried, rad.
     """
     left, top, _, bottom = bounds
-    middle = contour.places(Pose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
+    middle = contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
     width = float(np.ptp(middle[:, 1]))
     factor = max(1, int(width / _WIDTH))
     slope_u, slope_v, usual = _slopes(image, still, bounds, factor, 1.0)
@@ -64,14 +64,14 @@ def candidates(
     group = contour.group[thin].astype(float)
     step = 6
     reach = np.mgrid[0 : height + 1, -step // 2 : step - step // 2].reshape(2, -1).T.astype(float)
-    found: list[tuple[float, Pose, Samples]] = []
+    found: list[tuple[float, BodyPose, Samples]] = []
     for column in range(step // 2, length + step // 2, step):
         for heading in _HEADINGS:
             start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
             at = optics.points(start, optics.axis_height)[0]
             if not np.isfinite(at).all():
                 continue
-            pose = Pose(float(at[0]), float(at[1]), float(heading) + turn)
+            pose = BodyPose(float(at[0]), float(at[1]), float(heading) + turn)
             pixels, normals, _, _ = contour.places(pose, optics)
             small = (pixels[thin] - np.array([left, top])) / factor - 0.5 + 0.5 / factor
             places = np.stack([reach[:, 1], reach[:, 0] - 0.5 * height], axis=1)
@@ -80,12 +80,16 @@ def candidates(
             for k in np.argsort(scores)[-3:]:
                 there = optics.points(start + factor * places[k], optics.axis_height)[0]
                 found.append(
-                    (float(scores[k]) / usual, Pose(float(there[0]), float(there[1]), float(heading) + turn), places[k])
+                    (
+                        float(scores[k]) / usual,
+                        BodyPose(float(there[0]), float(there[1]), float(heading) + turn),
+                        places[k],
+                    )
                 )
     return _apart(found, optics, width)
 
 
-def _apart(found: list[tuple[float, Pose, Samples]], optics: Optics, width: float) -> list[Candidate]:
+def _apart(found: list[tuple[float, BodyPose, Samples]], optics: Optics, width: float) -> list[Candidate]:
     """The best candidates that are not the same one twice."""
     far = width * optics.length_per_pixel
     kept: list[Candidate] = []
@@ -132,13 +136,13 @@ def refined(
         pose = best.pose
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
             heading = pose.heading + float(turn)
-            pixels, normals, _, _ = contour.places(Pose(pose.x, pose.y, heading), optics)
+            pixels, normals, _, _ = contour.places(BodyPose(pose.x, pose.y, heading), optics)
             edge_scores(slope_u, slope_v, pixels[thin] - low, normals[thin], group, len(GROUPS), reach, scores)
             k = int(np.argmax(scores))
             if scores[k] > best.score:
                 middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + reach[k]
                 at = optics.points(middle, optics.axis_height)[0]
-                best = Candidate(Pose(float(at[0]), float(at[1]), heading), float(scores[k]))
+                best = Candidate(BodyPose(float(at[0]), float(at[1]), heading), float(scores[k]))
     return best
 
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.tracking.body import Body
+from spirillum.tracking.body import BodyFinder
 from spirillum.tracking.frames import Frame
-from spirillum.tracking.optics import Pose
+from spirillum.tracking.optics import BodyPose
 from spirillum.tracking.search import Candidate, most_likely, refined
 from spirillum.tracking.track import Flag
 from spirillum.tracking.warnings import close_places, start_flags
@@ -34,15 +34,15 @@ _FAINT = 0.4
 class Start:
     """What the first look has told."""
 
-    seen: list[tuple[np.ndarray, Pose]] = field(repr=False)
+    seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which the robot was found, 8-bit RGB, and where."""
-    path: list[tuple[float, Pose]]
+    path: list[tuple[float, BodyPose]]
     """When it was where."""
     score: float
     """How clear its edges usually are, grey per pixel."""
     flags: tuple[Flag, ...]
 
-    def expected(self, time: float) -> Pose:
+    def expected(self, time: float) -> BodyPose:
         """Where it should be at a time."""
         return on_the_way(self.path, time)
 
@@ -51,7 +51,7 @@ class Start:
         return score > _FAINT * self.score
 
 
-def first_look(name: str, body: Body, frames: Sequence[Frame], still: Samples) -> Start:
+def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> Start:
     """Find the robot on some frames and learn what its edges look like.
 
     Args:
@@ -95,12 +95,12 @@ def _clear(found: Sequence[list[Candidate]]) -> bool:
     return float(np.mean(clear)) >= _OFTEN
 
 
-def _advice(body: Body, images: Sequence[np.ndarray], still: Samples) -> str:
+def _advice(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> str:
     """What may be wrong where no robot is seen: also a scale that is out by a factor of two."""
     clear = {}
     for factor in (0.5, 2.0):
         optics = replace(body.optics, focal=body.optics.focal / factor)
-        other = Body(body.robot, optics, body.bounds)
+        other = BodyFinder(body.robot, optics, body.bounds)
         found = [close_places(other, image, still) for image in images[::2]]
         clear[factor] = float(np.median([some[0].score / some[2].score if len(some) > 2 else 0.0 for some in found]))
     factor = max(clear, key=lambda value: clear[value])
@@ -112,17 +112,17 @@ def _advice(body: Body, images: Sequence[np.ndarray], still: Samples) -> str:
     return "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
 
 
-def on_the_way(known: list[tuple[float, Pose]], time: float) -> Pose:
+def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
     """Where the body should be at a time, by straight lines between and beyond known places."""
     times = np.array([at for at, _ in known])
     poses = np.array([pose for _, pose in known])
     if len(known) == 1:
-        return Pose(*poses[0].tolist())
+        return BodyPose(*poses[0].tolist())
     if times[0] <= time <= times[-1]:
-        return Pose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
+        return BodyPose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
     few = slice(0, 4) if time < times[0] else slice(-4, None)
     span = times[few] - times[few].mean()
     slope = span @ (poses[few] - poses[few].mean(axis=0)) / max(float(span @ span), 1e-12)
     edge = 0 if time < times[0] else -1
     there = poses[edge] + slope * (time - times[edge]) * np.array([1.0, 1.0, 0.0])
-    return Pose(*there.tolist())
+    return BodyPose(*there.tolist())

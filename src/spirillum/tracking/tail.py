@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import sampled
 from spirillum.kernels.waves import ridge_of, wave_scores, wave_step
 from spirillum.robot.robot import Robot
-from spirillum.tracking.optics import Optics, Pose, seen
+from spirillum.tracking.optics import BodyPose, Optics, seen
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 
@@ -99,7 +99,7 @@ class Wire:
         self._points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
         self._spacing = float(coarse[1] - coarse[0])
 
-    def learn(self, samples: Sequence[tuple[np.ndarray, Pose]]) -> None:
+    def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Find out how the wire differs from what is around it, and whether it is the robot's.
 
         Args:
@@ -126,7 +126,7 @@ class Wire:
         if readable.mean() < 0.2 and not self._flags:
             self._flags = [self._unseen()]
 
-    def read(self, image: np.ndarray, pose: Pose) -> tuple[float, float]:
+    def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
         """Phase of the tail and its standard error, rad; NaN where it cannot be read.
 
         Args:
@@ -172,7 +172,7 @@ class Wire:
     def _unseen(self) -> Flag:
         return Flag("tail-unreadable", "The wire of the tail is not seen, so that its rotation is not given.", _TAIL)
 
-    def _strip(self, pose: Pose) -> _Strip:
+    def _strip(self, pose: BodyPose) -> _Strip:
         pixels = seen(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
         b = self.lift
         axis = pixels[:, 0]

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.tracking.body import Body, Placed
+from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.optics import Optics
 from spirillum.tracking.search import Candidate, candidates, refined
 from spirillum.tracking.setup import Setup
@@ -28,6 +28,8 @@ _TURNED = 1.15
 """Score of a robot the other way round over that of the stated direction."""
 _OFTEN = 0.6
 """Share of the frames in which something has to be seen to be said."""
+_ASKED = 3
+"""Every how manieth frame is also looked at the other way round."""
 _LOST = 0.03
 """Share of frames without the robot that is said."""
 _PART = 0.97
@@ -36,7 +38,7 @@ _HIDDEN = 0.55
 """Share of the edges that fit below which glare, shadows or bubbles are said."""
 
 
-def close_places(body: Body, image: np.ndarray, still: Samples, *, turn: float = 0.0) -> list[Candidate]:
+def close_places(body: BodyFinder, image: np.ndarray, still: Samples, *, turn: float = 0.0) -> list[Candidate]:
     """The three likeliest places, looked at closely, best first.
 
     Args:
@@ -51,7 +53,7 @@ def close_places(body: Body, image: np.ndarray, still: Samples, *, turn: float =
 
 
 def start_flags(
-    body: Body,
+    body: BodyFinder,
     images: Sequence[np.ndarray],
     still: Samples,
     found: Sequence[list[Candidate]],
@@ -75,7 +77,7 @@ def start_flags(
         count += 1
         apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
         second += any(other.score > max(_SECOND * one.score, _CLEAR * others[2].score) for other in apart)
-        if count % 2:
+        if count % _ASKED == 1:
             asked.append((image, others[0].score))
     if count and second > _OFTEN * count:
         flags.append(

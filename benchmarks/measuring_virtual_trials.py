@@ -1,0 +1,98 @@
+"""Measured against truth: degraded (or clean) films of the virtual camera, with random speeds, rates and places.
+
+    python benchmarks/measuring_virtual_trials.py 100 [--clean] [--keep FOLDER]
+
+Synthetic throughout. Prints errors and whether the 95 % intervals hold the truth, and how much faster than real time
+`measure` was. A hundred trials take an hour of one core, most of it for drawing the films.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+import spirillum as sp
+
+QUANTITIES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+DURATION = 20.0
+
+
+def between(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number that is as likely in every octave."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def rendered(folder: Path, number: int, preset: str) -> Path:
+    """A film with random truth, and its setup and truth beside it; one that is there is kept."""
+    film = folder / f"{preset}-{number:03d}.mp4"
+    if film.with_suffix(".truth.json").exists():
+        return film
+    rng = np.random.default_rng(1000 + number)
+    speed, tail, body = between(rng, 0.1, 1.5), between(rng, 0.2, 5.0), between(rng, 0.01, 0.3)
+    how = {
+        "view": "side" if rng.random() < 0.2 else "top",
+        "direction": "left" if rng.random() < 0.5 else "right",
+        "body_angle": float(rng.uniform(0.0, 2.0 * np.pi)),
+        "tail_phase": float(rng.uniform(0.0, 2.0 * np.pi)),
+        "lateral": float(rng.uniform(-2e-3, 2e-3)),
+        "heading": float(np.radians(rng.uniform(-1.5, 1.5))),
+    }
+    sp.render(
+        str(rng.choice(["biorob2012-wide", "biorob2012-narrow"])),
+        film,
+        forward_velocity=f"{speed} mm/s",
+        tail_rate=f"{tail} Hz",
+        body_rate=f"{-body} Hz",
+        duration=DURATION,
+        degradation=preset,
+        seed=number,
+        **how,
+    )
+    return film
+
+
+def main() -> None:
+    """Render, measure, compare."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("trials", type=int)
+    parser.add_argument("--clean", action="store_true")
+    parser.add_argument("--keep", type=Path, help="folder for the films")
+    asked = parser.parse_args()
+    errors: dict[str, list[float]] = {name: [] for name in QUANTITIES}
+    inside: dict[str, list[bool]] = {name: [] for name in QUANTITIES}
+    spent = 0.0
+    with TemporaryDirectory() as temporary:
+        folder = asked.keep or Path(temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        for number in range(asked.trials):
+            film = rendered(folder, number, "clean" if asked.clean else "degraded")
+            start = time.perf_counter()
+            measured = sp.measure([film], film.with_suffix(".setup.toml"), annotated=False)
+            spent += time.perf_counter() - start
+            trial = measured.to_dict()["trials"][0]
+            truth = json.loads(film.with_suffix(".truth.json").read_text(encoding="utf-8"))
+            words = []
+            for name in QUANTITIES:
+                found, true = trial[name], truth[name]["value"]
+                if found.get("value") is None:
+                    words.append(f"{name} not given")
+                    continue
+                errors[name].append(100.0 * (found["value"] / true - 1.0))
+                inside[name].append(found["low"] <= true <= found["high"])
+                words.append(f"{name} {errors[name][-1]:+.3f} %{'' if inside[name][-1] else ' outside'}")
+            print(film.stem, ", ".join(words), flush=True)
+    for name in QUANTITIES:
+        size = np.abs(errors[name])
+        missing = asked.trials - len(inside[name])
+        print(
+            f"{name}: {sum(inside[name])} of {len(inside[name])} inside, {missing} not given; error "
+            f"median {np.median(size):.3f} %, 90 % below {np.quantile(size, 0.9):.3f} %, largest {size.max():.3f} %"
+        )
+    print(f"{asked.trials * DURATION / spent:.1f} times faster than real time")
+
+
+if __name__ == "__main__":
+    main()
