@@ -96,3 +96,19 @@ def test_clicks_on_the_same_film_give_the_same_speed(film: tuple[Any, Path, Path
     velocity = found["trials"][0]["forward_velocity"]
     assert velocity["value"] == pytest.approx(flat.velocity, rel=2e-3)
     assert json.dumps(found, allow_nan=False)
+
+
+def test_readings_of_a_synthetic_film_are_synthetic_too(film: tuple[Any, Path, Path], tmp_path: Path) -> None:
+    _, path, setup = film
+    synthetic, marks = tmp_path / "computed.mp4", tmp_path / "marks.csv"
+    with av.open(str(path)) as source, av.open(str(synthetic), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        target.metadata["comment"] = "synthetic"
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                target.mux(packet)
+    marks.write_text("time_s,x_mm,tail_phase_deg\n0,0,0\n1,1.5,300\n2,3.1,610\n")
+    found = measure(synthetic, setup, tmp_path / "out", marks=marks, tracking=False, figures=False)
+    assert "synthetic" in [flag.name for flag in found.trials[0].flags]
+    assert "SYNTHETIC" in (tmp_path / "out" / "observations.csv").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import pytest
 
 from spirillum import InputError
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Ruled, corrected, read_marks, track_of_marks
+from spirillum.measurement.marks import Ruled, check_times, corrected, read_marks, track_of_marks
 from spirillum.measurement.trials import trial_of
 from spirillum.tracking.track import Scale, Track
 
@@ -46,6 +46,21 @@ def test_angles_within_a_turn_are_counted_on_and_others_stay(tmp_path: Path) -> 
     assert np.degrees(within.tail_phase) == pytest.approx([300, 350, 400, 450])
     beyond = read_marks(written(tmp_path, "frame,tail_phase_deg\n0,0\n10,250\n20,500\n30,750\n"))[""]
     assert np.degrees(beyond.tail_phase) == pytest.approx([0, 250, 500, 750])
+
+
+def test_what_was_counted_within_a_turn_is_flagged(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    for text, flags in (("0,300\n10,40\n20,90", ["by-hand", "counted-within-a-turn"]), ("0,0\n10,400", ["by-hand"])):
+        marks = read_marks(written(tmp_path, f"frame,tail_phase_deg\n{text}\n"))[""]
+        track = track_of_marks(marks, make_track().setup, "a.mp4", None, seconds)
+        assert [flag.name for flag in track.flags] == flags
+
+
+def test_a_time_after_the_end_of_the_video_is_refused(tmp_path: Path) -> None:
+    marks = read_marks(written(tmp_path, "time_s,tail_phase_deg\n0,0\n8,20\n100,40\n"))[""]
+    check_times(marks, None)
+    check_times(marks, 100.0)
+    with pytest.raises(InputError, match=r"row 4, column time_s: 100; allowed: 0 to 8\.03 s"):
+        check_times(marks, 8.03)
 
 
 def test_a_corrected_frame_replaces_what_was_seen(tmp_path: Path, make_track: Callable[..., Track], robot: Any) -> None:

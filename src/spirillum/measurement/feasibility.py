@@ -15,6 +15,7 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
 from spirillum.tracking.setup import Setup, load_setup
+from spirillum.tracking.unwrapping import LARGEST_STEP
 from spirillum.units import KINDS, Hz, parse_option
 
 __all__ = ["Check", "Feasibility", "feasibility"]
@@ -153,6 +154,7 @@ def feasibility(
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
     expected = _expected(robot, tail_rate, body_rate, speed)
     rate = frames_per_second or chosen.camera.frames_per_second or _FRAMES_PER_SECOND
+    source_of_rate = "given" if frames_per_second else "setup" if chosen.camera.frames_per_second else "assumed"
     if not 0.01 <= rate <= 1e5:
         raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
@@ -161,7 +163,10 @@ def feasibility(
     if not 32 <= picture_width <= 100_000:
         raise InputError(f"width = {picture_width}; allowed: 32 to 100000 pixels")
     pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, picture_width, video)
-    expected |= {"duration": (span, "assumed" if duration is None else "given"), "frames_per_second": (rate, "camera")}
+    expected |= {
+        "duration": (span, "assumed" if duration is None else "given"),
+        "frames_per_second": (rate, source_of_rate),
+    }
     expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
     stripes = chosen.robot.stripes or (robot.seal.stripes if robot.seal else ())
     shares = depth_shares(chosen)
@@ -221,11 +226,11 @@ def _pixel(
 def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tuple[str, ...]) -> list[Check]:
     found = []
     tail, body = abs(expected["tail_rotation_rate"][0]), abs(expected["body_rotation_rate"][0])
-    limits = [("tail-rate", "tail", tail, 0.5 * rate * Hz, "a helix looks the same after a turn")]
+    limits = [("tail-rate", "tail", tail, LARGEST_STEP * rate * Hz, "a helix looks the same after a turn")]
     if stripes:
         share = pattern_period(stripes) / Hz
         limits.append(
-            ("body-rate", "body", body, 0.5 * rate * share * Hz, f"the stripes repeat after {share:.3g} turns")
+            ("body-rate", "body", body, LARGEST_STEP * rate * share * Hz, f"the stripes repeat after {share:.3g} turns")
         )
     else:
         sentence = "the robot has no stripes: the body's rotation cannot be seen"

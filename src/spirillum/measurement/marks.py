@@ -16,7 +16,7 @@ from spirillum.measurement.trials import BY_HAND
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag, Scale, Track
 
-__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "corrected", "read_marks", "track_of_marks"]
+__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "check_times", "corrected", "read_marks", "track_of_marks"]
 
 _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
@@ -28,6 +28,8 @@ _CLICK = 1.0
 """Standard error that is taken for a click with the mouse, pixels."""
 _GLANCE = math.radians(5.0)
 """Standard error that is taken for an angle read by eye, rad."""
+_LATER = 1.02
+"""Latest time of a reading over the length of the video, which is known to about a frame."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class Marks:
     """rad, (k,)."""
     lines: tuple[int, ...] = ()
     """Line of each reading in the file."""
+    counted: tuple[str, ...] = ()
+    """Columns whose angles were read within a turn and counted on."""
 
 
 def read_marks(path: str | Path) -> dict[str, Marks]:
@@ -132,10 +136,13 @@ def _marks(table: Table, rows: list[Row]) -> Marks:
         raise InputError(f"{table.path}, rows {first} and {second} are of the same frame; allowed: once a frame")
     pixels = np.stack([column("x_px"), column("y_px")], axis=1)
     position = 1e-3 * np.stack([column("x_mm"), column("y_mm")], axis=1)
+    read = {name: np.radians(column(name)[order]) for name in ("body_angle_deg", "tail_phase_deg")}
+    angles = {name: _counted(values) for name, values in read.items()}
+    counted = tuple(name for name in read if not np.array_equal(read[name], angles[name], equal_nan=True))
     return Marks(
         table.path, frame[order], time[order], pixels[order], position[order],
-        _counted(np.radians(column("body_angle_deg")[order])), _counted(np.radians(column("tail_phase_deg")[order])),
-        tuple(rows[index].line for index in order),
+        angles["body_angle_deg"], angles["tail_phase_deg"],
+        tuple(rows[index].line for index in order), counted,
     )  # fmt: skip
 
 
@@ -149,6 +156,25 @@ def _counted(angle: Samples) -> Samples:
     found = angle.copy()
     found[known] = np.unwrap(values)
     return found
+
+
+def check_times(marks: Marks, duration: float | None) -> None:
+    """Refuse readings from after the end of a video.
+
+    Args:
+        marks: the readings.
+        duration: length of the video, s; None where it is not known.
+
+    Raises:
+        InputError: if there is one; the sentence names its row.
+    """
+    if duration is None:
+        return
+    for place in np.flatnonzero(marks.time > duration * _LATER):
+        row = f"row {marks.lines[place]}" if marks.lines else f"reading {place + 1}"
+        raise InputError(
+            f"{marks.path}, {row}, column time_s: {marks.time[place]:g}; allowed: 0 to {duration:.4g} s, its end"
+        )
 
 
 def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
@@ -202,8 +228,21 @@ def track_of_marks(
         body_angle=marks.body_angle[inside], tail_phase=marks.tail_phase[inside],
         position_error=nothing + click, body_angle_error=nothing + _GLANCE, tail_phase_error=nothing + _GLANCE,
         picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
-        flags=(Flag(BY_HAND, f"all {count} readings were taken by hand, from {marks.path.name}"),),
+        flags=(
+            Flag(BY_HAND, f"all {count} readings were taken by hand, from {marks.path.name}"), *_counted_flag(marks)
+        ),
     )  # fmt: skip
+
+
+def _counted_flag(marks: Marks) -> tuple[Flag, ...]:
+    """What has to be known where angles were read within a turn."""
+    if not marks.counted:
+        return ()
+    sentence = (
+        f"{' and '.join(marks.counted)} was read within a turn, and counted on the shorter way between readings: "
+        "the rate is right only if less than half a turn passed between them"
+    )
+    return (Flag("counted-within-a-turn", sentence),)
 
 
 def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:

@@ -13,7 +13,7 @@ from spirillum.errors import InputError
 from spirillum.files import output_folder, whole_file, write_dataset, write_text
 from spirillum.measurement.annotate import annotated_film
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Marks, corrected, read_marks, track_of_marks
+from spirillum.measurement.marks import Marks, check_times, corrected, read_marks, track_of_marks
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_dataset, series_dataset
 from spirillum.measurement.sight import Sighted, sighted
@@ -22,7 +22,7 @@ from spirillum.measurement.trials import RATE_NAMES, Trial, says_synthetic, tria
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.tracking.setup import Setup, load_setup
-from spirillum.tracking.track import Track
+from spirillum.tracking.track import Flag, Track
 
 __all__ = ["Measurement", "measure"]
 
@@ -250,7 +250,7 @@ class _Work:
         else:
             sight = sighted(path, self.setup, self.beside, needed=table is not None or _in_pixels(marks))
             ruled = sight.ruled
-            track = self._of_tables(path, sight, marks, table)
+            track = replace(self._of_tables(path, sight, marks, table), words=sight.words)
             marks = marks if table is not None else None
         if marks is not None:
             track = corrected(track, marks, ruled)
@@ -287,7 +287,12 @@ class _Work:
             return read_track(table, self.setup, path.name, sight.ruled, sight.time_of)
         if marks is None:
             raise InputError(f"{path} has no readings by hand; allowed: some, or tracking")
-        return track_of_marks(marks, self.setup, path.name, sight.ruled, sight.time_of)
+        check_times(marks, sight.duration)
+        track = track_of_marks(marks, self.setup, path.name, sight.ruled, sight.time_of)
+        if sight.seen:
+            return track
+        unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
+        return replace(track, flags=(*track.flags, unseen))
 
     def _write(self, path: Path, dataset: Any) -> None:
         write_dataset(dataset, path)

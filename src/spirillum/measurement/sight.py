@@ -25,6 +25,12 @@ class Sighted:
     """Turns pixels into lengths; None where nothing gives a scale."""
     time_of: Callable[[Samples], Samples] | None = field(repr=False)
     """Takes numbers of frames to times, s; None where nothing tells."""
+    words: str = ""
+    """What the video says of itself."""
+    duration: float | None = None
+    """Length of the video, s; None where it is not known."""
+    seen: bool = True
+    """Whether there was a video to open."""
 
 
 def sighted(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Sighted:
@@ -47,17 +53,17 @@ def sighted(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> S
     except InputError:
         if needed:
             raise
-        return Sighted(None, None if rate is None else _at(rate))
+        return Sighted(None, None if rate is None else _at(rate), seen=False)
     times = _times(video, rate)
     if not needed:
-        return Sighted(None, times)
+        return Sighted(None, times, video.words, video.duration)
     found, video = scale_of(video, setup, folder=folder)
     optics = found.optics
 
     def points(pixels: Samples) -> Samples:
         return np.asarray((optics.points(pixels, optics.axis_height) - optics.origin)[:, :2])
 
-    return Sighted(Ruled(found.scale, video.size, points), times)
+    return Sighted(Ruled(found.scale, video.size, points), times, video.words, video.duration)
 
 
 def _at(rate: float) -> Callable[[Samples], Samples]:

@@ -58,6 +58,11 @@ _SLOW_PIXELS = 0.01
 """Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
 _SLOW_ANGLE = math.radians(0.1)
 """The same of an angle, rad; at least the standard error of a frame, of which glare makes a slow one."""
+_PLACE = 0.15
+"""Standard error of a place itself, which does not matter to a speed, pixels: of outline, light and lens."""
+_HEADING = math.radians(0.2)
+"""The same of the heading, rad, for a body that is `_LONG` pixels long."""
+_LONG = 100.0
 _MANY_STRAYS = 0.02
 _FEW_TURNS = 2.0
 _DEGREE = 5
@@ -152,8 +157,9 @@ def trial_of(track: Track, robot: Robot, name: str = "") -> Trial:
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
     quantities |= {name: _widened(fits[name], "rad/s", *_slow_angles(track, name)) for name in rates}
-    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m")
-    quantities["heading"] = _mean(track, track.heading, "rad")
+    pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
+    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _PLACE * pixel)
+    quantities["heading"] = _mean(track, track.heading, "rad", _HEADING * _LONG * pixel / robot.body.length)
     quantities |= _wobbles(track)
     if not any(flag.name == BY_HAND for flag in flags):
         quantities = {name: _with_interval(item) for name, item in quantities.items()}
@@ -164,7 +170,7 @@ def _with_interval(item: Measured) -> Measured:
     """No number of a camera stands without an interval; two readings by hand may."""
     if math.isfinite(item.low) or not math.isfinite(item.value):
         return item
-    return Measured.missing(item.unit, "it was seen on too few frames")
+    return Measured.missing(item.unit, "it was read on too few frames, or on none")
 
 
 def _fits(track: Track, robot: Robot) -> dict[str, Rate]:
@@ -226,7 +232,7 @@ def _turns(angle: Samples) -> bool:
 def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
     """A rate whose interval holds standard errors beside that of the fit."""
     if not rate.measured:
-        return Measured.missing(unit, "it was seen on too few frames")
+        return Measured.missing(unit, "it was read on too few frames, or on none")
     reach = _NORMAL * math.hypot(*errors)
     low = rate.value - math.hypot(rate.value - rate.low, reach)
     return Measured(rate.value, low, rate.value + math.hypot(rate.high - rate.value, reach), unit)
@@ -252,11 +258,13 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     return _widened(rate, "m/s", _slow(track, _SLOW_PIXELS * pixel), scale)
 
 
-def _mean(track: Track, values: Samples, unit: str) -> Measured:
+def _mean(track: Track, values: Samples, unit: str, lasting: float) -> Measured:
+    """A mean, whose interval holds a standard error that lasts all along."""
     value, low, high = mean_of(track.time, values)
     reason = "" if math.isfinite(value) else "it was not seen"
-    if unit == "m":
-        reach = _NORMAL * track.scale.relative_uncertainty * abs(value)
+    shared = track.scale.relative_uncertainty * abs(value) if unit == "m" else 0.0
+    if math.hypot(shared, lasting) > 0.0:
+        reach = _NORMAL * math.hypot(shared, lasting)
         low, high = value - math.hypot(value - low, reach), value + math.hypot(high - value, reach)
     return Measured(value, low, high, unit, reason)
 

@@ -18,9 +18,9 @@ from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 from spirillum.units import show
 
-__all__ = ["Resolvable", "contradictions", "nyquist", "unwrapped"]
+__all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nyquist", "unwrapped"]
 
-_NEAR = 0.45
+LARGEST_STEP = 0.45
 """Step from frame to frame, in periods, from which on its sense is doubtful."""
 _ORDER = 0.6
 """Least length of the mean of the steps as unit vectors: less is no rotation."""
@@ -92,7 +92,7 @@ def unwrapped(
     flags: list[Flag] = []
     if known.size < 0.5 * angle.size:
         flags.append(_unread(part, known.size, angle.size))
-    if abs(rate) * dt > _NEAR * period:
+    if abs(rate) * dt > LARGEST_STEP * period:
         flags.append(_too_fast(part, rate, dt, period))
     elif (other := _better_alias(t, a, period, dt, rate)) is not None:
         flags.append(_other_rate(part, rate, other))
@@ -212,7 +212,7 @@ def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
     return Flag(
         f"aliased-{part}",
         f"The {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
-        f"rotation is doubtful; allowed: below {_NEAR:g}, with more frames a second; its rotation is not given.",
+        f"rotation is doubtful; allowed: below {LARGEST_STEP:g}, with more frames a second; its rotation is not given.",
         _RATES[part],
     )
 
