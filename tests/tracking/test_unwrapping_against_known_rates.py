@@ -6,7 +6,7 @@ import pytest
 from spirillum.hydrodynamics.resistance import resistance
 from spirillum.robot.load import load
 from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
-from spirillum.tracking.unwrapping import contradictions, nyquist, unwrapped
+from spirillum.tracking.unwrapping import _largest_advance, contradictions, nyquist, unwrapped
 
 FPS = 30.0
 TURN = 2 * np.pi
@@ -94,7 +94,7 @@ def test_nothing_read_is_nothing_given() -> None:
 def test_body_and_tail_cannot_turn_the_same_way() -> None:
     robot = load("biorob2012-wide")
     time = np.arange(300) / FPS
-    forward, back, still = 0.01 * time, -0.01 * time, 0.0 * time
+    forward, back, still = 0.005 * time, -0.005 * time, 0.0 * time
     assert contradictions(time, -0.7 * time, 7.0 * time, forward, robot) == ()
     assert contradictions(time, still, -7.0 * time, back, robot) == ()
     for hand, name in ((0, "handedness"), (1, "aliased-tail")):
@@ -105,17 +105,17 @@ def test_body_and_tail_cannot_turn_the_same_way() -> None:
     assert flag.name == "aliased-tail"
 
 
-def test_no_wire_advances_more_than_half_its_wavelength_a_turn() -> None:
+def test_no_wire_advances_more_than_it_can_without_a_body() -> None:
     time = np.arange(300) / FPS
     robot = load("biorob2012-wide")
-    advance = 0.49 * robot.tail.wavelength * 3.0 / TURN
+    advance = 0.3 * robot.tail.wavelength * 3.0 / TURN
     assert contradictions(time, -0.1 * time, 3.0 * time, advance * time, robot) == ()
-    (flag,) = contradictions(time, -0.1 * time, 3.0 * time, 1.05 * advance * time, robot)
+    (flag,) = contradictions(time, -0.1 * time, 3.0 * time, 1.2 * advance * time, robot)
     assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
     for amplitude in ("1 mm", "3 mm", "8 mm"):  # the tail alone, free of any body, by resistive force theory
         tail = load("biorob2012-wide", **{"tail.amplitude": amplitude, "tail.wavelength": "15 mm"})
         matrix = resistance(tail, part="tail", model="rft").matrix
-        assert 0.0 < -matrix[0, 3] / matrix[0, 0] * TURN < 0.5 * tail.tail.wavelength
+        assert 0.0 < -matrix[0, 3] / matrix[0, 0] * TURN < _largest_advance(tail)
 
 
 def test_largest_rates_are_half_a_period_a_frame() -> None:

@@ -37,8 +37,8 @@ _DRIFT = 0.05
 _TURNED = 0.35
 """Least angle, rad, that counts as turning when two senses of rotation are compared."""
 
-_MOST_ADVANCE = 0.5
-"""Largest advance of a helix in a turn over its wavelength."""
+_WALLS = 1.5
+"""What walls may add to the largest advance of a helix in a turn."""
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -242,8 +242,8 @@ def contradictions(
 ) -> tuple[Flag, ...]:
     """Rates that no free swimmer has: a sign of a rate too fast for the camera, or of a wrong robot file.
 
-    Without an outer torque the body turns against its tail; a tail that turns forward drives forward, by resistive
-    force theory at most by 1 - c_t/c_n < 1/2 of its wavelength a turn, whatever its amplitude (Gray and Hancock 1955).
+    Without an outer torque the body turns against its tail; a tail that turns forward drives forward, and no further
+    than it would without a body.
 
     Args:
         time: s, (n,).
@@ -271,14 +271,16 @@ def contradictions(
             "stripes is wrong, or the tail is too fast for this frame rate; neither rotation is given."
         )
         return (Flag("handedness", sentence, (*_RATES["tail"], *_RATES["body"])),)
+    far = abs(moved) > 0.05 * robot.body.length
+    if turns and far and (flags := _not_driven(moved, tail_turned, robot)):
+        return flags
     if turns and abs(body) > 1.5 * abs(tail):
         sentence = (
             "The body seems to turn faster than its tail: the tail may be too fast for this frame rate "
             f"({abs(tail) / (2 * np.pi):.3g} Hz is the least rate that fits)."
         )
         return (Flag("aliased-tail", sentence),)
-    far = abs(moved) > 0.05 * robot.body.length
-    return _not_driven(moved, tail_turned, robot) if turns and far else ()
+    return ()
 
 
 def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
@@ -287,10 +289,21 @@ def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, .
     if advance * robot.hand < 0:
         why = "moves against the sense in which its tail seems to turn"
         what = "the tail is too fast for this frame rate, tail.handedness is wrong"
-    elif abs(advance) > _MOST_ADVANCE * robot.tail.wavelength:
-        why = f"advances {show(abs(advance), 'mm')} a turn of its tail, more than half a wavelength"
+    elif abs(advance) > _WALLS * _largest_advance(robot):
+        why = f"advances {show(abs(advance), 'mm')} a turn of its tail, more than such a wire can in a viscous fluid"
         what = "the tail is too fast for this frame rate"
     else:
         return ()
     sentence = f"The robot {why}: {what}, or something else moves the robot; the tail's rotation is not given."
     return (Flag("aliased-tail", sentence, _RATES["tail"]),)
+
+
+def _largest_advance(robot: Robot) -> float:
+    """Advance of the tail alone in a turn, m: the largest that resistive force theory allows (Gray and Hancock 1955).
+
+    A helix of angle b, tan b = k B_o, which no force acts on, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its
+    wavelength, with g = c_t/c_n no less than 1/2.
+    """
+    tail = robot.tail
+    steepness = (2 * np.pi * tail.amplitude / tail.wavelength) ** 2
+    return float(tail.wavelength * 0.5 * steepness / (0.5 + steepness))
