@@ -1,9 +1,7 @@
-"""The examples run, the commands of the documentation run and print what it shows, and its options exist."""
+"""The commands of the documentation run and print what it shows, and its options exist."""
 
 import importlib.util
-import os
 import re
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -18,7 +16,6 @@ from spirillum.measurement.observations import COLUMNS
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 INSTALL = (
     "python3 -m venv .venv && . .venv/bin/activate && pip install . && spirillum study",
     'python3 -m venv .venv && . .venv/bin/activate && pip install -e ".[test]" && pytest',
@@ -53,24 +50,6 @@ COMMANDS = _commands(typer.main.get_command(app))
 
 def _options(path: str) -> set[str]:
     return {name for parameter in COMMANDS[path].params for name in parameter.opts} | {"--help", "-h"}
-
-
-@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
-def test_example_runs_and_its_assertion_holds(script: Path, tmp_path: Path) -> None:
-    environment = {**os.environ, "MPLBACKEND": "Agg", "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
-    assert not list(tmp_path.iterdir())
-    assert "assert " in script.read_text("utf-8")
 
 
 @pytest.mark.parametrize("page", RUNNABLE, ids=lambda path: path.stem)
