@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import tempfile
 import threading
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from spirillum.answer import as_json
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,7 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PICTURES",
+    "claim_folder",
+    "csv_rows",
     "netcdf_target",
+    "new_file",
     "output_folder",
     "output_target",
     "parse_toml",
@@ -90,6 +96,33 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         InputError: as `read_text` and `parse_toml`.
     """
     return parse_toml(read_text(path, what), str(path), what)
+
+
+def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
+    """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
+
+    Lines that start with `#` are comments. They are left out, and so are rows of commas alone, as spreadsheets write.
+
+    Args:
+        text: what stands in the file.
+        path: the file, for the sentence of an error.
+        what: what it should be.
+
+    Raises:
+        InputError: if it is not CSV.
+    """
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    reader = csv.reader((f"{line}\n" for _, line in lines), strict=True)
+    found: list[tuple[int, list[str]]] = []
+    first = 0
+    try:
+        for cells in reader:
+            found.append((lines[first][0], [cell.strip() for cell in cells]))
+            first = reader.line_num  # a cell in quotation marks may go over several lines
+    except csv.Error as error:
+        raise InputError(f"{path} is not CSV ({error}); allowed: {what}") from error
+    return found
 
 
 @contextmanager
@@ -183,6 +216,22 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
+def new_file(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file that a user edits and would not lose: whole, and not over one that is there.
+
+    Args:
+        path: the file.
+        text: what it holds.
+        overwrite: replace a file that is there.
+
+    Raises:
+        InputError: if the file is there or cannot be written.
+    """
+    if _regular(path).exists() and not overwrite:
+        raise InputError(f"{path} exists; allowed: a new file, or --force to overwrite one")
+    write_text(path, text)
+
+
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write NetCDF-4, compressed, whole or not at all."""
     encoding = {
@@ -203,3 +252,39 @@ def output_folder(path: Path) -> Path:
     except OSError as error:
         raise InputError(f"{path} cannot be a folder for results ({error.strerror}); allowed: a new folder") from error
     return path
+
+
+def claim_folder(
+    folder: Path, mark: str, content: Mapping[str, Any], what: str, results: Collection[str] | None = None
+) -> None:
+    """Mark a folder as the place of one question's results: a rerun resumes there, another question is refused.
+
+    Args:
+        folder: the folder, new, empty, or marked before.
+        mark: name of the file in it that marks it.
+        content: what the mark says: `fingerprint`, a hash of the question, and perhaps its `title`.
+        what: what the results are of, for the sentence of an error.
+        results: names that may not stand in a folder without the mark; None: any.
+
+    Raises:
+        InputError: if it holds results of another question or of unknown origin, or cannot be written to.
+    """
+    if (folder / mark).exists():
+        try:
+            found = json.loads((folder / mark).read_text(encoding="utf-8"))
+            same, title = found["fingerprint"] == content["fingerprint"], str(found.get("title", ""))[:80]
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InputError(f"{folder / mark} is damaged; allowed: a new folder (-o DIR)") from error
+        if not same:
+            named = f" ('{title}')" if title else ""
+            raise InputError(
+                f"{folder} holds another {what}{named}, or one with other settings; allowed: the same {what}, to "
+                "resume it, or a new folder (-o DIR)"
+            )
+        return
+    there = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    stray = next((name for name in there if results is None or name in results), None)
+    if stray is not None:
+        raise InputError(f"{folder} holds {stray} of unknown origin; allowed: a new folder (-o DIR)")
+    output_folder(folder)
+    write_text(folder / mark, as_json(dict(content)) + "\n")

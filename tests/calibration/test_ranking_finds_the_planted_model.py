@@ -99,3 +99,17 @@ def test_models_without_common_free_numbers_are_refused(made: Callable[..., Path
 def test_a_single_model_is_no_ranking(made: Callable[..., Path]) -> None:
     with pytest.raises(InputError, match="at least two models"):
         sp.rank_models(made(), models=["sbt"])
+
+
+def test_fitted_numbers_have_their_units(made: Callable[..., Path]) -> None:
+    from spirillum.calibration.ranking import Ranked, Ranking
+
+    path = made(presets=(WIDE,), wavelengths=(10.0, 15.0, 25.0))
+    fit = sp.calibrate(path, WIDE, free="body_drag,wire_diameter", method="least-squares")
+    one = np.zeros(fit.experiment.size)
+    ranked = Ranked("sbt", 0.0, 0.0, 0.0, 0.0, pareto=one, pointwise=one, fit=fit)
+    said = Ranking((ranked,), ()).to_dict()["models"][0]["parameters"]
+    assert {name: item["unit"] for name, item in said.items()} == {"body_drag": "1", "wire_diameter": "m"}
+    for name, item in said.items():
+        assert (item["value"], item["level"]) == (fit.values[name].value, 0.95)
+        assert item["low"] < item["value"] < item["high"]

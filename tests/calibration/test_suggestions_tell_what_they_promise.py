@@ -119,6 +119,21 @@ def test_wrong_candidates_are_refused_with_row_and_column(fitted: Path, rows: li
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("# nothing but a comment\n", "column 'channel_diameter_mm' is missing; allowed: a header line with"),
+        ('channel_diameter_mm,wavelength_mm,amplitude_mm\n"40,20,2.5\n', "is not CSV"),
+    ],
+)
+def test_a_file_that_is_no_table_of_candidates_is_refused(fitted: Path, tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "candidates.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        sp.suggest(fitted / "posterior.nc", WIDE, candidates=path)
+    assert words in str(caught.value)
+
+
 def test_trials_have_to_be_some(fitted: Path) -> None:
     with pytest.raises(InputError, match="trials = 0"):
         sp.suggest(fitted / "posterior.nc", WIDE, trials=0)

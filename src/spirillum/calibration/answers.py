@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer import envelope, quantity, versions
+from spirillum.calibration.fit import LEVEL
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT
 
 if TYPE_CHECKING:
@@ -23,13 +24,11 @@ MEANINGS: dict[Quantity, tuple[str, str]] = {
 }
 """Unit and meaning of what is compared."""
 
-_LEVEL = 0.95
-
 
 def _interval(item: Fitted) -> dict[str, Any]:
     if not math.isfinite(item.low):
         return {}
-    return {"low": item.low, "high": item.high, "kind": "interval", "level": _LEVEL}
+    return {"low": item.low, "high": item.high, "kind": "interval", "level": LEVEL}
 
 
 def calibration_answer(found: Calibrated) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
         unit, _ = MEANINGS[name]
         ends = {}
         if math.isfinite(low[place]):
-            ends = {"low": float(low[place]), "high": float(high[place]), "kind": "interval", "level": _LEVEL}
+            ends = {"low": float(low[place]), "high": float(high[place]), "kind": "interval", "level": LEVEL}
         content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)
         content[f"{name}_predicted"] = quantity(float(values[place]), unit, **ends)
     if found.friction:
@@ -128,7 +127,6 @@ _FITTED = (
     "tangential_factor",
     "shared_friction",
 )
-_UNITS = {"Pa s": "Pa s", "N m/A": "N m/A", "V s/rad": "V s/rad", "m": "m", "N m s/rad": "N m s/rad"}
 
 
 def calibration_text(found: Calibrated) -> str:

@@ -18,10 +18,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.strays import stray_trials
 from spirillum.errors import InputError
-from spirillum.measurement.observations import Observation, check_signs, read_observations
+from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
 from spirillum.robot.robot import Robot
 
-__all__ = ["Experiment", "Quantity", "Ratio", "read_experiment", "with_tail"]
+__all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "tail_words", "with_tail"]
 
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
@@ -97,14 +97,18 @@ class Experiment:
 
     def labels(self) -> list[str]:
         """Each robot in a few words."""
-        return [
-            f"channel {_channel(r) * 1e3:g} mm, tail {r.tail.wavelength * 1e3:g} x {r.tail.amplitude * 1e3:g} mm"
-            for r in self.robots
-        ]
+        return [tail_words(robot) for robot in self.robots]
 
 
-def _channel(robot: Robot) -> float:
+def channel_of(robot: Robot) -> float:
+    """Diameter of a robot's channel, m; infinite without one."""
     return robot.channel.diameter if robot.channel else float("inf")
+
+
+def tail_words(robot: Robot) -> str:
+    """Channel and tail of a robot in a few words."""
+    tail = robot.tail
+    return f"channel {channel_of(robot) * 1e3:g} mm, tail {tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g} mm"
 
 
 def with_tail(robot: Robot, wavelength: float, amplitude: float) -> Robot:
@@ -145,7 +149,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
     _check_rates(path, observations, ratios)
-    content = path.read_bytes()
+    comments, _ = observation_table(path)
     return Experiment(
         robots=tuple(
             with_tail(by_channel[group[0].tail[0]], group[0].wavelength, group[0].amplitude) for group in items
@@ -160,15 +164,10 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         tail_rate=np.array([found.tail_rate for found in ratios]),
         correlation=_correlation([(found.advance.values, found.turning.values) for found in ratios]),
         source=path.name,
-        sha256=hashlib.sha256(content).hexdigest(),
-        synthetic=path.suffix != ".parquet" and "synthetic" in _comments(content),
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        synthetic="synthetic" in " ".join(comments).lower(),
         strays=stray_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
-
-
-def _comments(content: bytes) -> str:
-    lines = content.decode("utf-8-sig", "replace").splitlines()
-    return " ".join(line.lower() for line in lines if line.lstrip().startswith("#"))
 
 
 def _by_channel(robots: Sequence[Robot]) -> dict[float, Robot]:
@@ -204,8 +203,7 @@ def _check_row(path: Path, item: Observation, robot: Robot) -> None:
         raise InputError(
             f"{path}, row {item.row}, column body_rate_Hz: {item.body_rate / (2 * np.pi):.4g}; allowed: "
             f"{'negative' if driven > 0 else 'positive'}, for the body turns against the "
-            f"{robot.tail.handedness}-handed "
-            "tail"
+            f"{robot.tail.handedness}-handed tail"
         )
 
 

@@ -31,7 +31,7 @@ from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 
-__all__ = ["LEVEL", "METHODS", "Calibrated", "calibrate", "given_robots"]
+__all__ = ["LEVEL", "METHODS", "Calibrated", "RobotSource", "calibrate", "given_robots"]
 
 METHODS = ("posterior", "least-squares", "paper")
 LEVEL = 0.95
@@ -178,7 +178,6 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
     if "friction" in problem.free:
         best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
         friction = tuple(Fitted(float(value), nan, nan) for value in best)
-    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
     unknown = np.full(problem.experiment.size, nan)
     return Calibrated(
         problem=problem,
@@ -186,7 +185,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         reading=reading,
         values={name: Fitted(value, nan, nan) for name, value in fit.values.items()},
         friction=friction,
-        predicted={name: (values, unknown, unknown) for name, values in predicted.items()},
+        predicted={name: (values, unknown, unknown) for name, values in problem.predicted_at(z).items()},
         discrepancy={},
         error={name: problem.ratio(name).pooled_error for name in problem.quantities},
         paper=fit,
@@ -208,9 +207,8 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     """Intervals from draws around the best fit, in coordinates."""
     rng = np.random.default_rng(1)
     z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
-    best = problem.values(fit.z[None])
     draws = problem.values(z)
-    values = {name: _fitted(float(best[name][0]), draws[name]) for name in best}
+    values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
     friction = _friction(problem, z, fit.z, fit.error, reading, rng)
     predicted = _predicted(problem, fit.z, z, tau, rng)
     # Where the moments give none, as where the fit misses less than the trials' errors, the middle of what may be.
@@ -256,7 +254,7 @@ def _by_posterior(
     tau, sigma = posterior.density.nuisances(chosen)
     discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
     friction = _friction(problem, own, middle, {name: float(np.median(s)) for name, s in sigma.items()}, reading, rng)
-    wrong = [f"the posterior may not be used: {problem_found}" for problem_found in posterior.problems()]
+    wrong = [f"the posterior may not be used: {sentence}" for sentence in posterior.problems()]
     warnings = [
         *wrong,
         *_of_the_fit(problem, fit, report, reading),
@@ -289,14 +287,14 @@ def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, re
     ]
 
 
-def limits(draws: Samples) -> tuple[Samples, Samples]:
+def _limits(draws: Samples) -> tuple[Samples, Samples]:
     """Limits of the 95 % interval along the first axis."""
     low, high = np.quantile(draws, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
     return low, high
 
 
 def _fitted(value: float, draws: Samples) -> Fitted:
-    low, high = (float(end) for end in limits(draws))
+    low, high = (float(end) for end in _limits(draws))
     return Fitted(value, min(low, value), max(high, value))
 
 
@@ -321,7 +319,7 @@ def _friction(
     rates = ratio.mean * (1.0 + relative * rng.normal(size=(z.shape[0], problem.experiment.size)))
     draws = problem.friction(z, rates, reading)
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
-    low, high = limits(draws)
+    low, high = _limits(draws)
     low, high = np.minimum(low, middle), np.maximum(high, middle)  # NaN where no motor rate was observed
     return tuple(Fitted(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))
 
@@ -333,11 +331,12 @@ def _predicted(
     discrepancy: Mapping[Quantity, float | Samples],
     rng: np.random.Generator,
 ) -> dict[Quantity, tuple[Samples, Samples, Samples]]:
-    draws, middle = problem.predicted(z), problem.predicted(best[None])
+    draws, middles = problem.predicted(z), problem.predicted_at(best)
     found: dict[Quantity, tuple[Samples, Samples, Samples]] = {}
     for name, values in draws.items():
         tau = np.reshape(np.asarray(discrepancy[name], dtype=float), (-1, 1))
         spread = values * (1.0 + tau * rng.normal(size=values.shape))
-        low, high = limits(spread)
-        found[name] = (middle[name][0], np.minimum(low, middle[name][0]), np.maximum(high, middle[name][0]))
+        low, high = _limits(spread)
+        middle = middles[name]
+        found[name] = (middle, np.minimum(low, middle), np.maximum(high, middle))
     return found

@@ -13,19 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.least_squares import LeastSquares, sensitivities, standard_errors, weighted_residuals
+from spirillum.calibration.least_squares import (
+    LARGEST,
+    LEAST_ERROR,
+    LeastSquares,
+    sensitivities,
+    weighted_residuals,
+    weighted_sensitivities,
+)
 from spirillum.calibration.problem import Problem
 
-__all__ = ["Identifiability", "Profile", "identified", "profiles"]
+__all__ = ["FAR", "Identifiability", "Profile", "identified", "profiles"]
 
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
 _POOR = 3.0
-_FAR = 3.0
+FAR = 3.0
 """Standard deviations of the prior beyond which the observations have overruled it."""
 _MEMBER = 0.25
 """Least share of a direction, over that of the first, at which a number is named."""
-_LEAST_ERROR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -57,15 +63,10 @@ def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
         problem: the fit.
         fit: its least squares.
     """
-    predicted = {name: values[0] for name, values in problem.predicted(fit.z[None]).items()}
-    error = {name: max(np.nan_to_num(value), _LEAST_ERROR) for name, value in fit.error.items()}
-    errors = standard_errors(problem, predicted, error, fit.discrepancy)
-    rows, plain = [], []
-    for name, column in sensitivities(problem, fit.z).items():
-        seen = problem.ratio(name).seen
-        rows.append((column * (predicted[name] / errors[name])[:, None])[seen])
-        plain.append(column[seen])
-    jacobian, relative = np.concatenate(rows), np.concatenate(plain)
+    error = {name: max(np.nan_to_num(value), LEAST_ERROR) for name, value in fit.error.items()}
+    jacobian = np.concatenate(list(weighted_sensitivities(problem, fit.z, error, fit.discrepancy).values()))
+    columns = sensitivities(problem, fit.z)
+    relative = np.concatenate([column[problem.ratio(name).seen] for name, column in columns.items()])
     _, singular, directions = np.linalg.svd(jacobian, full_matrices=False)
     labels = tuple(item.label for item in problem.coordinates)
     slope = _slopes(problem, fit.z)
@@ -86,14 +87,8 @@ def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
 def _slopes(problem: Problem, z: Samples) -> Samples:
     """D log(value)/dz of each number."""
     step = 1e-5
-    up, down = problem.values((z + step)[None]), problem.values((z - step)[None])
-    at = problem.values(z[None])
-    return np.array(
-        [
-            (up[item.label][0] - down[item.label][0]) / (2.0 * step * max(abs(at[item.label][0]), 1e-300))
-            for item in problem.coordinates
-        ]
-    )
+    up, down, at = (problem.values_at(place) for place in (z + step, z - step, z))
+    return np.array([(up[name] - down[name]) / (2.0 * step * max(abs(at[name]), 1e-300)) for name in at])
 
 
 def _words(problem: Problem, z: Samples, singular: float, direction: Samples) -> str:
@@ -105,16 +100,15 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     labels = [problem.coordinates[place].label for place in named]
     known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
     if len(named) == 1:
-        if abs(z[named[0]]) > _FAR:
+        if abs(z[named[0]]) > FAR:  # `far_warnings` says so
             return ""
         return (
             f"{labels[0]} is hardly identifiable: the observations say {known} about it, for they hardly change "
-            "with it, "
-            "or as they do with others"
+            "with it, or as they do with others"
         )
     moved = z + 0.5 * direction * np.sign(direction[named[0]])
-    before, after = problem.values(z[None]), problem.values(moved[None])
-    changes = [f"{label} by {_change(before[label][0], after[label][0])}" for label in labels]
+    before, after = problem.values_at(z), problem.values_at(moved)
+    changes = [f"{label} by {_change(before[label], after[label])}" for label in labels]
     effect = f"{0.5 * singular:.1g}" if singular > 2e-3 else "less than 0.001"
     return (
         f"{_listed(labels)} trade off: changing {_listed(changes)} together moves all predictions by {effect} "
@@ -183,6 +177,6 @@ def _others_fitted(
 
     if start.size == 1:
         return whole(start[others]), float(np.sum(residuals(whole(start[others])) ** 2))
-    first = np.clip(start[others], -11.9, 11.9)
-    solved = least_squares(lambda rest: residuals(whole(rest)), first, bounds=(-12.0, 12.0), max_nfev=60)
+    inside = np.clip(start[others], 0.1 - LARGEST, LARGEST - 0.1)  # where the bounds leave room for a first step
+    solved = least_squares(lambda rest: residuals(whole(rest)), inside, bounds=(-LARGEST, LARGEST), max_nfev=60)
     return whole(solved.x), 2.0 * float(solved.cost)

@@ -9,6 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
+from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from spirillum.calibration.fit import Fitted
 
 __all__ = [
+    "CALLED",
     "check_believable",
     "common_warnings",
     "far_warnings",
@@ -26,21 +28,25 @@ __all__ = [
     "percent",
     "plain_misfit_warnings",
     "stray_warnings",
+    "synthetic_warning",
 ]
 
-_WORDS: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
+CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
+"""What each quantity that is compared is called."""
 _LARGE_MISFIT = 0.03
+"""Relative misfit from which on it is said by how much a model misses."""
 _BEYOND_TRIALS = 2.0 * ERROR_SCALE
 """Discrepancy that no error of a single trial explains."""
 _SENSELESS = 10.0
 """Factor of a typical misfit beyond which observations and model differ in robot or units."""
 _PRINTED = 0.1
 """Relative difference of the body's rates beyond which a reading of the friction does not fit the observations."""
-_FAR = 3.0
 _SENSELESSLY_FAR = 5.0
+"""Standard deviations of a wide prior that no robot is away from its middle."""
 _WIDE = 0.5
 """Spread of a prior so wide that nothing true lies many times as far away."""
 _STRAY, _LEAST_STRAY = 6.0, 0.2
+"""Robust standard deviations, and relative deviation, beyond which a robot is named as an outlier."""
 
 
 def percent(share: float) -> str:
@@ -61,19 +67,19 @@ def check_believable(problem: Problem, z: Samples) -> None:
             lies where no prior knowledge allows it.
     """
     source, model = problem.experiment.source, problem.model.name
-    for name, values in problem.predicted(z[None]).items():
+    for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         with np.errstate(divide="ignore", invalid="ignore"):
-            off = np.abs(np.log(np.abs(ratio.mean / values[0])))[ratio.seen]
+            off = np.abs(np.log(np.abs(ratio.mean / values)))[ratio.seen]
         if float(np.median(off)) > np.log(_SENSELESS):
-            factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values[0]))[ratio.seen])))
+            factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values))[ratio.seen])))
             raise InputError(
-                f"{source}: the observed {_WORDS[name]} is typically {factor:.3g} times what model '{model}' can "
+                f"{source}: the observed {CALLED[name]} is typically {factor:.3g} times what model '{model}' can "
                 "explain; allowed: within a factor of ten (are the columns in mm, mm/s and Hz?)"
             )
     for item, place in zip(problem.coordinates, z, strict=True):
         if abs(place) > _SENSELESSLY_FAR and getattr(item.prior, "spread", 0.0) >= _WIDE:
-            value = float(problem.values(z[None])[item.label][0])
+            value = problem.values_at(z)[item.label]
             raise InputError(
                 f"{source}: {item.label} comes out as {value:.3g}; allowed: observations that a number nearer to its "
                 f"prior explains ({item.prior.words(item.parameter.unit)}; are the columns in mm, mm/s and Hz?)"
@@ -82,12 +88,12 @@ def check_believable(problem: Problem, z: Samples) -> None:
 
 def far_warnings(problem: Problem, z: Samples) -> list[str]:
     """Numbers that lie where their prior hardly allows them."""
-    values = problem.values(z[None])
+    values = problem.values_at(z)
     return [
-        f"{item.label} = {float(values[item.label][0]):.3g} lies {abs(place):.1f} standard deviations from the middle "
+        f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from the middle "
         f"of its prior ({item.prior.words(item.parameter.unit)}): the model, a unit or the robot may be wrong"
         for item, place in zip(problem.coordinates, z, strict=True)
-        if abs(place) > _FAR
+        if abs(place) > FAR
     ]
 
 
@@ -95,9 +101,9 @@ def stray_warnings(problem: Problem, z: Samples) -> list[str]:
     """Rows whose trial, or whose robot, is far off all others."""
     experiment = problem.experiment
     found = list(experiment.strays)
-    for name, values in problem.predicted(z[None]).items():
+    for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
-        relative = np.where(ratio.seen, ratio.mean / values[0] - 1.0, np.nan)
+        relative = np.where(ratio.seen, ratio.mean / values - 1.0, np.nan)
         if np.count_nonzero(ratio.seen) < 5:
             continue
         off = np.abs(relative - np.nanmedian(relative))
@@ -105,7 +111,7 @@ def stray_warnings(problem: Problem, z: Samples) -> list[str]:
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
             found.append(
-                f"row {rows}: the {_WORDS[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
+                f"row {rows}: the {CALLED[name]} of {experiment.labels()[place]} is {percent(float(relative[place]))} "
                 "off the fit, far more than that of other tails: an outlier?"
             )
     return found
@@ -125,25 +131,25 @@ def misfit_warnings(
     for name, size in discrepancy.items():
         if left is not None and left[name] < FEWEST_LEFT:
             found.append(
-                f"the fit has as many free numbers as the {_WORDS[name]} has means: nothing is left to tell by how "
+                f"the fit has as many free numbers as the {CALLED[name]} has means: nothing is left to tell by how "
                 f"much model '{problem.model.name}' misses, and the intervals take what models of this kind miss by"
             )
         elif not problem.ratio(name).freedom.sum() > 0:
             once = not np.any(problem.ratio(name).trials > 1)
             why = "was observed once for each tail" if once else "has means without the scatter of their trials"
             found.append(
-                f"the {_WORDS[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
+                f"the {CALLED[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
                 "discrepancy holds both"
             )
             if size.value > _BEYOND_TRIALS:
                 found.append(
-                    f"the discrepancy of the {_WORDS[name]}, {percent(size.value)}, is more than trials are off by: "
-                    f"model '{problem.model.name}' misses the {_WORDS[name]} from tail to tail, its fitted numbers "
+                    f"the discrepancy of the {CALLED[name]}, {percent(size.value)}, is more than trials are off by: "
+                    f"model '{problem.model.name}' misses the {CALLED[name]} from tail to tail, its fitted numbers "
                     "stand for what it lacks, and hold for these tails"
                 )
         elif size.value > _LARGE_MISFIT:
             found.append(
-                f"model '{problem.model.name}' misses the {_WORDS[name]} by {percent(size.value)} from tail to tail, "
+                f"model '{problem.model.name}' misses the {CALLED[name]} by {percent(size.value)} from tail to tail, "
                 "beyond the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for "
                 "these tails"
             )
@@ -153,12 +159,12 @@ def misfit_warnings(
 def plain_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
     """By how much a fit without statistics misses the means."""
     found = []
-    for name, values in problem.predicted(z[None]).items():
+    for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
-        size = float(np.sqrt(np.mean((ratio.mean / values[0] - 1.0)[ratio.seen] ** 2)))
+        size = float(np.sqrt(np.mean((ratio.mean / values - 1.0)[ratio.seen] ** 2)))
         if size > _LARGE_MISFIT:
             found.append(
-                f"model '{problem.model.name}' with these factors misses the {_WORDS[name]} by {percent(size)} (root "
+                f"model '{problem.model.name}' with these factors misses the {CALLED[name]} by {percent(size)} (root "
                 "mean square over the tails), errors of the trials included"
             )
     return found
@@ -193,12 +199,17 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
     ]
 
 
+def synthetic_warning(source: str) -> str:
+    """What has to be said of every answer that rests on observations which a program has made."""
+    return f"{source} says that its numbers are synthetic: nothing here is measured"
+
+
 def common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
     """What has to be said of any method's answer."""
     experiment = problem.experiment
     found = []
     if experiment.synthetic:
-        found.append(f"{experiment.source} says that its numbers are synthetic: nothing here is measured")
+        found.append(synthetic_warning(experiment.source))
     negative = [n for n, item in enumerate(friction) if item.value < 0]
     if negative:
         found.append(

@@ -21,25 +21,33 @@ from spirillum.errors import InputError
 
 __all__ = [
     "FEWEST_LEFT",
+    "LARGEST",
+    "LEAST_ERROR",
     "LeastSquares",
     "drawn_fit",
     "least_squares_fit",
     "sensitivities",
     "standard_errors",
     "weighted_residuals",
+    "weighted_sensitivities",
 ]
 
 _STARTS = 6
 _STEP = 1e-4
+"""Step of the central differences, in standard deviations of the prior."""
 _BLIND = 1e-8
-_LARGEST = 12.0
+"""Relative change of a prediction by one standard deviation of a prior that is none but rounding."""
+LARGEST = 12.0
+"""Standard deviations of the prior to either side within which a fit looks."""
 _BREATH = 1e-2
+"""Weight of the prior in the first fit: it holds a number that nothing observed holds, and moves no other."""
 FEWEST_LEFT = 0.5
 """Degrees of freedom below which a fit leaves no residual to judge the model by."""
 _MIDDLE = 0.6745
 """Median of a half-normal number over its scale."""
 _SHARP = 0.01
-_LEAST_ERROR = 1e-3
+"""Relative error that all errors are taken to have where it is asked how many numbers a quantity fits."""
+LEAST_ERROR = 1e-3
 """Relative error that no mean is known better than: else one quantity that happens to fit would outweigh the others."""
 
 
@@ -98,10 +106,16 @@ def standard_errors(
     """
     found: dict[Quantity, Samples] = {}
     for name, values in predicted.items():
-        ratio = problem.ratio(name)
-        trial = np.nan_to_num(error[name]) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
-        floor = max(_LEAST_ERROR, problem.interpolation_error) * ratio.scale
-        found[name] = np.sqrt(trial**2 + (discrepancy[name] * values) ** 2 + floor**2)
+        found[name] = np.sqrt(_noise(problem, name, error[name]) + (discrepancy[name] * values) ** 2)
+    return found
+
+
+def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
+    """Square of each mean's error by its trials alone, and by what no mean is known better than."""
+    ratio = problem.ratio(name)
+    trial = np.nan_to_num(error) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+    floor = max(LEAST_ERROR, problem.interpolation_error) * ratio.scale
+    found: Samples = trial**2 + floor**2
     return found
 
 
@@ -130,7 +144,7 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
             break
         z = _best(problem, z, error, discrepancy, starts=1, prior=1.0)
         left = _left(problem, z, error, discrepancy)
-    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    predicted = problem.predicted_at(z)
     return LeastSquares(
         z=z,
         covariance=_covariance(problem, z, error, discrepancy),
@@ -151,16 +165,14 @@ def _check_count(problem: Problem) -> None:
     if not problem.coordinates:
         raise InputError(
             f"free = '{', '.join(problem.free)}': nothing to fit; allowed: also body_drag or another parameter, "
-            "or method "
-            "'paper'"
+            "or method 'paper'"
         )
     count = _count(problem)
     if count < len(problem.coordinates):
         raise InputError(
             f"{problem.experiment.source} has {count} means of {problem.experiment.size} robots, fewer than the "
             f"{len(problem.coordinates)} free numbers ({', '.join(c.label for c in problem.coordinates)}); "
-            "allowed: more "
-            "observations, or fewer free parameters"
+            "allowed: more observations, or fewer free parameters"
         )
 
 
@@ -194,7 +206,7 @@ def weighted_residuals(
         discrepancy: relative misfit from robot to robot, by quantity.
         prior: weight of the distance from the middle of the prior.
     """
-    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    predicted = problem.predicted_at(z)
     # A discrepancy is relative to the size of the mean here: else a large prediction would excuse itself.
     sized = {name: problem.ratio(name).scale for name in predicted}
     errors = standard_errors(problem, sized, error, discrepancy)
@@ -224,7 +236,7 @@ def _best(
         found = least_squares(
             lambda z: weighted_residuals(problem, z, error, discrepancy, prior=prior),
             np.clip(first, -3.0, 3.0) if first is not start else first,
-            bounds=(-_LARGEST, _LARGEST),
+            bounds=(-LARGEST, LARGEST),
             xtol=1e-13,
             ftol=1e-13,
             gtol=1e-13,
@@ -235,17 +247,22 @@ def _best(
     return np.asarray(best, dtype=float)
 
 
-def _weighted(
+def weighted_sensitivities(
     problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> dict[Quantity, Samples]:
-    """Change of each seen mean over its standard error per unit of each coordinate."""
-    predicted = {name: values[0] for name, values in problem.predicted(z[None]).items()}
+    """Change of each seen mean over its standard error per unit of each coordinate, (seen robots, free numbers).
+
+    Args:
+        problem: the fit.
+        z: coordinates, (free numbers,).
+        error: relative error of one trial, by quantity.
+        discrepancy: relative misfit from robot to robot, by quantity.
+    """
+    predicted = problem.predicted_at(z)
     errors = standard_errors(problem, predicted, error, discrepancy)
     found: dict[Quantity, Samples] = {}
     for name, column in sensitivities(problem, z).items():
-        ratio = problem.ratio(name)
-        sized = np.maximum(errors[name], 1e-12 * ratio.scale)
-        found[name] = (column * (predicted[name] / sized)[:, None])[ratio.seen]
+        found[name] = (column * (predicted[name] / errors[name])[:, None])[problem.ratio(name).seen]
     return found
 
 
@@ -253,12 +270,9 @@ def _left(
     problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float]
 ) -> dict[Quantity, float]:
     """Degrees of freedom that the fit leaves each quantity: its means less its share in fitting the numbers."""
-    rows = _weighted(problem, z, error, discrepancy)
+    rows = weighted_sensitivities(problem, z, error, discrepancy)
     # As if the errors were a per cent: what not even that sees takes nothing away.
-    sizes = [
-        np.median(np.maximum(np.nan_to_num(error[name]), _LEAST_ERROR) + discrepancy[name])
-        for name in problem.quantities
-    ]
+    sizes = [max(np.nan_to_num(error[name]), LEAST_ERROR) + discrepancy[name] for name in problem.quantities]
     sharp = float(np.mean(sizes)) / _SHARP
     whole = sharp * np.concatenate(list(rows.values()))
     inverse = np.linalg.inv(whole.T @ whole + np.eye(z.size))
@@ -269,11 +283,11 @@ def _left(
 def _squares(problem: Problem, z: Samples, error: dict[Quantity, float]) -> dict[Quantity, tuple[float, float]]:
     """Mean squares of the relative residuals, and of what the trials' errors explain of them, by quantity."""
     found: dict[Quantity, tuple[float, float]] = {}
-    for name, values in problem.predicted(z[None]).items():
+    for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         seen = ratio.seen
-        relative = (ratio.mean[seen] - values[0][seen]) / values[0][seen]
-        trial = np.nan_to_num(error[name]) * ratio.scale[seen] / values[0][seen]
+        relative = (ratio.mean[seen] - values[seen]) / values[seen]
+        trial = np.nan_to_num(error[name]) * ratio.scale[seen] / values[seen]
         found[name] = float(np.mean(relative**2)), float(np.mean(trial**2 / ratio.trials[seen]))
     return found
 
@@ -309,18 +323,15 @@ def drawn_fit(
         Coordinates, (draws, free numbers), and discrepancies by quantity, (draws,).
     """
     squares = _squares(problem, fit.z, fit.error)
-    predicted = {name: values[0] for name, values in problem.predicted(fit.z[None]).items()}
+    predicted = problem.predicted_at(fit.z)
     columns = sensitivities(problem, fit.z)
     information = np.broadcast_to(np.eye(fit.z.size), (count, fit.z.size, fit.z.size))
     taus: dict[Quantity, Samples] = {}
     for name, (square, expected) in squares.items():
-        ratio = problem.ratio(name)
-        seen = ratio.seen
+        seen = problem.ratio(name).seen
         total = square * np.count_nonzero(seen)
         taus[name] = _drawn_discrepancy(total, expected, fit.left[name], count, rng)
-        trial = np.nan_to_num(fit.error[name]) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
-        floor = max(_LEAST_ERROR, problem.interpolation_error) * ratio.scale
-        noise = ((trial**2 + floor**2) / predicted[name] ** 2)[seen]
+        noise = (_noise(problem, name, fit.error[name]) / predicted[name] ** 2)[seen]
         weights = 1.0 / (noise + taus[name][:, None] ** 2)
         information = information + np.einsum("dn,nj,nk->djk", weights, columns[name][seen], columns[name][seen])
     root = np.linalg.cholesky(np.linalg.inv(information))
@@ -331,7 +342,7 @@ def drawn_fit(
 def _drawn_discrepancy(total: float, expected: float, left: float, count: int, rng: np.random.Generator) -> Samples:
     """Draws of a discrepancy given the sum of squares that a fit leaves, and its half-normal prior."""
     grid = np.concatenate([[0.0], np.geomspace(1e-5, 4.0 * DISCREPANCY_SCALE, 600)])
-    variance = grid**2 + expected + _LEAST_ERROR**2
+    variance = grid**2 + expected + LEAST_ERROR**2
     freedom = left if left >= FEWEST_LEFT else 0.0
     seen = total if freedom else 0.0
     log = -0.5 * (grid / DISCREPANCY_SCALE) ** 2 - 0.5 * freedom * np.log(variance) - 0.5 * seen / variance
@@ -348,6 +359,6 @@ def _covariance(
     discrepancy: dict[Quantity, float],
 ) -> Samples:
     """Inverse of the information of means and prior."""
-    jacobian = np.concatenate(list(_weighted(problem, z, error, discrepancy).values()))
+    jacobian = np.concatenate(list(weighted_sensitivities(problem, z, error, discrepancy).values()))
     found: Samples = np.linalg.inv(jacobian.T @ jacobian + np.eye(z.size))
     return found

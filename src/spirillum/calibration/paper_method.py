@@ -53,15 +53,13 @@ def paper_fit(problem: Problem) -> PaperFit:
     if wrong or problem.model.placed:
         raise InputError(
             f"method = 'paper' with free = '{(wrong or names)[0]}' and model '{problem.model.name}'; allowed: "
-            "body_drag, "
-            "body_rotation, friction, with a model that takes drag factors"
+            "body_drag, body_rotation, friction, with a model that takes drag factors"
         )
     if np.any(problem.experiment.by_motor):
         place = int(np.argmax(problem.experiment.by_motor))
         raise InputError(
             f"{problem.experiment.source}, row {problem.experiment.rows[place][0]}, column tail_rate_Hz: empty; "
-            "allowed: "
-            "a tail rate, which method 'paper' inverts (15) with"
+            "allowed: a tail rate, which method 'paper' inverts (15) with"
         )
     by_robot, weights = _inverted(problem)
     values: dict[str, float] = {}
@@ -80,8 +78,7 @@ def paper_fit(problem: Problem) -> PaperFit:
         if values[item.label] <= 0:
             raise InputError(
                 f"{problem.experiment.source}: {item.label} comes out as {values[item.label]:.3g}; allowed: "
-                "observations "
-                f"that model '{problem.model.name}' can explain with a positive factor"
+                f"observations that model '{problem.model.name}' can explain with a positive factor"
             )
     return PaperFit(values, by_robot, spread)
 

@@ -15,7 +15,17 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 
-__all__ = ["DEFAULT_FREE", "PARAMETERS", "Coordinate", "LogNormal", "LogUniform", "Parameter", "Uniform", "free_names"]
+__all__ = [
+    "DEFAULT_FREE",
+    "PARAMETERS",
+    "Coordinate",
+    "LogNormal",
+    "LogUniform",
+    "Parameter",
+    "Prior",
+    "Uniform",
+    "free_names",
+]
 
 
 class Prior(Protocol):

@@ -130,6 +130,14 @@ class Problem:
         shape = (z.shape[0], self.experiment.size)
         return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}
 
+    def values_at(self, z: Samples) -> dict[str, float]:
+        """Free numbers by label at one place of the coordinates, (free numbers,)."""
+        return {label: float(values[0]) for label, values in self.values(z[None]).items()}
+
+    def predicted_at(self, z: Samples) -> dict[Quantity, Samples]:
+        """What is compared, (robots,), at one place of the coordinates, (free numbers,)."""
+        return {name: values[0] for name, values in self.predicted(z[None]).items()}
+
     def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor") -> Samples:
         """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
         seen = self.experiment

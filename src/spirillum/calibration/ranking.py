@@ -18,20 +18,22 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.calibration.fit import Calibrated, RobotSource, calibrate
+from spirillum.calibration.fit import LEVEL, Calibrated, RobotSource, calibrate
+from spirillum.calibration.judgement import synthetic_warning
 from spirillum.calibration.netcdf import posterior_tree
-from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS
+from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
+from spirillum.robot.load import PAPER_ROBOTS
 
-__all__ = ["Ranked", "Ranking", "rank_models"]
+__all__ = ["Ranked", "Ranking", "rank_models", "ranked_fits"]
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
 _PARETO = 0.7
 """Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
-FEWEST_ROBOTS = 4
+_FEWEST_ROBOTS = 4
 """Below that number a standard error over the robots is chance, and no model is named the better."""
 _WORST = 3
 _MODELS = ("sbt", "rft")
@@ -40,6 +42,12 @@ _MODELS = ("sbt", "rft")
 def _size(row: dict[str, Any]) -> float:
     """Largest misfit first."""
     return -abs(float(row["standard_deviations"]["value"]))
+
+
+def _fitted(fit: Calibrated, number: Coordinate) -> dict[str, Any]:
+    """A fitted number with its interval."""
+    found, unit = fit.values[number.label], number.parameter.unit or "1"
+    return quantity(found.value, unit, low=found.low, high=found.high, kind="interval", level=LEVEL)
 
 
 @dataclass(frozen=True)
@@ -77,7 +85,7 @@ class Ranking:
     def clear(self) -> bool:
         """Whether the best is better than the second beyond doubt."""
         second = self.ranked[1] if len(self.ranked) > 1 else None
-        enough = self.best.pointwise.size >= FEWEST_ROBOTS
+        enough = self.best.pointwise.size >= _FEWEST_ROBOTS
         return enough and second is not None and -second.difference > _CLEAR * second.difference_error
 
     def verdict(self) -> str:
@@ -87,9 +95,9 @@ class Ranking:
             return f"only {names[0]} was fitted"
         second = self.ranked[1]
         count = self.best.pointwise.size
-        if count < FEWEST_ROBOTS:
+        if count < _FEWEST_ROBOTS:
             few = "1 tail is" if count == 1 else f"{count} tails are"
-            return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {FEWEST_ROBOTS} are needed"
+            return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {_FEWEST_ROBOTS} are needed"
         how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
         if self.clear:
             return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
@@ -125,10 +133,7 @@ class Ranking:
                 "difference": quantity(item.difference, "1", standard_error=item.difference_error),
                 "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
                 "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
-                "parameters": {
-                    name: quantity(v.value, "1", low=v.low, high=v.high, kind="interval", level=0.95)
-                    for name, v in item.fit.values.items()
-                },
+                "parameters": {c.label: _fitted(item.fit, c) for c in item.fit.problem.coordinates},
                 "fails_most_at": self.failures(item),
             }
             for item in self.ranked
@@ -146,7 +151,7 @@ class Ranking:
 
 def rank_models(
     observations: str | Path,
-    robots: RobotSource | Sequence[RobotSource] = ("biorob2012-wide", "biorob2012-narrow"),
+    robots: RobotSource | Sequence[RobotSource] = PAPER_ROBOTS,
     *,
     models: Sequence[str] | None = None,
     free: str | Sequence[str] | None = None,
@@ -247,5 +252,5 @@ def _cautions(ranked: Sequence[Ranked]) -> list[str]:
         robots = "1 robot" if count == 1 else f"{count} robots"
         said.append(f"only {robots}: differences of the log density are hardly known")
     if ranked[0].fit.experiment.synthetic:
-        said.append(f"{ranked[0].fit.experiment.source} says that its numbers are synthetic: nothing here is measured")
+        said.append(synthetic_warning(ranked[0].fit.experiment.source))
     return said

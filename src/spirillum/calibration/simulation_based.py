@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.experiment import Experiment, Quantity, Ratio, with_tail
+from spirillum.calibration.experiment import Experiment, Quantity, Ratio, channel_of, with_tail
 from spirillum.calibration.least_squares import least_squares_fit
 from spirillum.calibration.likelihood import Density
 from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed
 from spirillum.errors import InputError
-from spirillum.robot.load import load
+from spirillum.robot.load import PAPER_ROBOTS, load
 
 __all__ = ["PAPER_TAILS", "Ranks", "simulated_ranks", "synthetic_experiment"]
 
@@ -42,7 +42,7 @@ class Ranks:
 def synthetic_experiment(
     tails: Sequence[tuple[float, float]] = PAPER_TAILS,
     trials: int = 5,
-    robots: Sequence[str] = ("biorob2012-wide", "biorob2012-narrow"),
+    robots: Sequence[str] = PAPER_ROBOTS,
 ) -> Experiment:
     """The robots of an experiment of the paper's size, with nothing observed yet.
 
@@ -58,7 +58,7 @@ def synthetic_experiment(
     nothing = Ratio(one, trials * one, one, 0.0 * one, 0.0 * one)
     return Experiment(
         robots=tuple(robot for _, robot in every),
-        channels=tuple(robot.channel.diameter if robot.channel else np.inf for robot in loaded),
+        channels=tuple(channel_of(robot) for robot in loaded),
         channel=np.array([n for n, _ in every]),
         rows=tuple((n + 1,) for n in range(size)),
         advance=nothing,

@@ -13,8 +13,6 @@ A discrepancy caps it: a model that misses every tail by 10 % learns little from
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -25,10 +23,11 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.calibration.experiment import with_tail
+from spirillum.calibration.experiment import channel_of, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, given_robots
+from spirillum.calibration.judgement import synthetic_warning
 from spirillum.errors import InputError
-from spirillum.files import read_text
+from spirillum.files import csv_rows, read_text
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.intervals import drawn_kinematics
 from spirillum.motion.posterior_file import PosteriorFile, read_posterior
@@ -36,6 +35,7 @@ from spirillum.motion.prediction import calibration_warnings
 from spirillum.motion.swimming import requirements
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
+from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.robot.robot import Robot
 
 __all__ = ["Candidate", "Suggestion", "suggest"]
@@ -45,7 +45,6 @@ _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
 _DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
 _DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
 _MOST = 2000
-_PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,7 @@ def suggest(
     for robot in listed:
         outside = broken(requirements(RobotBatch.of(robot), find_swimmer_model(known.model)))
         if outside:
-            left_out.append(f"{_words(robot)} is left out: {outside[0].sentence()}")
+            left_out.append(f"{tail_words(robot)} is left out: {outside[0].sentence()}")
             continue
         found.append(_candidate(known, robot, trials, numbers, names))
     if not found:
@@ -144,7 +143,7 @@ def _papers_robots(known: PosteriorFile) -> list[Robot]:
     Raises:
         InputError: if it is of others.
     """
-    robots = given_robots(_PRESETS)
+    robots = given_robots(PAPER_ROBOTS)
     channels = [robot.channel.diameter for robot in robots if robot.channel]
     body = (robots[0].body.diameter, robots[0].body.length)
     strange = [c for c in known.channels if not np.any(np.isclose(c, channels, rtol=1e-6, atol=0.0))]
@@ -168,7 +167,7 @@ def _check_channel(robot: Robot) -> None:
 def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[str]:
     said = [f"{robot.name}: {words}" for robot in robots for words in calibration_warnings(robot, known.model)]
     if known.synthetic:
-        said.append(f"{known.observations} says that its numbers are synthetic: nothing here is measured")
+        said.append(synthetic_warning(known.observations))
     return said
 
 
@@ -202,19 +201,13 @@ def _candidate(known: PosteriorFile, robot: Robot, trials: int, numbers: Samples
     variance = deviations.var(axis=0, ddof=1)
     told = np.einsum("ij,jk,ik->i", shared, np.linalg.inv(spread + errors), shared)
     narrowing = np.sqrt(np.clip(1.0 - told / np.maximum(variance, 1e-300), 0.0, 1.0))
-    diameter = robot.channel.diameter if robot.channel else float("inf")
     return Candidate(
-        diameter,
+        channel_of(robot),
         robot.tail.wavelength,
         robot.tail.amplitude,
         float(gain),
         {name: float(value) for name, value in zip(names, narrowing, strict=True)},
     )
-
-
-def _words(robot: Robot) -> str:
-    diameter = robot.channel.diameter * 1e3 if robot.channel else float("inf")
-    return f"channel {diameter:g} mm, tail {robot.tail.wavelength * 1e3:g} x {robot.tail.amplitude * 1e3:g} mm"
 
 
 def _default(robots: Sequence[Robot]) -> list[Robot]:
@@ -224,24 +217,19 @@ def _default(robots: Sequence[Robot]) -> list[Robot]:
 
 def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
     """Candidates of a file; comments and empty lines are skipped."""
-    numbered = [
-        (number, line)
-        for number, line in enumerate(read_text(path, _WHAT).splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    table = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered))))
-    header = [name.strip() for name in table[0]]
+    table = csv_rows(read_text(path, _WHAT), path, _WHAT)
+    header = table[0][1] if table else []
     missing = [name for name in _COLUMNS if name not in header]
     if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing; needed: {', '.join(_COLUMNS)}")
+        raise InputError(f"{path}: column '{missing[0]}' is missing; allowed: a header line with {', '.join(_COLUMNS)}")
     if not 2 <= len(table) <= _MOST + 1:
         raise InputError(f"{path} holds {len(table) - 1} candidates; allowed: 1 to {_MOST}")
     by_channel = {round(robot.channel.diameter, 9): robot for robot in robots if robot.channel}
     found = []
-    for (number, _), cells in zip(numbered[1:], table[1:], strict=True):
+    for number, cells in table[1:]:
         if len(cells) != len(header):
             raise InputError(f"{path}, row {number}: {len(cells)} cells; allowed: {len(header)}, one for each column")
-        row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+        row = dict(zip(header, cells, strict=True))
         channel, wavelength, amplitude = (_length(path, number, name, row[name]) for name in _COLUMNS)
         robot = by_channel.get(round(channel, 9))
         if robot is None:
@@ -250,7 +238,7 @@ def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
                 f"{path}, row {number}, column channel_diameter_mm: {row[_COLUMNS[0]]}; allowed: {allowed}"
             )
         found.append(with_tail(robot, wavelength, amplitude))
-    return list({_words(robot): robot for robot in found}.values())  # a tail that stands twice is one candidate
+    return list({tail_words(robot): robot for robot in found}.values())  # a tail that stands twice is one candidate
 
 
 def _length(path: Path, number: int, name: str, text: str) -> float:

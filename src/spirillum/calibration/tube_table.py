@@ -22,7 +22,7 @@ from spirillum.motion.band import at_place, band_places
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 
-__all__ = ["place_ranges", "tube_forward"]
+__all__ = ["Ranges", "place_ranges", "tube_forward"]
 
 _POINTS = {"gap": 4, "pitch": 3}
 _CHECKED_AT = {"gap": 0.36, "pitch": 0.3}

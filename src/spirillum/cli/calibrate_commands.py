@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Json, Model, Settings, complete_models, complete_robots
+from spirillum.cli.options import Json, Model, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
 
 __all__ = ["calibrate", "rank_models", "suggest"]
@@ -18,11 +18,10 @@ _Robots = Annotated[
     list[str],
     typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file for each channel."),
 ]
-_METHODS = ("posterior", "least-squares", "paper")
 
 
 def _complete_methods(incomplete: str) -> list[str]:
-    return [name for name in _METHODS if name.startswith(incomplete)]
+    return starting(("posterior", "least-squares", "paper"), incomplete)
 
 
 def calibrate(
@@ -108,8 +107,9 @@ def rank_models(
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import rank_models as answer
     from spirillum.cli import calibration_text, text
+    from spirillum.robot.load import PAPER_ROBOTS
 
-    names = robot or ["biorob2012-wide", "biorob2012-narrow"]
+    names = robot or PAPER_ROBOTS
     with text.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
@@ -144,10 +144,11 @@ def suggest(
     """
     from spirillum.calibration.suggest import suggest as answer
     from spirillum.cli import calibration_text, text
+    from spirillum.robot.load import PAPER_ROBOTS
 
     if rows < 1:
         raise InputError(f"rows = {rows}; allowed: at least 1")
-    names = robot or (["biorob2012-wide", "biorob2012-narrow"] if settings else [])
+    names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings) for name in names] or None
     found = answer(posterior, robots, candidates=candidates, trials=trials)
     text.show(found.to_dict(), lambda content, console: calibration_text.suggestion(content, console, rows), json=json)

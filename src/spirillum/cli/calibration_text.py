@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from spirillum.cli.text import friendly_unit, grid, in_unit
+from spirillum.cli.text import Answer, friendly_unit, grid, in_unit
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 __all__ = ["calibration", "calibration_content", "ranking", "suggestion"]
 
-Answer = Mapping[str, Any]
-
 
 def calibration_content(
-    answer: Mapping[str, Any], folder: Path, written: Sequence[Path], replaced: Sequence[Path] = ()
+    answer: Answer, folder: Path, written: Sequence[Path], replaced: Sequence[Path] = ()
 ) -> dict[str, Any]:
     """The answer with the files that were written; warnings stay last.
 
@@ -113,8 +111,10 @@ def ranking(answer: Answer, console: Console) -> None:
         f"{_counted(answer['robots'], 'robot')}"
     )
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
-    compared = [name for name in _MISSES if any(name in item["discrepancy"] for item in answer["models"])]
-    table = grid("", "model", "log density", "difference", *(f"misses {_MISSES[name]} by" for name in compared))
+    from spirillum.calibration.judgement import CALLED
+
+    compared = [name for name in CALLED if any(name in item["discrepancy"] for item in answer["models"])]
+    table = grid("", "model", "log density", "difference", *(f"misses {CALLED[name]} by" for name in compared))
     for item in answer["models"]:
         difference = item["difference"]
         apart = "-" if difference["value"] == 0 else f"{difference['value']:.1f} +- {difference['standard_error']:.1f}"
@@ -127,7 +127,6 @@ def ranking(answer: Answer, console: Console) -> None:
         console.print(escape(_failures(item)), highlight=False, soft_wrap=True)
 
 
-_MISSES = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
 _STANDS_OUT = 2.5
 """Standard deviations below which the worst of some tens of means is as far off as chance makes it."""
 

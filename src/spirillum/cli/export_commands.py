@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Json, RobotArgument, Settings
+from spirillum.cli.options import Json, RobotArgument, Settings, starting
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -18,11 +18,11 @@ __all__ = ["export"]
 
 
 def _complete_models(incomplete: str) -> list[str]:
-    return [name for name in ("rft", "slender") if name.startswith(incomplete)]
+    return starting(("rft", "slender"), incomplete)
 
 
 def _complete_units(incomplete: str) -> list[str]:
-    return [name for name in ("m", "mm") if name.startswith(incomplete)]
+    return starting(("m", "mm"), incomplete)
 
 
 def export(

@@ -23,17 +23,18 @@ from spirillum.cli.options import (
     Tolerance,
     complete_frames,
     complete_planes,
+    starting,
 )
 
 __all__ = ["flow"]
 
 
 def _complete_accuracies(incomplete: str) -> list[str]:
-    return [name for name in ("high", "standard") if name.startswith(incomplete)]
+    return starting(("high", "standard"), incomplete)
 
 
 def _complete_models(incomplete: str) -> list[str]:
-    return [name for name in ("slender", "tube") if name.startswith(incomplete)]
+    return starting(("slender", "tube"), incomplete)
 
 
 def flow(

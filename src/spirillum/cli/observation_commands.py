@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from spirillum.cli.options import Json
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from spirillum.cli.text import Answer
 
 __all__ = ["observations_app"]
 
@@ -59,12 +64,9 @@ def join(
     typer.echo(f"{output}: {rows} rows of {len(files)} files")
 
 
-def _table(answer: object, console: object) -> None:
-    from rich.console import Console
+def _table(answer: Answer, console: Console) -> None:
     from rich.markup import escape
 
-    assert isinstance(answer, dict)  # noqa: S101 - `show` hands its answer on
-    assert isinstance(console, Console)  # noqa: S101
     seen = ", ".join(f"{name} {count}" for name, count in answer["measured"].items())
     console.print(
         f"{escape(answer['file'])}: valid, {answer['rows']} rows of {answer['tails']} tails in "

@@ -37,17 +37,19 @@ __all__ = [
     "complete_resistance_models",
     "complete_robots",
     "complete_schemas",
+    "starting",
 ]
 
 
-def _starting(words: tuple[str, ...], incomplete: str) -> list[str]:
+def starting(words: tuple[str, ...], incomplete: str) -> list[str]:
+    """Words that begin with what is typed."""
     return [word for word in words if word.startswith(incomplete)]
 
 
 def complete_presets(incomplete: str) -> list[str]:
     """Names of presets."""
     folder = Path(__file__).parent.parent / "robot" / "presets"
-    return _starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
+    return starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
 
 
 def complete_robots(incomplete: str) -> list[str]:
@@ -59,48 +61,48 @@ def complete_robots(incomplete: str) -> list[str]:
 
 def complete_models(incomplete: str) -> list[str]:
     """Names of models that make a robot swim."""
-    return _starting(("rft", "sbt", "slender", "tube"), incomplete)
+    return starting(("rft", "sbt", "slender", "tube"), incomplete)
 
 
 def complete_resistance_models(incomplete: str) -> list[str]:
     """Names of models that give a resistance matrix."""
-    return _starting(("perrin", "rft", "sbt", "slender", "tube"), incomplete)
+    return starting(("perrin", "rft", "sbt", "slender", "tube"), incomplete)
 
 
 def complete_parts(incomplete: str) -> list[str]:
     """Parts of a robot."""
-    return _starting(("body", "coupling", "robot", "rotor", "tail"), incomplete)
+    return starting(("body", "coupling", "robot", "rotor", "tail"), incomplete)
 
 
 def complete_planes(incomplete: str) -> list[str]:
     """Planes through a robot."""
-    return _starting(("xy", "xz", "yz"), incomplete)
+    return starting(("xy", "xz", "yz"), incomplete)
 
 
 def complete_frames(incomplete: str) -> list[str]:
     """Frames of a flow."""
-    return _starting(("body", "lab"), incomplete)
+    return starting(("body", "lab"), incomplete)
 
 
 def complete_schemas(incomplete: str) -> list[str]:
     """Names of schemas."""
-    return _starting(("calibration", "robot", "setup", "study"), incomplete)
+    return starting(("calibration", "robot", "setup", "study"), incomplete)
 
 
 def _complete_accuracies(incomplete: str) -> list[str]:
-    return _starting(("high", "standard"), incomplete)
+    return starting(("high", "standard"), incomplete)
 
 
 def _complete_ends(incomplete: str) -> list[str]:
-    return _starting(("closed", "open"), incomplete)
+    return starting(("closed", "open"), incomplete)
 
 
 def _complete_motions(incomplete: str) -> list[str]:
-    return _starting(("free", "held"), incomplete)
+    return starting(("free", "held"), incomplete)
 
 
 def _complete_friction(incomplete: str) -> list[str]:
-    return _starting(("body", "none", "paper", "rotor"), incomplete)
+    return starting(("body", "none", "paper", "rotor"), incomplete)
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]

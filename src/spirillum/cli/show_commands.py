@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Json, RobotArgument, Settings
+from spirillum.cli.options import Json, RobotArgument, Settings, starting
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,11 +20,11 @@ _VIEWS = ("front", "perspective", "rear", "side", "top")
 
 
 def _complete_views(incomplete: str) -> list[str]:
-    return [name for name in _VIEWS if name.startswith(incomplete)]
+    return starting(_VIEWS, incomplete)
 
 
 def _complete_cameras(incomplete: str) -> list[str]:
-    return [name for name in ("auto", "fixed", "follow") if name.startswith(incomplete)]
+    return starting(("auto", "fixed", "follow"), incomplete)
 
 
 _View = Annotated[

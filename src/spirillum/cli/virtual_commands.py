@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate
+from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from spirillum.cli.text import Answer
     from spirillum.virtual.degradation import Degradation
 
 __all__ = ["render", "virtual_experiment"]
 
 
 def _complete_presets(incomplete: str) -> list[str]:
-    return [name for name in ("clean", "degraded") if name.startswith(incomplete)]
+    return starting(("clean", "degraded"), incomplete)
 
 
 def _complete_views(incomplete: str) -> list[str]:
-    return [name for name in ("side", "top") if name.startswith(incomplete)]
+    return starting(("side", "top"), incomplete)
 
 
 def _complete_directions(incomplete: str) -> list[str]:
-    return [name for name in ("left", "right") if name.startswith(incomplete)]
+    return starting(("left", "right"), incomplete)
 
 
 _View = Annotated[str, typer.Option(autocompletion=_complete_views, help="Camera: top, or side (level).")]
@@ -182,7 +182,7 @@ def _degradation(
     )
 
 
-def _trial(answer: Mapping[str, Any], console: Console) -> None:
+def _trial(answer: Answer, console: Console) -> None:
     from rich.markup import escape
 
     from spirillum.cli import text
@@ -262,7 +262,7 @@ def virtual_experiment(
     text.show(found.to_dict(), _experiment, json=json)
 
 
-def _experiment(answer: Mapping[str, Any], console: Console) -> None:
+def _experiment(answer: Answer, console: Console) -> None:
     from rich.markup import escape
 
     from spirillum.cli import text

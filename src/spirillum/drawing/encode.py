@@ -1,25 +1,22 @@
-"""Frames into a film: MP4 (H.264) by PyAV, or GIF."""
+"""Frames into a film at an even pace: MP4 (H.264), or GIF."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
-from spirillum.errors import InputError
-from spirillum.extras import required
+from spirillum.h264 import h264_writer
 
 __all__ = ["FILMS", "Writer", "film_writer"]
 
 FILMS = {".mp4": "a film", ".gif": "a film"}
 """Endings of the films that can be written, for `output_target`."""
-_ENCODERS = ("libx264", "libopenh264", "h264")
-_BT709 = 1
 _PALETTE_FRAMES = 9
 _QUALITY = {"crf": "18", "preset": "veryfast"}
 
@@ -31,8 +28,7 @@ class Writer(Protocol):
         """Append a frame, (height, width, 3) sRGB bytes."""
 
 
-@contextmanager
-def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> Iterator[Writer]:
+def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> AbstractContextManager[Writer]:
     """A writer for frames of one size; the file is complete when the block ends.
 
     Args:
@@ -44,57 +40,9 @@ def film_writer(path: Path, size: tuple[int, int], fps: int, words: dict[str, st
     Raises:
         InputError: if PyAV is missing or has no encoder for H.264.
     """
-    opened = _gif(path, fps, words) if path.suffix == ".gif" else _mp4(path, size, fps, words)
-    with opened as writer:
-        yield writer
-
-
-class _Mp4:
-    def __init__(self, av: Any, container: Any, stream: Any) -> None:
-        self._av, self._container, self._stream, self._count = av, container, stream, 0
-
-    def add(self, image: np.ndarray) -> None:
-        """Append a frame."""
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
-        frame.pts, frame.time_base = self._count, self._stream.codec_context.time_base
-        self._count += 1
-        self._container.mux(self._stream.encode(frame))
-
-    def finish(self) -> None:
-        """Write what is still in the encoder."""
-        self._container.mux(self._stream.encode(None))
-
-
-@contextmanager
-def _mp4(path: Path, size: tuple[int, int], fps: int, words: dict[str, str]) -> Iterator[Writer]:
-    av = required("av", "a film")
-    av.logging.set_level(None)
-    name = next((name for name in _ENCODERS if _has_encoder(av, name)), None)
-    if name is None:
-        raise InputError(f"{path.name} cannot be encoded: PyAV has no encoder for H.264 here; allowed: a .gif")
-    container = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
-    try:
-        container.metadata.update(words)
-        stream = container.add_stream(name, rate=Fraction(fps), options=_QUALITY if name == "libx264" else {})
-        stream.width, stream.height = size
-        stream.pix_fmt = "yuv420p"
-        context = stream.codec_context
-        context.time_base = Fraction(1, fps)
-        context.colorspace = context.color_primaries = context.color_trc = context.color_range = _BT709
-        writer = _Mp4(av, container, stream)
-        yield writer
-        writer.finish()
-    finally:
-        container.close()
-
-
-def _has_encoder(av: Any, name: str) -> bool:
-    try:
-        av.codec.Codec(name, "w")
-    except (ValueError, OSError):
-        return False
-    return True
+    if path.suffix == ".gif":
+        return _gif(path, fps, words)
+    return h264_writer(path, size, Fraction(fps), words, quality=_QUALITY, instead="a .gif", extra="3d")
 
 
 class _Gif:

@@ -9,13 +9,14 @@ from fractions import Fraction
 from pathlib import Path
 from queue import Queue
 from threading import Thread
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.extras import required
+from spirillum.h264 import h264_writer
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ _INK = (255, 255, 255)
 _SHIFT = 4
 """Lines are drawn at sixteenths of a pixel."""
 _TICKS = 90_000
-_ENCODERS = ("libx264", "libopenh264", "h264")
+_QUALITY = {"crf": "23", "preset": "superfast"}
 _WAITING = 8
 
 
@@ -231,7 +232,7 @@ class _Writer:
     """Frames with times into H.264; the film starts with the first frame's time."""
 
     def __init__(self, path: Path, words: dict[str, str]) -> None:
-        self._av = required("av", "an annotated video", "video")
+        required("av", "an annotated video", "video")  # said here, before any frame is tracked
         self._path, self._words = path, words
         self._queue: Queue[tuple[np.ndarray, float] | None] = Queue(_WAITING)
         self._error: BaseException | None = None
@@ -275,34 +276,19 @@ class _Writer:
         if item is None:
             raise InputError(f"{self._path.name} has no frames; allowed: a video with at least one")
         height, width = (even - even % 2 for even in item[0].shape[:2])
-        name = next((name for name in _ENCODERS if _has_encoder(self._av, name)), None)
-        if name is None:
-            raise InputError(f"{self._path.name} cannot be encoded: PyAV has no H.264 here; allowed: --no-annotated")
-        self._av.logging.set_level(None)
-        options = {"crf": "23", "preset": "superfast"} if name == "libx264" else {}
-        with self._av.open(str(self._path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            container.metadata.update(self._words)
-            stream = container.add_stream(name, rate=30, options=options)
-            stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
-            stream.codec_context.time_base = Fraction(1, _TICKS)
-            stream.codec_context.thread_count = 1
-            first, last = item[1], -1
+        size, first, last = (width, height), item[1], -1
+        with h264_writer(
+            self._path,
+            size,
+            Fraction(30),
+            self._words,
+            quality=_QUALITY,
+            tick=Fraction(1, _TICKS),
+            threads=1,
+            instead="--no-annotated",
+            extra="video",
+        ) as film:
             while item is not None:
                 last = max(last + 1, round((item[1] - first) * _TICKS))
-                container.mux(stream.encode(self._frame(item[0][:height, :width], last)))
+                film.add(item[0][:height, :width], last)
                 item = self._next()
-            container.mux(stream.encode(None))
-
-    def _frame(self, image: np.ndarray, ticks: int) -> Any:
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = frame.reformat(format="yuv420p")
-        frame.pts, frame.time_base = ticks, Fraction(1, _TICKS)
-        return frame
-
-
-def _has_encoder(av: Any, name: str) -> bool:
-    try:
-        av.codec.Codec(name, "w")
-    except (ValueError, OSError):
-        return False
-    return True

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
+from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import Ruled
 from spirillum.measurement.tables import read_table
 from spirillum.tracking.setup import Setup
@@ -25,7 +26,7 @@ _MIDDLES = ("centre", "center", "body", "middle")
 _FRONTS = ("nose", "front")
 _REARS = ("rear", "tail_base", "back")
 _POINT_ERROR = 0.5
-"""Standard error that is taken for a point, pixels; only its ratio to others counts."""
+"""Standard error that is taken for a point, pixels."""
 
 
 def read_track(
@@ -62,7 +63,7 @@ def read_track(
     nothing = np.full(frame.size, np.nan)
     error = nothing + _POINT_ERROR * ruled.scale.length_per_pixel
     middle = np.where(both[:, None], 0.5 * (nose + rear), centre)
-    flag = Flag("imported", f"the positions are another program's, from {path.name}; it has no angles of body and tail")
+    flag = Flag(IMPORTED, f"the positions are another program's, from {path.name}; it has no angles of body and tail")
     return Track(
         time=time[inside], frame=frame[inside], position=position[inside],
         heading=np.where(both, np.arctan2(along[:, 1], along[:, 0]), np.nan)[inside],

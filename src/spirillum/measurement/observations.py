@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -11,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.files import read_text
+from spirillum.files import csv_rows, read_text
 from spirillum.measurement.parquet import parquet_table
 from spirillum.measurement.statistics import Mean, mean_with_interval
 from spirillum.units import Hz
@@ -115,16 +113,10 @@ def observation_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]
         return [], parquet_table(path, _WHAT)
     text = read_text(path, _WHAT, _LARGEST)
     comments = [line.strip() for line in text.splitlines() if line.lstrip().startswith("#")]
-    # A row of commas alone, as spreadsheets write, is an empty one.
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    if len(lines) < 2:
+    rows = csv_rows(text, path, _WHAT)
+    if len(rows) < 2:
         raise InputError(f"{path} holds no observations; allowed: a header line and at least one row")
-    try:
-        table = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
-    except csv.Error as error:
-        raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
-    return comments, list(zip((number for number, _ in lines), table, strict=False))
+    return comments, rows
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
@@ -141,7 +133,7 @@ def _check_header(path: Path, header: Sequence[str]) -> None:
         raise InputError(f"{path}: column '{twice[0]}' stands twice; allowed: once")
     missing = [name for name in _NEEDED if name not in header]
     if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing; needed: {', '.join(_NEEDED)}")
+        raise InputError(f"{path}: column '{missing[0]}' is missing; allowed: a header line with {', '.join(_NEEDED)}")
     if not set(header) & set(RATES):
         raise InputError(f"{path} has no measured column; allowed: at least one of {', '.join(RATES)}")
 

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.answer import envelope, quantity
-from spirillum.errors import InputError
-from spirillum.files import output_target, write_text
+from spirillum.files import new_file, output_target
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.fields import field_values
 from spirillum.tracking.setup import load_setup
@@ -68,10 +67,7 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
     Raises:
         InputError: if the file is there or cannot be written.
     """
-    target = output_target(path, {".toml": "a setup file"}, "setup.toml")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target} exists; allowed: a new file, or --force to overwrite one")
-    write_text(target, _TEMPLATE)
+    new_file(output_target(path, {".toml": "a setup file"}, "setup.toml"), _TEMPLATE, overwrite=overwrite)
 
 
 def setup_answer(path: str | Path) -> dict[str, Any]:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from spirillum.errors import InputError
-from spirillum.files import read_text
+from spirillum.files import csv_rows, read_text
 
 __all__ = ["Row", "Table", "read_table"]
 
@@ -78,11 +75,10 @@ def read_table(path: str | Path, what: str, headers: int = 1) -> Table:
         InputError: if it cannot be read, is not CSV, has no rows, or a row has more or fewer cells than the header.
     """
     path = Path(path)
-    text = read_text(path, what, _LARGEST)
-    found = list(_lines(path, text, what))
+    found = csv_rows(read_text(path, what, _LARGEST), path, what)
     if len(found) <= headers:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
-    heads = tuple(cells for _, cells in found[:headers])
+    heads = tuple(tuple(cells) for _, cells in found[:headers])
     width = len(heads[0])
     if width > _MOST_COLUMNS:
         raise InputError(f"{path} has {width} columns; allowed: at most {_MOST_COLUMNS}")
@@ -91,16 +87,5 @@ def read_table(path: str | Path, what: str, headers: int = 1) -> Table:
         if len(cells) != width:
             raise InputError(f"{path}, row {line}: {len(cells)} cells; allowed: {width}, one for each column")
         if line:
-            rows.append(Row(path, line, cells))
+            rows.append(Row(path, line, tuple(cells)))
     return Table(path, heads, tuple(rows))
-
-
-def _lines(path: Path, text: str, what: str) -> Iterator[tuple[int, tuple[str, ...]]]:
-    numbered = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    numbered = [(number, line) for number, line in numbered if not line.lstrip().startswith("#")]
-    try:
-        table: Sequence[list[str]] = list(csv.reader(io.StringIO("\n".join(line for _, line in numbered)), strict=True))
-    except csv.Error as error:
-        raise InputError(f"{path} is not CSV ({error}); allowed: {what}") from error
-    for (number, _), cells in zip(numbered, table, strict=False):
-        yield number, tuple(cell.strip() for cell in cells)

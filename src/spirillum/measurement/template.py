@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.answer import envelope
-from spirillum.errors import InputError
-from spirillum.files import output_target, write_text
+from spirillum.files import new_file, output_target
 from spirillum.measurement.observations import COLUMNS, Observation, read_observations
 
 __all__ = ["new_observations_file", "observations_answer"]
@@ -36,9 +35,7 @@ def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
         InputError: if the file is there or cannot be written.
     """
     target = output_target(path, {".csv": "an observations file"}, "observations.csv")
-    if target.exists() and not overwrite:
-        raise InputError(f"{target} exists; allowed: a new file, or --force to overwrite one")
-    write_text(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n")
+    new_file(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n", overwrite=overwrite)
 
 
 def observations_answer(path: str | Path) -> dict[str, Any]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
-from spirillum.files import read_text
+from spirillum.files import csv_rows, read_text
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["DUTY_COLUMNS", "Switch", "Window", "read_duty", "schedule", "windows_of"]
@@ -94,20 +92,15 @@ def read_duty(path: str | Path) -> list[Switch]:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
     path = Path(path)
-    lines = [(n, line) for n, line in enumerate(read_text(path, _WHAT, _LARGEST).splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    try:
-        rows = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), strict=True))
-    except csv.Error as error:
-        raise InputError(f"{path} is not CSV ({error}); allowed: {_WHAT}") from error
-    header = tuple(name.strip() for name in rows[0]) if rows else ()
+    rows = csv_rows(read_text(path, _WHAT, _LARGEST), path, _WHAT)
+    header = tuple(rows[0][1]) if rows else ()
     if header != DUTY_COLUMNS:
         shown = ", ".join(header)[:80]
         raise InputError(f"{path} has the columns '{shown}'; allowed: {', '.join(DUTY_COLUMNS)}")
     if len(rows) < 2:
         raise InputError(f"{path} holds no rows; allowed: a header line and at least one row")
     switches: list[Switch] = []
-    for (number, _), cells in zip(lines[1:], rows[1:], strict=False):
+    for number, cells in rows[1:]:
         switch = _row(path, number, cells)
         if switches and switch.time <= switches[-1].time:
             raise InputError(

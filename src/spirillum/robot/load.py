@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.files import parse_toml, read_toml, write_text
+from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.robot.calibration_file import with_calibration
 from spirillum.robot.fields import Section
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 
 __all__ = [
+    "PAPER_ROBOTS",
     "load",
     "new_robot_file",
     "parse_setting",
@@ -38,6 +39,9 @@ _WEIGHED = {
     "coupling": ("diameter", "length", "clearance"),
 }
 _DEEPEST = 8
+
+PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
+"""Presets of the paper's robot, one for each of its channels."""
 
 
 @lru_cache(maxsize=1)
@@ -118,11 +122,9 @@ def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) ->
             f"preset {preset!r}{did_you_mean(preset, preset_names())}; allowed: {', '.join(preset_names())}"
         )
     path = Path(path)
-    if path.exists() and (path.is_dir() or not overwrite):
-        raise InputError(f"{path} exists; allowed: a new file, or --force to overwrite one")
     name = re.sub(r"[^\w-]+", "-", path.stem)[:100] or "robot"
     text = preset_text(preset).replace(f'name = "{preset}"', f'name = "{name}"', 1)
-    write_text(path, text)
+    new_file(path, text, overwrite=overwrite)
 
 
 def _looks_like_a_name(robot: str | Path) -> bool:

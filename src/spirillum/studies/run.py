@@ -9,9 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spirillum.answer import as_json
-from spirillum.errors import InputError
-from spirillum.files import output_folder, write_dataset, write_text
+from spirillum.files import claim_folder, output_folder, write_dataset
 from spirillum.hydrodynamics import find_swimmer_model
 from spirillum.motion.comparison import uneven_models
 from spirillum.motion.prediction import calibration_warnings
@@ -30,6 +28,7 @@ Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
 
 _RESULTS = ("dataset.nc", "figures", "report.html", "claims.json")
+"""What a folder without the mark of a study may not hold, for it would be replaced."""
 
 
 def study(
@@ -72,7 +71,9 @@ def study(
     tell = progress or (lambda _what, _done, _total: None)
     if output is None:
         return _computed(loaded, observed, fingerprint, None, tell)
-    folder = _claimed_folder(Path(output), loaded, fingerprint)
+    folder = Path(output)
+    mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
+    claim_folder(folder, "study.json", mark, "study", _RESULTS)
     dataset = read_dataset(folder / "dataset.nc")
     if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
         parts = output_folder(folder / f"parts-{fingerprint[:16]}")
@@ -89,34 +90,6 @@ def _fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> str:
 
     question = [loaded.fingerprint, observed.question() if observed else None, __version__]
     return hashlib.sha256(json.dumps(question).encode()).hexdigest()
-
-
-def _claimed_folder(folder: Path, loaded: LoadedStudy, fingerprint: str) -> Path:
-    """The folder of results, marked as this study's.
-
-    Raises:
-        InputError: if it holds another study, or results of unknown origin.
-    """
-    mark = folder / "study.json"
-    if mark.exists():
-        try:
-            found = json.loads(mark.read_text(encoding="utf-8"))
-            same, title = found["fingerprint"] == fingerprint, str(found["title"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{mark} is damaged; allowed: a new folder (-o DIR)") from error
-        if not same:
-            raise InputError(
-                f"{folder} holds another study ('{title[:80]}', or other settings); allowed: the same study, to resume "
-                "it, or a new folder (-o DIR)"
-            )
-        return folder
-    stray = [name for name in _RESULTS if (folder / name).exists()]
-    if stray:
-        raise InputError(f"{folder} holds {stray[0]} of unknown origin; allowed: a new folder (-o DIR)")
-    output_folder(folder)
-    content = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
-    write_text(mark, as_json(content))
-    return folder
 
 
 def _computed(

@@ -16,7 +16,7 @@ from spirillum.virtual.way import Way
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SYNTHETIC", "names_beside", "setup_text", "truth_dataset", "truth_text"]
+__all__ = ["SYNTHETIC", "names_beside", "rate_quantities", "setup_text", "truth_dataset", "truth_text"]
 
 SYNTHETIC = "synthetic: a computed robot seen by a virtual camera, not a measurement"
 _UNITS = {
@@ -82,6 +82,15 @@ def setup_text(
     return "\n".join(lines) + "\n"
 
 
+def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
+    """Forward velocity and rates as quantities of an answer.
+
+    Args:
+        rates: by name, SI.
+    """
+    return {name: quantity(value, _UNITS[name]) for name, value in rates.items()}
+
+
 def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
     """The truth of a trial, JSON.
 
@@ -89,8 +98,7 @@ def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
         rates: forward velocity and rates, SI.
         content: what else belongs to it.
     """
-    numbers = {name: quantity(rates[name], unit) for name, unit in _UNITS.items()}
-    return as_json(envelope("truth", {"synthetic": True, **numbers, **content}, (SYNTHETIC,))) + "\n"
+    return as_json(envelope("truth", {"synthetic": True, **rate_quantities(rates), **content}, (SYNTHETIC,))) + "\n"
 
 
 def truth_dataset(way: Way, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]) -> xr.Dataset:

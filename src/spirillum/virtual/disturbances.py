@@ -61,9 +61,8 @@ class Disturbances:
         self._hand_time = rng.uniform(0.2, 0.8) * duration
         self._hand_way = rng.choice([-1.0, 1.0])
         self._hand_row = rng.uniform(0.3, 0.7)
-        grain = np.random.default_rng([seed, _GRAIN])
-        self._grain_starts = grain
-        self.grain = grain.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
+        self._grain_places = np.random.default_rng([seed, _GRAIN])
+        self.grain = self._grain_places.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
         """A stock of normal noise; every row of every picture begins at a random place of it."""
 
     def kept(self, count: int) -> np.ndarray:
@@ -84,7 +83,7 @@ class Disturbances:
 
     def starts(self, rows: int) -> np.ndarray:
         """Where in the stock of noise each row of the next picture begins, (rows,)."""
-        return self._grain_starts.integers(0, self.grain.size, rows)
+        return self._grain_places.integers(0, self.grain.size, rows)
 
     def spoil(self, light: Samples, time: float, position: Samples) -> None:
         """Put shadow, bubbles and glare into a picture.

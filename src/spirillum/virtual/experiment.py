@@ -14,22 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import as_json, envelope, quantity
+from spirillum.answer import envelope
 from spirillum.errors import InputError
-from spirillum.files import output_folder, write_text
-from spirillum.robot.load import load
+from spirillum.files import claim_folder, output_folder, write_text
+from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
-from spirillum.virtual.beside import SYNTHETIC
+from spirillum.virtual.beside import SYNTHETIC, rate_quantities
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.motion import steady_rates
-from spirillum.virtual.options import checked_fps, checked_size, one_of, whole_number
+from spirillum.virtual.options import DIRECTIONS, VIEWS, checked_fps, checked_seed, checked_size, one_of, whole_number
 from spirillum.virtual.trial import render, room
 
-__all__ = ["PRESETS", "Experiment", "virtual_experiment"]
+__all__ = ["Planned", "VirtualExperiment", "virtual_experiment"]
 
-PRESETS = ("biorob2012-wide", "biorob2012-narrow")
-"""Robots of an experiment without a study: the paper's two."""
 _LONGEST = 20.0
 _MOST = 10_000
 _MARK = "virtual-experiment.json"
@@ -56,7 +54,7 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class VirtualExperiment:
     """A virtual experiment that was written."""
 
     folder: Path
@@ -76,14 +74,7 @@ class Experiment:
 
     def to_dict(self) -> dict[str, Any]:
         """The experiment's facts, as ``virtual-experiment --json`` prints them."""
-        units = {"forward_velocity": "m/s"}
-        robots = [
-            {
-                "robot": name,
-                **{key: quantity(value, units.get(key, "rad/s")) for key, value in self.rates[name].items()},
-            }
-            for name in self.robots
-        ]
+        robots = [{"robot": name, **rate_quantities(self.rates[name])} for name in self.robots]
         content = {
             "synthetic": True,
             "folder": str(self.folder),
@@ -114,7 +105,7 @@ def virtual_experiment(
     seed: int = 0,
     jobs: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
-) -> Experiment:
+) -> VirtualExperiment:
     """Render several trials of each robot of a study; all of it is synthetic.
 
     Every trial has the model's steady rates times one random factor, the planted spread of the motor's rate: without
@@ -145,13 +136,13 @@ def virtual_experiment(
         InputError: for wrong input, or a folder of another experiment.
     """
     trials, jobs = whole_number("trials", trials, 1, 1000), whole_number("jobs", jobs, 1, 64)
-    seed = whole_number("seed", seed, 0, 2**31 - 1)
+    seed = checked_seed(seed)
     if isinstance(spread, bool) or not 0.0 <= spread <= 0.3:
         raise InputError(f"spread = {spread!r}; allowed: 0 to 0.3")
     look: dict[str, Any] = {
         "degradation": degradation_of(degradation),
-        "view": one_of("view", view, ("top", "side")),
-        "direction": one_of("direction", direction, ("right", "left")),
+        "view": one_of("view", view, VIEWS),
+        "direction": one_of("direction", direction, DIRECTIONS),
         "fps": checked_fps(fps),
         "size": checked_size(size),
     }
@@ -164,6 +155,8 @@ def virtual_experiment(
         rates, _, said = steady_rates(robot, model=model, tail_rate=tail_rate, friction=friction)
         steady[name] = rates
         warnings += [f"{name}: {sentence}" for sentence in said]
+    from spirillum import __version__
+
     folder = Path(output)
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
@@ -173,8 +166,16 @@ def virtual_experiment(
         "duration": longest,
         "seed": seed,
         "look": look | {"degradation": asdict(look["degradation"])},
+        "version": __version__,
     }
-    _claim(folder, question)
+    mark = {
+        "schema": "spirillum.virtual-experiment-folder/1",
+        "synthetic": True,
+        "fingerprint": hashlib.sha256(json.dumps(question, sort_keys=True).encode()).hexdigest(),
+        "spread": spread,
+        "seed": seed,
+    }
+    claim_folder(folder, _MARK, mark, "virtual experiment")
     planned = [
         plan
         for place, name in enumerate(robots)
@@ -187,13 +188,13 @@ def virtual_experiment(
     table = folder / _TABLE
     write_text(table, _table(planned))
     kept = len(planned) - len(todo)
-    return Experiment(folder, tuple(robots), trials, kept, spread, table, steady, tuple(dict.fromkeys(warnings)))
+    return VirtualExperiment(folder, tuple(robots), trials, kept, spread, table, steady, tuple(dict.fromkeys(warnings)))
 
 
 def _robots(study: str | Path | Mapping[str, Any] | None, model: str | None) -> tuple[dict[str, Robot], str]:
     """Robots by the names of their folders, and the model."""
     if study is None:
-        return {name: load(name) for name in PRESETS}, model or "sbt"
+        return {name: load(name) for name in PAPER_ROBOTS}, model or "sbt"
     from spirillum.studies.spec import load_study
 
     loaded = load_study(study)
@@ -212,38 +213,6 @@ def _robots(study: str | Path | Mapping[str, Any] | None, model: str | None) -> 
             name = f"{name}-{place + 1}"
         found[name] = robot
     return found, model or loaded.study.models[0]
-
-
-def _claim(folder: Path, question: Mapping[str, Any]) -> None:
-    """Mark the folder as this experiment's.
-
-    Raises:
-        InputError: if it holds another one, or cannot be written.
-    """
-    fingerprint = hashlib.sha256(json.dumps(question, sort_keys=True).encode()).hexdigest()
-    mark = folder / _MARK
-    if mark.exists():
-        try:
-            same = json.loads(mark.read_text(encoding="utf-8"))["fingerprint"] == fingerprint
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{mark} is damaged; allowed: a new folder (-o DIR)") from error
-        if not same:
-            raise InputError(
-                f"{folder} holds another virtual experiment, or one with other settings; allowed: the same, to resume "
-                "it, or a new folder (-o DIR)"
-            )
-        return
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder} holds files of unknown origin; allowed: a new folder (-o DIR)")
-    output_folder(folder)
-    content = {
-        "schema": "spirillum.virtual-experiment-folder/1",
-        "synthetic": True,
-        "fingerprint": fingerprint,
-        "spread": question["spread"],
-        "seed": question["seed"],
-    }
-    write_text(mark, as_json(content) + "\n")
 
 
 def _planned(

@@ -1,26 +1,25 @@
-"""Frames into a video with their true times: MP4 (H.264) by PyAV, or a folder of PNG files."""
+"""Frames into a video with their true times: MP4 (H.264), or a folder of PNG files."""
 
 from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.extras import required
+from spirillum.h264 import h264_writer
 
 __all__ = ["FrameWriter", "mp4_writer", "png_writer"]
 
-_BT709 = 1
 _QUALITY = {"preset": "veryfast", "x264-params": "mbtree=0"}
 """With `mbtree` small pictures gave now and then other bytes from the same frames."""
 _THREADS = 2
-"""Threads of the encoder: their number changes the bytes, so that it is always the same."""
+"""Threads of the encoder, always as many: the same seed is to give the same bytes."""
 
 
 class FrameWriter(Protocol):
@@ -30,26 +29,9 @@ class FrameWriter(Protocol):
         """Append a frame, (height, width, 3) sRGB bytes, that was recorded as this number, counted from 0."""
 
 
-class _Mp4:
-    def __init__(self, av: Any, container: Any, stream: Any) -> None:
-        self._av, self._container, self._stream = av, container, stream
-
-    def add(self, image: np.ndarray, number: int) -> None:
-        """Append a frame at its time."""
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
-        frame.pts, frame.time_base = number, self._stream.codec_context.time_base
-        self._container.mux(self._stream.encode(frame))
-
-    def finish(self) -> None:
-        """Write what is still in the encoder."""
-        self._container.mux(self._stream.encode(None))
-
-
-@contextmanager
 def mp4_writer(
     path: Path, size: tuple[int, int], fps: Fraction, crf: int, words: dict[str, str]
-) -> Iterator[FrameWriter]:
+) -> AbstractContextManager[FrameWriter]:
     """A writer of an MP4 file; it is complete when the block ends.
 
     Args:
@@ -62,28 +44,17 @@ def mp4_writer(
     Raises:
         InputError: if PyAV is missing or has no libx264.
     """
-    av = required("av", "a video", "video")
-    av.logging.set_level(None)
-    container = av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"})
-    try:
-        container.metadata.update(words)
-        try:
-            stream = container.add_stream("libx264", rate=fps, options=_QUALITY | {"crf": str(crf)})
-        except (ValueError, OSError) as error:
-            raise InputError(
-                f"{path.name} cannot be encoded: PyAV has no libx264 here; allowed: a folder of PNG files"
-            ) from error
-        stream.width, stream.height = size
-        stream.pix_fmt = "yuv420p"
-        context = stream.codec_context
-        context.thread_count = _THREADS
-        context.time_base = 1 / fps
-        context.colorspace = context.color_primaries = context.color_trc = context.color_range = _BT709
-        writer = _Mp4(av, container, stream)
-        yield writer
-        writer.finish()
-    finally:
-        container.close()
+    return h264_writer(
+        path,
+        size,
+        fps,
+        words,
+        quality=_QUALITY | {"crf": str(crf)},
+        threads=_THREADS,
+        encoders=("libx264",),  # others know no constant rate factor
+        instead="a folder of PNG files",
+        extra="video",
+    )
 
 
 class _Pngs:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +14,16 @@ from spirillum.errors import InputError
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
+from spirillum.virtual.tank import tube_height
 from spirillum.virtual.way import Way, lab_to_camera, run_way, steady_way
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Motion", "motion_of", "reach_of", "steady_rates"]
+
+_GAP = 0.5e-3
+"""Between body and tube in a run that does not say where the robot lies, m; assumed."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Motion:
     way: Way
     model: str
     """Model, `prescribed`, or both."""
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
 
 
 def steady_rates(
@@ -127,7 +131,7 @@ def motion_of(
     )
     turn = lab_to_camera(view, leftwards=leftwards)
     position = turn @ _resting(loaded, placement["gap"], placement["lateral"])
-    position = position + np.array([0.0, 0.0, _axis(loaded, view, side_axis)])
+    position = position + np.array([0.0, 0.0, tube_height(loaded, view, side_axis)])
     way = steady_way(
         length,
         **rates,
@@ -149,18 +153,11 @@ def _of_run(
     own = robot_of(dataset)
     if own != loaded:
         raise InputError(f"the run's robot {own.name!r} is not {loaded.name!r}; allowed: the robot of the run")
-    axis = _axis(loaded, view, side_axis)
-    way = run_way(dataset, view, leftwards=leftwards, axis=axis, level=float(_resting(loaded, 0.5e-3, 0.0)[2]))
+    axis = tube_height(loaded, view, side_axis)
+    way = run_way(dataset, view, leftwards=leftwards, axis=axis, level=float(_resting(loaded, _GAP, 0.0)[2]))
     way = way.until(parse_option("duration", duration, KINDS["time"]))
     model = str(dataset.attrs.get("model", ""))[:60]
     return Motion(loaded, way, f"run, {model}" if model else "run")
-
-
-def _axis(robot: Robot, view: str, side_axis: float) -> float:
-    """Height of the channel's axis above the reference plane."""
-    from spirillum.virtual.tank import tank_of
-
-    return tank_of(robot, view, 1.0, side_axis).tube_height
 
 
 def _resting(robot: Robot, gap: float, lateral: float) -> Samples:

@@ -9,7 +9,22 @@ from spirillum.errors import InputError
 from spirillum.files import output_target
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["checked_fps", "checked_size", "one_of", "signed_length", "video_target", "whole_number"]
+__all__ = [
+    "DIRECTIONS",
+    "VIEWS",
+    "checked_fps",
+    "checked_seed",
+    "checked_size",
+    "one_of",
+    "signed_length",
+    "video_target",
+    "whole_number",
+]
+
+VIEWS = ("top", "side")
+"""Where the camera is: above, or level beside the tank."""
+DIRECTIONS = ("right", "left")
+"""Where the nose points in the picture."""
 
 _SMALLEST, _LARGEST = 64, 4096
 
@@ -50,6 +65,15 @@ def whole_number(name: str, value: object, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise InputError(f"{name} = {value!r}; allowed: a whole number from {low} to {high}")
     return value
+
+
+def checked_seed(seed: object) -> int:
+    """The seed of all random numbers.
+
+    Raises:
+        InputError: if it is none.
+    """
+    return whole_number("seed", seed, 0, 2**31 - 1)
 
 
 def signed_length(name: str, value: str | float) -> float:

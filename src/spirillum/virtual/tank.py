@@ -13,9 +13,9 @@ from spirillum.robot.robot import Robot
 from spirillum.virtual.optics import Lens
 from spirillum.virtual.solids import linear
 
-__all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint"]
+__all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
 
-GLASS = 2.0e-3
+_GLASS = 2.0e-3
 """Thickness of the tube's wall, m; assumed."""
 _RULER_WIDTH, _RULER_LENGTH, _RULER_AWAY, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
 _OIL = (0.72, 0.90, 1.98)
@@ -48,7 +48,7 @@ class Tank:
     @property
     def outside(self) -> float:
         """Outer radius of the tube, 0 without one."""
-        return 0.0 if self.tube is None else self.tube + GLASS
+        return 0.0 if self.tube is None else self.tube + _GLASS
 
 
 @dataclass(frozen=True)
@@ -74,13 +74,26 @@ def tank_of(robot: Robot, view: str, spacing: float, side_height: float) -> Tank
         spacing: of the ruler's lines, m.
         side_height: height of the tube's axis above the far wall in the view from the side, m.
     """
-    if robot.channel is None:
-        reach, tube, length = 0.6 * robot.body.diameter, None, 0.0
-    else:
-        tube = 0.5 * robot.channel.diameter
-        reach, length = tube + GLASS, robot.channel.length or 1.0
-    height = side_height if view == "side" else reach
-    return Tank(view, tube, height, length, spacing, reach + _RULER_AWAY)
+    tube, length = None, 0.0
+    if robot.channel is not None:
+        tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
+    return Tank(view, tube, tube_height(robot, view, side_height), length, spacing, _reach(robot) + _RULER_AWAY)
+
+
+def tube_height(robot: Robot, view: str, side_height: float) -> float:
+    """Height of the tube's axis above the reference plane, m; of the robot's way where there is no tube.
+
+    Args:
+        robot: a checked robot.
+        view: `top` or `side`.
+        side_height: the height in the view from the side, m.
+    """
+    return side_height if view == "side" else _reach(robot)
+
+
+def _reach(robot: Robot) -> float:
+    """From the tube's axis to its outside, m; without a tube to a little beyond the body."""
+    return 0.6 * robot.body.diameter if robot.channel is None else 0.5 * robot.channel.diameter + _GLASS
 
 
 def spots(side: int) -> Samples:
@@ -108,18 +121,14 @@ def tint(depth: float) -> Samples:
     return np.asarray(np.exp(-depth * np.array(_OIL)))
 
 
+@lru_cache(maxsize=4)
 def backdrop(tank: Tank, lens: Lens) -> Backdrop:
-    """See the still parts through a lens.
+    """See the still parts through a lens; trials with the same tank and camera share what is seen.
 
     Args:
         tank: what stands there.
         lens: the camera.
     """
-    return _seen(tank, lens)
-
-
-@lru_cache(maxsize=4)
-def _seen(tank: Tank, lens: Lens) -> Backdrop:
     width, height = lens.size
     light, over, shine, floor = (np.empty((height, width, *more), dtype=np.float32) for more in ((3,), (), (), (2,)))
     ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)

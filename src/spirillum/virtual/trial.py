@@ -18,14 +18,23 @@ from spirillum.errors import InputError
 from spirillum.files import whole_file, write_dataset
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
-from spirillum.virtual.beside import SYNTHETIC, names_beside, setup_text, truth_dataset, truth_text
+from spirillum.virtual.beside import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.film import FrameWriter, mp4_writer, png_writer
 from spirillum.virtual.frames import Frames
 from spirillum.virtual.motion import Motion, motion_of, reach_of
 from spirillum.virtual.optics import Lens
-from spirillum.virtual.options import checked_fps, checked_size, one_of, signed_length, video_target, whole_number
+from spirillum.virtual.options import (
+    DIRECTIONS,
+    VIEWS,
+    checked_fps,
+    checked_seed,
+    checked_size,
+    one_of,
+    signed_length,
+    video_target,
+)
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import Tank, tank_of
@@ -71,13 +80,15 @@ class VirtualTrial:
     dropped: int
     """Number of frames that were lost."""
     size: tuple[int, int]
+    """Width and height, pixels."""
     fps: float
+    """Frames a second."""
     seed: int
+    """Of all random numbers."""
     warnings: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """The trial's facts, as ``render --json`` prints them."""
-        units = {name: "m/s" if name == "forward_velocity" else "rad/s" for name in self.rates}
         content = {
             "robot": self.robot.name,
             "synthetic": True,
@@ -85,7 +96,7 @@ class VirtualTrial:
             "video": str(self.path),
             "setup": str(self.setup),
             "truth": str(self.truth),
-            **{name: quantity(value, units[name]) for name, value in self.rates.items()},
+            **rate_quantities(self.rates),
             "frames": self.frames,
             "dropped": self.dropped,
             "width": self.size[0],
@@ -169,9 +180,9 @@ def render(
         InputError: for wrong input, or a target that cannot be written.
     """
     target, pixels, rate = video_target(path), checked_size(size), checked_fps(fps)
-    seen_from = one_of("view", view, ("top", "side"))
-    leftwards = one_of("direction", direction, ("right", "left")) == "left"
-    what, seed = degradation_of(degradation), whole_number("seed", seed, 0, 2**31 - 1)
+    seen_from = one_of("view", view, VIEWS)
+    leftwards = one_of("direction", direction, DIRECTIONS) == "left"
+    what, seed = degradation_of(degradation), checked_seed(seed)
     open_for = parse_option("exposure", exposure, KINDS["time"])
     if open_for > 1.0 / rate:
         raise InputError(f"exposure = {open_for:.4g} s; allowed: at most the {1.0 / rate:.4g} s of a frame")
@@ -268,18 +279,18 @@ def render(
         _write_frames(writer, frames, kept, rate, tell)
         tell("render: writing", len(kept), len(kept))
     return VirtualTrial(
-        target,
-        names["setup"],
-        names["json"],
-        loaded,
-        rates,
-        motion.model,
-        len(kept),
-        count - len(kept),
-        pixels,
-        rate,
-        seed,
-        motion.warnings,
+        path=target,
+        setup=names["setup"],
+        truth=names["json"],
+        robot=loaded,
+        rates=rates,
+        model=motion.model,
+        frames=len(kept),
+        dropped=count - len(kept),
+        size=pixels,
+        fps=rate,
+        seed=seed,
+        warnings=motion.warnings,
     )
 
 

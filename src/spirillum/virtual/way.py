@@ -92,7 +92,7 @@ class Way:
 
     def rates(self) -> dict[str, float]:
         """Mean rates from the first sample to the last: `forward_velocity`, `body_rotation_rate`, ..."""
-        time = float(self.time[-1] - self.time[0])
+        time = self.duration
         forward = float(self.position[-1, 0] - self.position[0, 0]) / time
         body = float(self.body_angle[-1] - self.body_angle[0]) / time
         tail = float(self.tail_phase[-1] - self.tail_phase[0]) / time

@@ -1,0 +1,108 @@
+"""Frames into H.264 in an MP4 file, by PyAV: each at its time, with colours as every player shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.extras import required
+
+__all__ = ["ENCODERS", "H264Writer", "h264_writer"]
+
+ENCODERS = ("libx264", "libopenh264", "h264")
+"""Encoders of H.264, the best first: which of them are there depends on how PyAV was built."""
+_BT709 = 1
+_LIMITED_RANGE = 1
+
+
+class H264Writer:
+    """Takes the frames of a film, one after the other."""
+
+    def __init__(self, av: Any, container: Any, stream: Any) -> None:
+        """Take an open file; `h264_writer` makes it."""
+        self._av, self._container, self._stream = av, container, stream
+        self._next = 0
+
+    def add(self, image: np.ndarray, number: int | None = None) -> None:
+        """Append a frame.
+
+        Args:
+            image: (height, width, 3) sRGB bytes.
+            number: its time in ticks, later than that of the frame before; None: the next tick.
+        """
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
+        frame.pts = self._next if number is None else number
+        frame.time_base = self._stream.codec_context.time_base
+        self._next = frame.pts + 1
+        self._container.mux(self._stream.encode(frame))
+
+    def finish(self) -> None:
+        """Write what is still in the encoder."""
+        self._container.mux(self._stream.encode(None))
+
+
+@contextmanager
+def h264_writer(
+    path: Path,
+    size: tuple[int, int],
+    rate: Fraction,
+    words: Mapping[str, str],
+    *,
+    quality: Mapping[str, str],
+    instead: str,
+    extra: str,
+    tick: Fraction | None = None,
+    threads: int = 0,
+    encoders: Sequence[str] = ENCODERS,
+) -> Iterator[H264Writer]:
+    """A writer of an MP4 file; the file is complete when the block ends.
+
+    Args:
+        path: the file.
+        size: width and height, even numbers.
+        rate: frames a second.
+        words: tags of the file, such as title and comment.
+        quality: options of libx264; other encoders have their own defaults.
+        instead: what can be had without an encoder, for the sentence of an error.
+        extra: the extra that installs PyAV, for the sentence of an error.
+        tick: what times are whole multiples of, s; None: the time of a frame.
+        threads: of the encoder, whose number changes the bytes of the file; 0: as many as it likes.
+        encoders: those that will do, the best first.
+
+    Raises:
+        InputError: if PyAV is missing, or has none of the encoders.
+    """
+    av = required("av", "a film", extra)
+    av.logging.set_level(None)
+    name = next((name for name in encoders if _is_there(av, name)), None)
+    if name is None:
+        missing = " or ".join(encoders)
+        raise InputError(f"{path.name} cannot be encoded: PyAV has no {missing} for H.264 here; allowed: {instead}")
+    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
+        container.metadata.update(words)
+        stream = container.add_stream(name, rate=rate, options=dict(quality) if name == "libx264" else {})
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"
+        context = stream.codec_context
+        context.thread_count = threads
+        context.time_base = tick or 1 / rate
+        context.colorspace = context.color_primaries = context.color_trc = _BT709
+        context.color_range = _LIMITED_RANGE
+        writer = H264Writer(av, container, stream)
+        yield writer
+        writer.finish()
+
+
+def _is_there(av: Any, name: str) -> bool:
+    try:
+        av.codec.Codec(name, "w")
+    except (ValueError, OSError):
+        return False
+    return True
