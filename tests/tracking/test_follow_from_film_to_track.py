@@ -68,6 +68,15 @@ def test_only_the_scale(swimmer):
     assert video.size == (320, 240)
 
 
+def test_an_end_beyond_the_film_changes_nothing_and_a_start_beyond_it_is_refused(swimmer):
+    _, path = swimmer
+    setup, robot = load_setup(path.with_name("a.setup.toml"))
+    found, later = (follow(path, setup.model_copy(update={"end": end}), robot) for end in (None, 1000.0))
+    assert later.position.tolist() == found.position.tolist()
+    with pytest.raises(InputError, match=r"start = 8 s, but a.mp4 ends at 6 s; allowed: a start before its end"):
+        follow(path, setup.model_copy(update={"start": 8.0}), robot)
+
+
 def test_a_robot_that_leaves_is_kept_as_far_as_it_was_seen(flat_pictures, tmp_path):
     film = flat_pictures.Flat(frames=16, fps=3.0, start=(0.03, 0.0), velocity=0.02, body_rate=0.1, tail_rate=0.5)
     found = track(film, tmp_path)

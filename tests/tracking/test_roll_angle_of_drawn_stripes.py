@@ -90,6 +90,26 @@ def test_glare_on_a_part_of_the_seal_does_not_mislead(flat_pictures: ModuleType,
     assert np.degrees(np.max(np.abs(missed))) < 1.0
 
 
+def test_wide_glare_that_was_there_all_the_time_does_not_hold_the_angle(
+    flat_pictures: ModuleType, tmp_path: Path
+) -> None:
+    drawn = film(flat_pictures, frames=16, body_rate=-np.pi / 4, noise=3.0)
+    stripes, pictures, angle = learnt(drawn, tmp_path)
+    bright = []
+    for picture, pose in pictures:
+        centre = drawn.pixels(np.array([pose.x - 0.018, pose.y + 0.003, drawn.axis_height]))
+        v, u = np.mgrid[: picture.shape[0], : picture.shape[1]]
+        far = np.hypot((u - centre[0]) / 40.0, (v - centre[1]) / 13.0)
+        shine = 400.0 * np.exp(-0.5 * np.maximum(far - 0.5, 0.0) ** 2 / 0.25)
+        bright.append((np.clip(picture + shine[..., None], 0, 255).astype(np.uint8), pose))
+    stripes.learn(bright)
+    missed, _ = errors(stripes, bright, angle)
+    read = np.isfinite(missed)
+    assert read.mean() > 0.5
+    assert np.degrees(np.max(np.abs(missed[read]))) < 4.0
+    assert abs(np.polyfit(angle[read], missed[read], 1)[0]) < 0.03  # it does not lag behind
+
+
 @pytest.mark.parametrize(
     ("order", "word"), [(PRESET[::-1], "reversed"), (("red", "green", "yellow", "blue") * 2, "another")]
 )

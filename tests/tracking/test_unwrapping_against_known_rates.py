@@ -118,6 +118,16 @@ def test_no_wire_advances_more_than_it_can_without_a_body() -> None:
         assert 0.0 < -matrix[0, 3] / matrix[0, 0] * TURN < _largest_advance(tail)
 
 
+def test_a_robot_that_swims_on_a_tail_at_rest_betrays_a_tail_at_the_frame_rate() -> None:
+    time = np.arange(300) / FPS
+    robot = load("biorob2012-wide")
+    still = 1e-3 * np.sin(time)
+    (flag,) = contradictions(time, -0.1 * time, still, 1e-3 * time, robot)
+    assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
+    assert contradictions(time, still, still, 1e-5 * time, robot) == ()  # a robot at rest
+    assert contradictions(time, -0.1 * time, np.full(300, np.nan), 1e-3 * time, robot) == ()  # a tail that is not seen
+
+
 def test_largest_rates_are_half_a_period_a_frame() -> None:
     setup = Setup(
         camera=CameraSetup(height="200 mm"),

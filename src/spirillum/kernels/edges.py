@@ -9,7 +9,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles"]
+__all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
 
 _RUN = 6
 """Neighbouring points of an edge on which brightness rises or falls in the same sense."""
@@ -259,3 +259,26 @@ def robust_change(shifts: Samples, slopes: Samples, weights: Samples, used: Samp
             share = miss[i] / (4.685 * level) if weights[i] > 0.0 else 1.0
             used[i] = weights[i] * (1.0 - share * share) ** 2 if share < 1.0 else 0.0
     return level
+
+
+@compiled
+def sums_along(rows: Samples, design: Samples, middle: float, numbers: Samples, out: Samples) -> None:
+    """Sums of one sample from each row, at places that are linear in some numbers; nothing beyond the rows' ends.
+
+    Args:
+        rows: samples, (n, m).
+        design: by how many samples the place in each row moves with each number, (n, k).
+        middle: place where all numbers are zero, samples.
+        numbers: the numbers to be tried, (q, k).
+        out: the sums, (q,).
+    """
+    for q in range(numbers.shape[0]):
+        total = 0.0
+        for i in range(rows.shape[0]):
+            place = middle
+            for k in range(design.shape[1]):
+                place += design[i, k] * numbers[q, k]
+            at = round(place)
+            if 0 <= at < rows.shape[1]:
+                total += rows[i, at]
+        out[q] = total

@@ -48,8 +48,9 @@ def _read_seal(value: Any) -> Any:
 
 
 def _read_stripes(value: Any) -> Any:
-    if not isinstance(value, (list, tuple)) or len(value) == 1 or len(value) > _MOST_STRIPES:
-        raise ValueError(f"a list of 2 to {_MOST_STRIPES} names of colours, or an empty one")
+    alike = isinstance(value, (list, tuple)) and len(value) > 0 and all(item == value[0] for item in value)
+    if not isinstance(value, (list, tuple)) or alike or len(value) > _MOST_STRIPES:
+        raise ValueError(f"a list of 2 to {_MOST_STRIPES} names of colours that are not all the same, or an empty one")
     return tuple(value)
 
 

@@ -33,6 +33,8 @@ _SMOOTHED = 2
 _NEIGHBOURS = 2
 _FEWEST = 0.3
 """Least share of the edges that have to fit."""
+_TRUSTED_EDGE, _CLEAR_EDGE = 0.6, 10.0
+"""An edge whose place is less sure than this says nothing of the size, pixels; stronger ones than this weigh alike."""
 _WORST = 0.7
 """Largest standard error of a place that is kept, pixels."""
 
@@ -67,7 +69,7 @@ class BodyFinder:
         """
         self.robot, self.optics, self.bounds = robot, optics, bounds
         self.contour: Contour = contour_of(robot, optics)
-        self.offsets = np.arange(-_HALF, _HALF + 1, dtype=float)
+        self.half, self.offsets = _HALF, np.arange(-_HALF, _HALF + 1, dtype=float)
         self._usual: Samples | None = None
         self._slopes: Samples = np.empty((0, 0))
         self._strength: Samples = np.empty(0)
@@ -101,6 +103,22 @@ class BodyFinder:
             if turn < _SMOOTHED:
                 poses = _smooth(poses, times)
         return found
+
+    def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
+        """How steep each edge's brightness usually is along its normal, and how much each edge tells.
+
+        Args:
+            offsets: pixels outward from the outline, (m,).
+
+        Returns:
+            Shares of the edge's whole, (n, m), and weights of the edges, (n,), 0 for those that are not trusted.
+        """
+        assert self._usual is not None  # noqa: S101 - learnt first
+        from scipy.interpolate import CubicSpline
+
+        steep = CubicSpline(self.offsets, self._usual, axis=1)(offsets, 1) ** 2
+        weight = np.where(self._trust < _TRUSTED_EDGE, np.minimum(self._strength, _CLEAR_EDGE), 0.0)
+        return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
     def place(self, image: np.ndarray, guess: BodyPose) -> Placed:
         """The body on a frame, near a guess; errors are NaN where it is not seen well enough.

@@ -19,6 +19,8 @@ __all__ = ["bounds_of", "opened", "samples_of", "scale_of", "sight_of"]
 _SAMPLES = 24
 """Frames from which scale and looks are learnt."""
 _GOLDEN = 0.618034
+_UNKNOWN = 10.0
+"""How much of a film of unknown length is learnt from, s."""
 
 
 def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[Sight, Video]:
@@ -43,10 +45,21 @@ def opened(video: str | Path | Video, setup: Setup) -> Video:
 
 
 def samples_of(video: Video, setup: Setup) -> list[Frame]:
-    """Some frames, spread unevenly over what is to be measured: else all could show the robot at the same angles."""
+    """Some frames, spread unevenly over what is to be measured: else all could show the robot at the same angles.
+
+    Raises:
+        InputError: if it begins after the video's end, or nothing can be decoded.
+    """
     end = setup.end
-    if end is None:
-        end = video.duration if video.duration else setup.start + 10.0
+    if video.duration:
+        if setup.start >= video.duration:
+            raise InputError(
+                f"start = {setup.start:g} s, but {video.name} ends at {video.duration:.4g} s; allowed: a start before "
+                "its end"
+            )
+        end = video.duration if end is None else min(end, video.duration)
+    elif end is None:
+        end = setup.start + _UNKNOWN
     count = np.arange(_SAMPLES)
     shares = (count + (_GOLDEN * count) % 1.0) / _SAMPLES
     return video.samples((setup.start + (end - setup.start) * shares).tolist())

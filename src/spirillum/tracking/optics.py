@@ -15,7 +15,7 @@ from spirillum.tracking.setup import Setup
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["BodyPose", "Optics", "optics_of", "placed", "seen"]
+__all__ = ["BodyPose", "Optics", "optics_of", "placed", "places_seen_by", "seen"]
 
 
 class BodyPose(NamedTuple):
@@ -146,3 +146,9 @@ def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
 def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
     """Pixels (k, 2) of points (k, 3) of the body's frame, m."""
     return optics.pixels(placed(points, pose, optics.axis_height))
+
+
+def places_seen_by(one: Optics, other: Optics, places: Samples) -> Samples:
+    """Places (n, 2) that one camera shows where another one shows these, (n, 2), all at the height of the axis, m."""
+    points = np.column_stack([places, np.full(len(places), other.axis_height)])
+    return np.asarray(one.points(other.pixels(points), one.axis_height)[:, :2])

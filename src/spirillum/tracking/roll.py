@@ -12,7 +12,7 @@ from spirillum.kernels.pictures import even_loss, profile_of_rows, stripe_losses
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import colour_classes, named_rightly, order_seen, pattern_period, without_glare
 from spirillum.tracking.optics import BodyPose, Optics, seen
-from spirillum.tracking.setup import Setup
+from spirillum.tracking.setup import Setup, stripes_of
 from spirillum.tracking.track import Flag
 
 __all__ = ["Stripes"]
@@ -49,6 +49,10 @@ _GOOD = 0.3
 """The same, below which the colours found are believed without trying the named ones."""
 _DOUBT = 1.0
 """How much less an angle counts at which frames differ from what is expected by more than usual."""
+_WHITE = 228.0
+"""Brightness of the darkest channel from which on no colour is left."""
+_WIDE, _HALO = 10, 8
+"""Angles, `_STEP` each, from which on glare is wide, and those beside it that it makes paler than a lamp does."""
 _STEPS = 8
 """Gauss-Newton steps at most."""
 _ALIKE = 6
@@ -83,10 +87,7 @@ class Stripes:
 
     def __init__(self, robot: Robot, setup: Setup, optics: Optics) -> None:
         self.robot, self.optics = robot, optics
-        stripes = setup.robot.stripes
-        if stripes is None:
-            stripes = robot.seal.stripes if robot.seal is not None else ()
-        self.stripes: tuple[str, ...] = tuple(stripes)
+        self.stripes = stripes_of(setup, robot)
         self.names = tuple(dict.fromkeys(self.stripes))
         self.period = pattern_period(self.stripes) if self.stripes else 2.0 * np.pi
         self.order = np.array([self.names.index(name) for name in self.stripes], dtype=np.int64)
@@ -113,7 +114,7 @@ class Stripes:
             samples: pictures, 8-bit RGB (h, w, 3), and where the body is in each.
         """
         if len(self.names) < 2 or self.robot.seal is None:
-            sentence = "The robot has no stripes, so that its body's rotation cannot be seen; it is not given."
+            sentence = "the robot has no stripes, so that its body's rotation cannot be seen; it is not given"
             self.flags = (Flag("no-stripes", sentence, ("body_rotation_rate",)),)
             return
         found = [self._profile(image, pose) for image, pose in samples]
@@ -141,8 +142,8 @@ class Stripes:
         if verdict in ("reversed", "other"):
             how = "in the reversed order" if verdict == "reversed" else "in another order"
             sentence = (
-                f"The stripes are seen {how} than {', '.join(self.stripes)}; the body's rotation is not given: "
-                "check robot.stripes."
+                f"the stripes are seen {how} than {', '.join(self.stripes)}; the body's rotation is not given: "
+                "check robot.stripes"
             )
             self.flags = (Flag("stripe-order", sentence, ("body_rotation_rate",)),)
 
@@ -170,7 +171,7 @@ class Stripes:
         return float(answer[0]), float(np.sqrt(answer[1] ** 2 + _FLOOR**2 + (_LOCKED / scale.max()) ** 2))
 
     def _unreadable(self) -> Flag:
-        sentence = "The stripes are in no frame's view, so that the body's rotation is not given."
+        sentence = "the stripes are in no frame's view, so that the body's rotation is not given"
         return Flag("stripes-unreadable", sentence, ("body_rotation_rate",))
 
     def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
@@ -184,7 +185,16 @@ class Stripes:
         scale = np.maximum(scale * np.sign(scale[scale.size // 2]), 0.0)
         profile = np.empty((self.angles.size, 3))
         profile_of_rows(image, first, last, _ROWS, profile)
+        if "white" not in self.names:
+            profile[self._dazzled(profile)] = np.nan
         return profile, scale
+
+    def _dazzled(self, profile: Samples) -> np.ndarray:
+        """Angles at which wide glare hides every colour, and its halo, (n,)."""
+        white = profile.min(axis=1) > _WHITE
+        if np.count_nonzero(white) < _WIDE:
+            return np.zeros(white.shape, dtype=bool)
+        return np.asarray(np.convolve(white, np.ones(2 * _HALO + 1), mode="same") > 0.5)
 
     def _fit(self, profile: Samples, scale: Samples, look: _Look) -> Samples:
         good = np.isfinite(profile).all(axis=1) & (scale > 0.15 * scale.max())

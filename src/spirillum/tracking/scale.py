@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from spirillum.tracking.ruler import Lines
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag, Scale
 
-__all__ = ["Sight", "fitted_camera", "given_camera"]
+__all__ = ["Sight", "fitted_camera", "given_camera", "with_source"]
 
 _EXPECTED_TILT = 0.1
 """Standard deviation of the camera's tilts before anything was seen, rad."""
@@ -101,6 +102,18 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
             )
         )
     return Sight(optics, Scale(optics.length_per_pixel, _total(sources), sources, lines.lines, residual), tuple(flags))
+
+
+def with_source(scale: Scale, name: str, share: float) -> Scale:
+    """A scale that is less certain for one more reason.
+
+    Args:
+        scale: the scale.
+        name: of the reason.
+        share: its part of the uncertainty, relative.
+    """
+    sources = {**scale.sources, name: share}
+    return replace(scale, sources=sources, relative_uncertainty=_total(sources))
 
 
 def _total(sources: dict[str, float]) -> float:

@@ -13,7 +13,7 @@ from spirillum.kernels.edges import edge_scores
 from spirillum.tracking.contour import GROUPS, Contour
 from spirillum.tracking.optics import BodyPose, Optics
 
-__all__ = ["Candidate", "candidates", "most_likely", "refined"]
+__all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined"]
 
 _WIDTH = 16.0
 """Width of a body in the picture that is searched first, pixels."""
@@ -99,6 +99,30 @@ def _apart(found: list[tuple[float, BodyPose, Samples]], optics: Optics, width: 
         if all(np.hypot(pose.x - other.pose.x, pose.y - other.pose.y) > far for other in kept):
             kept.append(Candidate(pose, score))
     return kept
+
+
+def close_places(
+    image: np.ndarray,
+    still: Samples,
+    contour: Contour,
+    optics: Optics,
+    bounds: tuple[int, int, int, int],
+    *,
+    turn: float = 0.0,
+) -> list[Candidate]:
+    """The three likeliest places, looked at closely, best first.
+
+    Args:
+        image: 8-bit RGB, (h, w, 3).
+        still: what stands still in the video, (h, w, 3).
+        contour: the body's apparent edges.
+        optics: the camera.
+        bounds: part of the picture to look at.
+        turn: angle by which the body is turned round, rad.
+    """
+    rough = candidates(image, still, contour, optics, bounds, turn=turn)[:3]
+    close = [refined(image, still, one, contour, optics, bounds) for one in rough]
+    return sorted(close, key=lambda one: -one.score)
 
 
 def refined(

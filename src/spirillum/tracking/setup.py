@@ -16,7 +16,17 @@ from spirillum.robot.parts import Stripes
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 
-__all__ = ["CameraSetup", "Checkerboard", "Markers", "Region", "RobotSetup", "Setup", "TankSetup", "load_setup"]
+__all__ = [
+    "CameraSetup",
+    "Checkerboard",
+    "Markers",
+    "Region",
+    "RobotSetup",
+    "Setup",
+    "TankSetup",
+    "load_setup",
+    "stripes_of",
+]
 
 WHAT = "a setup file (TOML, see `spirillum schema setup`)"
 _Pixels = Annotated[int, Field(strict=True, ge=0, le=100_000)]
@@ -150,7 +160,7 @@ class Setup(Section):
         if self.markers.height is not None and self.markers.height >= top:
             problems.append(f"markers.height is not below {bound}; allowed: a ruler under it")
         if self.end is not None and self.end <= self.start:
-            problems.append("end is not after start; allowed: a later time")
+            problems.append(f"end = {self.end:g} s is not after start = {self.start:g} s; allowed: a later time")
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
@@ -173,3 +183,15 @@ def load_setup(path: str | Path) -> tuple[Setup, Robot]:
     name = checked.robot.file
     beside = path.parent / name
     return checked, load(beside if beside.is_file() else name)
+
+
+def stripes_of(setup: Setup, robot: Robot) -> tuple[str, ...]:
+    """Colours of the stripes in their order: the setup's, else the robot file's; empty where there are none.
+
+    Args:
+        setup: the setup.
+        robot: the robot.
+    """
+    if setup.robot.stripes is not None:
+        return tuple(setup.robot.stripes)
+    return tuple(robot.seal.stripes) if robot.seal else ()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +13,11 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.tracking.body import BodyFinder
 from spirillum.tracking.frames import Frame
-from spirillum.tracking.optics import BodyPose
-from spirillum.tracking.search import Candidate, most_likely, refined
+from spirillum.tracking.optics import BodyPose, places_seen_by
+from spirillum.tracking.search import Candidate, close_places, most_likely, refined
+from spirillum.tracking.size import SURE, OutlineFit, another_size, clearness, outline_seen, resized
 from spirillum.tracking.track import Flag
-from spirillum.tracking.warnings import close_places, start_flags
+from spirillum.tracking.warnings import start_flags
 
 __all__ = ["Start", "first_look", "on_the_way"]
 
@@ -28,12 +30,19 @@ _OFTEN = 0.25
 """Share of the frames on which it has to be as clear as that."""
 _FAINT = 0.4
 """Score of a robot over that on its best frames, below which it is not learnt from: it is partly out of view."""
+_AGAIN = 3
+"""How often a body is learnt again at the size and place at which its outline lies."""
+_ALLOWED = "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
 
 
 @dataclass(frozen=True)
 class Start:
     """What the first look has told."""
 
+    body: BodyFinder = field(repr=False)
+    """The body, which has learnt, in front of a camera that shows it as large as it looks."""
+    size: float
+    """How large it looks, over what its file says at the stated scale."""
     seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which the robot was found, 8-bit RGB, and where."""
     path: list[tuple[float, BodyPose]]
@@ -51,65 +60,108 @@ class Start:
         return score > _FAINT * self.score
 
 
-def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> Start:
-    """Find the robot on some frames and learn what its edges look like.
+class _Learnt(NamedTuple):
+    """Where the body is on the frames that it was learnt from."""
+
+    frames: list[Frame]
+    poses: list[BodyPose]
+    score: float
+    """How clear its edges usually are, grey per pixel."""
+
+    @property
+    def typical(self) -> BodyPose:
+        """One of the places, from the middle."""
+        return self.poses[len(self.poses) // 2]
+
+
+def first_look(
+    name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, *, any_size: bool = False
+) -> Start:
+    """Find the robot on some frames, and learn how large it is and what its edges look like.
+
+    A robot that does not stand out clearly is looked for at other sizes too, which takes some seconds.
 
     Args:
         name: name of the video.
-        body: the robot's body, which learns.
+        body: the robot's body at the stated scale.
         frames: frames spread over the video.
         still: what stands still in them, (h, w, 3).
+        any_size: look for it at other sizes in any case.
 
     Raises:
         InputError: if there is no robot.
     """
-    times = np.array([frame.time for frame in frames])
-    every = np.unique(np.linspace(0, len(frames) - 1, min(_SEARCHED, len(frames))).round().astype(int))
+    every = np.unique(np.linspace(0, len(frames) - 1, min(_SEARCHED, len(frames))).round().astype(int)).tolist()
     images = [frames[k].image for k in every]
-    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
-        found = list(pool.map(lambda image: close_places(body, image, still), images))
+    stated, found = body.optics, _places(body, images, still)
+    doubtful = any_size or clearness(found) < SURE
+    if doubtful and (size := another_size(body, images, still, found)) is not None:
+        body = resized(body, size)
+        found = _places(body, images, still)
     if not _clear(found):
-        advice = _advice(body, images, still)
-        raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {advice}")
+        raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
     chosen = most_likely(found, body.robot.body.length)
-    known = [(times[k], one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
-    guesses = [Candidate(on_the_way(known, frame.time), 0.0) for frame in frames]
-    starts = [
-        refined(frame.image, still, guess, body.contour, body.optics, body.bounds)
-        for frame, guess in zip(frames, guesses, strict=True)
-    ]
-    usual = float(np.quantile([start.score for start in starts], 0.8))
-    kept = [k for k, start in enumerate(starts) if start.score > _FAINT * usual]
-    placed = body.learn([frames[k].image for k in kept], [starts[k].pose for k in kept], times[kept])
-    good = [(k, one.pose) for k, one in zip(kept, placed, strict=True) if one.known]
-    if not good:
-        advice = _advice(body, images, still)
-        raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {advice}")
     flags = start_flags(body, images, still, found, chosen)
-    return Start([(frames[k].image, pose) for k, pose in good], [(times[k], pose) for k, pose in good], usual, flags)
+    known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
+    learnt = _learnt(name, body, _roughly(body, known, frames, still))
+    outline = outline_seen(body, learnt.typical)
+    for _ in range(_AGAIN):
+        if outline.fits(body.optics.length_per_pixel):
+            break
+        body, learnt = _relearnt(name, body, learnt, outline)
+        outline = outline_seen(body, learnt.typical)
+    size = body.optics.focal / stated.focal * outline.size
+    seen = [(frame.image, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
+    path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
+    return Start(body, size, seen, path, learnt.score, flags)
+
+
+def _places(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> list[list[Candidate]]:
+    """The likeliest places on some frames."""
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+        return list(pool.map(lambda image: close_places(image, still, body.contour, body.optics, body.bounds), images))
+
+
+def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
+    """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
+    found = [
+        refined(
+            frame.image, still, Candidate(on_the_way(known, frame.time), 0.0), body.contour, body.optics, body.bounds
+        )
+        for frame in frames
+    ]
+    usual = float(np.quantile([one.score for one in found], 0.8))
+    clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > _FAINT * usual]
+    return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual)
+
+
+def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
+    """Learn from frames on which the places are known to a pixel or so.
+
+    Raises:
+        InputError: if it is clear on none.
+    """
+    times = np.array([frame.time for frame in about.frames])
+    found = body.learn([frame.image for frame in about.frames], about.poses, times)
+    good = [(frame, one.pose) for frame, one in zip(about.frames, found, strict=True) if one.known]
+    if not good:
+        raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {_ALLOWED}")
+    return _Learnt([frame for frame, _ in good], [pose for _, pose in good], about.score)
+
+
+def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit) -> tuple[BodyFinder, _Learnt]:
+    """Learn again where the outline lies, in front of a camera that shows it as large as it looks."""
+    other = resized(body, outline.size) if outline.resizes else body
+    moved = np.array(learnt.poses) + np.array(outline.move)
+    there = places_seen_by(other.optics, body.optics, moved[:, :2])
+    poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
+    return other, _learnt(name, other, _Learnt(learnt.frames, poses, learnt.score))
 
 
 def _clear(found: Sequence[list[Candidate]]) -> bool:
     """Whether something stands out of the pictures as a robot does."""
     clear = [len(some) > 0 and (len(some) < 3 or some[0].score > _CLEAR * some[2].score) for some in found]
     return float(np.mean(clear)) >= _OFTEN
-
-
-def _advice(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> str:
-    """What may be wrong where no robot is seen: also a scale that is out by a factor of two."""
-    clear = {}
-    for factor in (0.5, 2.0):
-        optics = replace(body.optics, focal=body.optics.focal / factor)
-        other = BodyFinder(body.robot, optics, body.bounds)
-        found = [close_places(other, image, still) for image in images[::2]]
-        clear[factor] = float(np.median([some[0].score / some[2].score if len(some) > 2 else 0.0 for some in found]))
-    factor = max(clear, key=lambda value: clear[value])
-    if clear[factor] > 1.3 * _CLEAR:
-        return (
-            f"allowed: a scale that fits the robot, which is there with {factor:g} times the stated spacing or length "
-            "per pixel"
-        )
-    return "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
 
 
 def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:

@@ -149,8 +149,8 @@ class Wire:
         if self.handedness() == -1:
             hand = self.robot.tail.handedness
             sentence = (
-                f"The tail looks {'left' if hand == 'right' else 'right'}-handed, by how perspective shows what is "
-                f"higher, but tail.handedness is '{hand}'; its sense of rotation, and so its rate, is not given."
+                f"the tail looks {'left' if hand == 'right' else 'right'}-handed, by how perspective shows what is "
+                f"higher, but tail.handedness is '{hand}'; its sense of rotation, and so its rate, is not given"
             )
             flags.append(Flag("handedness", sentence, _TAIL))
         return tuple(flags)
@@ -170,7 +170,7 @@ class Wire:
         return 1 if misfit > -1.0 else -1
 
     def _unseen(self) -> Flag:
-        return Flag("tail-unreadable", "The wire of the tail is not seen, so that its rotation is not given.", _TAIL)
+        return Flag("tail-unreadable", "the wire of the tail is not seen, so that its rotation is not given", _TAIL)
 
     def _strip(self, pose: BodyPose) -> _Strip:
         pixels = seen(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
@@ -338,9 +338,9 @@ class Wire:
         if abs(factor - 1.0) > 0.07 and scores[best] > 1.15 * own:
             spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
             sentence = (
-                f"The tail's wavelength looks like {factor * given * 1e3:.0f} mm, but tail.wavelength is "
+                f"the tail's wavelength looks like {factor * given * 1e3:.0f} mm, but tail.wavelength is "
                 f"{given * 1e3:.3g} mm: check the robot file"
-                + ("; the tail's rotation is not given." if spoils else "; its rotation is read all the same.")
+                + ("; the tail's rotation is not given" if spoils else "; its rotation is read all the same")
             )
             self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             return
@@ -349,7 +349,7 @@ class Wire:
             if abs(share) > 0.2:
                 given = self.robot.tail.amplitude
                 sentence = (
-                    f"The tail's amplitude looks like {(1.0 + share) * given * 1e3:.1f} mm or further from that of the "
-                    f"robot file, {given * 1e3:.3g} mm: check it; the rotation is read all the same."
+                    f"the tail's amplitude looks like {(1.0 + share) * given * 1e3:.1f} mm or further from that of the "
+                    f"robot file, {given * 1e3:.3g} mm: check it; the rotation is read all the same"
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from spirillum.arrays import Samples
@@ -36,6 +37,8 @@ class Scale:
     """Number of lines of the ruler that were found; 0 where the scale was given."""
     residual: float
     """Root mean square distance of the lines from where the fit has them, pixels; NaN without a ruler."""
+    apparent_size: float = math.nan
+    """Size of the body in the picture over that of its file at this scale; NaN where it was not looked at."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.setup import Setup
+from spirillum.tracking.setup import Setup, stripes_of
 from spirillum.tracking.track import Flag
 from spirillum.units import show
 
@@ -61,9 +61,7 @@ def nyquist(setup: Setup, robot: Robot, frames_per_second: float) -> Resolvable:
         robot: the robot.
         frames_per_second: 1/s.
     """
-    stripes = setup.robot.stripes
-    if stripes is None:
-        stripes = robot.seal.stripes if robot.seal is not None else ()
+    stripes = stripes_of(setup, robot)
     body = 0.5 * pattern_period(stripes) * frames_per_second if len(set(stripes)) > 1 else np.nan
     return Resolvable(np.pi * frames_per_second, body)
 
@@ -103,8 +101,8 @@ def unwrapped(
         flags.append(
             Flag(
                 f"{part}-turns-lost",
-                f"Between {doubtful[0]:.1f} s and {doubtful[1]:.1f} s the {part} was not seen for so long that whole "
-                "turns may be missing from its angle.",
+                f"between {doubtful[0]:.1f} s and {doubtful[1]:.1f} s the {part} was not seen for so long that whole "
+                "turns may be missing from its angle",
             )
         )
     out[known] = values
@@ -194,16 +192,16 @@ def _unread(part: _Part, seen: int, total: int) -> Flag:
     name, what = ("stripes-unreadable", "stripes") if part == "body" else ("tail-unreadable", "tail")
     if seen < 4:
         return Flag(
-            name, f"The {what} could be read on {seen} of {total} frames; the rotation is not given.", _RATES[part]
+            name, f"the {what} could be read on {seen} of {total} frames; the rotation is not given", _RATES[part]
         )
-    return Flag(name, f"The {what} could be read on {seen} of {total} frames only.")
+    return Flag(name, f"the {what} could be read on {seen} of {total} frames only")
 
 
 def _jumps(part: _Part) -> Flag:
     return Flag(
         f"aliased-{part}",
-        f"The {part}'s angle jumps from frame to frame without order: it turns too fast for this frame rate, or it is "
-        "misread; its rotation is not given.",
+        f"the {part}'s angle jumps from frame to frame without order: it turns too fast for this frame rate, or it is "
+        "misread; its rotation is not given",
         _RATES[part],
     )
 
@@ -211,8 +209,8 @@ def _jumps(part: _Part) -> Flag:
 def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
     return Flag(
         f"aliased-{part}",
-        f"The {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
-        f"rotation is doubtful; allowed: below {LARGEST_STEP:g}, with more frames a second; its rotation is not given.",
+        f"the {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
+        f"rotation is doubtful; allowed: below {LARGEST_STEP:g}, with more frames a second; its rotation is not given",
         _RATES[part],
     )
 
@@ -220,8 +218,8 @@ def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
 def _other_rate(part: _Part, rate: float, other: float) -> Flag:
     return Flag(
         f"aliased-{part}",
-        f"By the uneven times of the frames the {part} turns at {other / (2 * np.pi):.3g} Hz rather than "
-        f"{rate / (2 * np.pi):.3g} Hz, too fast for this frame rate; its rotation is not given.",
+        f"by the uneven times of the frames the {part} turns at {other / (2 * np.pi):.3g} Hz rather than "
+        f"{rate / (2 * np.pi):.3g} Hz, too fast for this frame rate; its rotation is not given",
         _RATES[part],
     )
 
@@ -262,22 +260,22 @@ def contradictions(
     if turns and abs(body_turned) > _TURNED and body * tail > 0:
         if hand_seen > 0:
             sentence = (
-                "Body and tail seem to turn the same way, as no free swimmer does, though the tail's hand is as given: "
-                "its rate is likely too fast for this frame rate, or the order of the stripes is wrong; none is given."
+                "body and tail seem to turn the same way, as no free swimmer does, though the tail's hand is as given: "
+                "its rate is likely too fast for this frame rate, or the order of the stripes is wrong; none is given"
             )
             return (Flag("aliased-tail", sentence, (*_RATES["tail"], *_RATES["body"])),)
         sentence = (
-            "Body and tail seem to turn the same way, as no free swimmer does: tail.handedness or the order of the "
-            "stripes is wrong, or the tail is too fast for this frame rate; neither rotation is given."
+            "body and tail seem to turn the same way, as no free swimmer does: tail.handedness or the order of the "
+            "stripes is wrong, or the tail is too fast for this frame rate; neither rotation is given"
         )
         return (Flag("handedness", sentence, (*_RATES["tail"], *_RATES["body"])),)
     far = abs(moved) > 0.05 * robot.body.length
-    if turns and far and (flags := _not_driven(moved, tail_turned, robot)):
+    if far and np.isfinite(tail_phase).any() and (flags := _not_driven(moved, tail_turned, robot)):
         return flags
     if turns and abs(body) > 1.5 * abs(tail):
         sentence = (
-            "The body seems to turn faster than its tail: the tail may be too fast for this frame rate "
-            f"({abs(tail) / (2 * np.pi):.3g} Hz is the least rate that fits)."
+            "the body seems to turn faster than its tail: the tail may be too fast for this frame rate "
+            f"({abs(tail) / (2 * np.pi):.3g} Hz is the least rate that fits)"
         )
         return (Flag("aliased-tail", sentence),)
     return ()
@@ -285,16 +283,18 @@ def contradictions(
 
 def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
     """A way that no tail drives which turns as this one seems to."""
-    advance = 2 * np.pi * moved / tail_turned
-    if advance * robot.hand < 0:
-        why = "moves against the sense in which its tail seems to turn"
-        what = "the tail is too fast for this frame rate, tail.handedness is wrong"
-    elif abs(advance) > _WALLS * _largest_advance(robot):
-        why = f"advances {show(abs(advance), 'mm')} a turn of its tail, more than such a wire can in a viscous fluid"
-        what = "the tail is too fast for this frame rate"
-    else:
+    turns, what = abs(tail_turned) / (2 * np.pi), "the tail is too fast for this frame rate"
+    if abs(tail_turned) > _TURNED and moved * tail_turned * robot.hand < 0:
+        why, what = "moves against the sense in which its tail seems to turn", f"{what}, tail.handedness is wrong"
+    elif abs(moved) <= turns * _WALLS * _largest_advance(robot):
         return ()
-    sentence = f"The robot {why}: {what}, or something else moves the robot; the tail's rotation is not given."
+    elif abs(tail_turned) > _TURNED:
+        why = (
+            f"advances {show(abs(moved) / turns, 'mm')} a turn of its tail, more than such a wire can in viscous fluid"
+        )
+    else:
+        why = "moves while its tail seems to rest"
+    sentence = f"the robot {why}: {what}, or something else moves the robot; the tail's rotation is not given"
     return (Flag("aliased-tail", sentence, _RATES["tail"]),)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.optics import Optics
-from spirillum.tracking.search import Candidate, candidates, refined
+from spirillum.tracking.search import Candidate, close_places
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 
@@ -24,32 +24,19 @@ _SECOND = 0.75
 """Score of a second robot over that of the first."""
 _CLEAR = 1.3
 """The same over the next best place."""
-_TURNED = 1.15
-"""Score of a robot the other way round over that of the stated direction."""
+_MAYBE, _TURNED = 0.85, 1.05
+"""Score of a robot the other way round over that of the stated direction, from which on more frames are asked, and
+from which on it is said."""
 _OFTEN = 0.6
 """Share of the frames in which something has to be seen to be said."""
 _ASKED = 3
-"""Every how manieth frame is also looked at the other way round."""
+"""Every how manieth frame is looked at the other way round first."""
 _LOST = 0.03
 """Share of frames without the robot that is said."""
 _PART = 0.97
 """Share of the edges in the picture below which the robot is partly out of view."""
 _HIDDEN = 0.55
 """Share of the edges that fit below which glare, shadows or bubbles are said."""
-
-
-def close_places(body: BodyFinder, image: np.ndarray, still: Samples, *, turn: float = 0.0) -> list[Candidate]:
-    """The three likeliest places, looked at closely, best first.
-
-    Args:
-        body: the robot's body.
-        image: 8-bit RGB, (h, w, 3).
-        still: what stands still in the video, (h, w, 3).
-        turn: angle by which the body is turned round, rad.
-    """
-    rough = candidates(image, still, body.contour, body.optics, body.bounds, turn=turn)[:3]
-    close = [refined(image, still, one, body.contour, body.optics, body.bounds) for one in rough]
-    return sorted(close, key=lambda one: -one.score)
 
 
 def start_flags(
@@ -69,7 +56,7 @@ def start_flags(
         chosen: the one that was taken for the robot.
     """
     flags, second, count = [], 0, 0
-    asked: list[tuple[np.ndarray, float]] = []
+    seen: list[tuple[np.ndarray, float]] = []
     half = 0.5 * body.robot.body.length
     for image, others, one in zip(images, found, chosen, strict=True):
         if one is None:
@@ -77,8 +64,7 @@ def start_flags(
         count += 1
         apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
         second += any(other.score > max(_SECOND * one.score, _CLEAR * others[2].score) for other in apart)
-        if count % _ASKED == 1:
-            asked.append((image, others[0].score))
+        seen.append((image, others[0].score))
     if count and second > _OFTEN * count:
         flags.append(
             Flag(
@@ -88,20 +74,33 @@ def start_flags(
                 EVERYTHING,
             )
         )
-    with ThreadPoolExecutor(_THREADS) as pool:
-        backs = pool.map(lambda one: close_places(body, one[0], still, turn=np.pi), asked)
-        turned = [back[0].score / score if back else 0.0 for back, (_, score) in zip(backs, asked, strict=True)]
-    side = "left" if body.optics.leftward else "right"
-    if turned and float(np.median(turned)) > _TURNED:
+    turned = _turned(body, seen[::_ASKED], still)
+    if turned > _MAYBE:
+        turned = _turned(body, seen, still)
+    if turned > _TURNED:
+        side = "left" if body.optics.leftward else "right"
         flags.append(
             Flag(
                 "nose-on-the-other-side",
                 f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits "
-                f"{float(np.median(turned)):.2g} times better; all signs would be wrong, so that nothing is given",
+                f"{turned:.2g} times better; all signs would be wrong, so that nothing is given",
                 EVERYTHING,
             )
         )
     return tuple(flags)
+
+
+def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
+    """How much better a body the other way round fits, usually; of each frame its score as stated is given."""
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+        backs = pool.map(
+            lambda image: close_places(image, still, body.contour, body.optics, body.bounds, turn=np.pi),
+            [image for image, _ in seen],
+        )
+        ratios = [
+            back[0].score / max(score, 1e-9) if back else 0.0 for back, (_, score) in zip(backs, seen, strict=True)
+        ]
+    return float(np.median(ratios)) if ratios else 0.0
 
 
 def _apart(other: Candidate, one: Candidate, half: float) -> bool:

@@ -1,0 +1,87 @@
+"""A wrong scale makes the body look too large or too small: speeds are doubted or withheld, rates are not touched."""
+
+import numpy as np
+import pytest
+
+from spirillum.tracking.follow import follow
+from spirillum.tracking.setup import load_setup
+
+pytest.importorskip("av")
+pytest.importorskip("cv2")
+
+FRAMES, FPS = 24, 4.0
+
+
+def slope(time, values):
+    known = np.isfinite(values)
+    return np.polyfit(time[known], values[known], 1)[0]
+
+
+@pytest.fixture(scope="module")
+def film(flat_pictures, tmp_path_factory):
+    """A drawn film and a function that tracks it with some lines of the setup changed."""
+    flat = flat_pictures.Flat(frames=FRAMES, fps=FPS, velocity=1e-3, body_rate=-0.4, tail_rate=3.0, noise=2.0)
+    path = tmp_path_factory.mktemp("size") / "a.mp4"
+    setup = flat.write(path)
+
+    def tracked(**changes):
+        setup.write_text(flat.setup_text(**changes))
+        return follow(path, *load_setup(setup))
+
+    return flat, tracked
+
+
+def flags(track):
+    return {flag.name: flag for flag in track.flags}
+
+
+def test_the_right_scale_is_not_doubted(film):
+    found = film[1]()
+    assert found.scale.apparent_size == pytest.approx(1.0, abs=0.01)
+    assert "size-does-not-fit" not in flags(found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "size"),
+    [({"markers_spacing": '"1.9 mm"'}, 0.95), ({"robot_axis_height": '"25 mm"'}, 175 / 185)],
+    ids=["spacing", "depth"],
+)
+def test_a_scale_off_by_a_twentieth_widens_the_interval_beyond_its_error(film, changes, size):
+    flat, tracked = film
+    found = tracked(**changes)
+    assert found.scale.apparent_size == pytest.approx(size, abs=0.012)
+    flag = flags(found)["size-does-not-fit"]
+    assert not flag.spoils
+    off = abs(slope(found.time, found.position[:, 0]) / flat.velocity - 1.0)
+    assert off == pytest.approx(1.0 - size, abs=0.01)
+    assert off < 1.96 * found.scale.relative_uncertainty
+    assert found.scale.sources["size of the body"] == pytest.approx(abs(np.log(size)), abs=0.015)
+    assert slope(found.time, found.body_angle) == pytest.approx(flat.body_rate, rel=5e-3)
+    assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
+
+
+def test_a_stated_uncertainty_of_depth_explains_it(film):
+    flat, tracked = film
+    found = tracked(robot_axis_height='"25 mm"', robot_axis_height_uncertainty='"10 mm"')
+    assert "size-does-not-fit" not in flags(found)
+    assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
+
+
+@pytest.mark.parametrize(("spacing", "size"), [("4 mm", 2.0), ("1 mm", 0.5)])
+def test_a_scale_off_by_two_gives_rates_and_no_speed(film, spacing, size):
+    flat, tracked = film
+    found = tracked(markers_spacing=f'"{spacing}"')
+    assert found.scale.apparent_size == pytest.approx(size, rel=0.02)
+    assert "forward_velocity" in flags(found)["size-does-not-fit"].spoils
+    assert "lateral_position" in flags(found)["size-does-not-fit"].spoils
+    assert slope(found.time, found.body_angle) == pytest.approx(flat.body_rate, rel=5e-3)
+    assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
+
+
+def test_a_robot_at_rest_is_placed_by_its_outline_and_its_tail_is_read(flat_pictures, tmp_path):
+    flat = flat_pictures.Flat(frames=FRAMES, fps=FPS, velocity=0.0, body_rate=0.0, tail_rate=2.0)
+    found = follow(tmp_path / "a.mp4", *load_setup(flat.write(tmp_path / "a.mp4")))
+    assert np.nanmedian(found.heading) == pytest.approx(0.0, abs=np.radians(0.6))
+    assert slope(found.time, found.position[:, 0]) == pytest.approx(0.0, abs=2e-6)
+    assert slope(found.time, found.tail_phase) == pytest.approx(2.0, rel=5e-3)
+    assert not [flag for flag in found.flags if flag.spoils]
