@@ -108,7 +108,7 @@ def test_one_sentence_and_code_2(
         (b"[body", "is not TOML"),
         (b"body = 1\n", "body = 1"),
         (b"a = " + b"[" * 4000 + b"]" * 4000, "nested too deeply"),
-        (b"a." * 2000 + b"b = 1\n", "body is missing"),
+        (b"a." * 2000 + b"b = 1\n", "a is not a known field"),
         (b'extends = "nothing"\n', "extends"),
         (b'extends = "biorob2012-wide"\n[tail]\nwavelength = nan\n', "tail.wavelength = nan"),
         (b'extends = "biorob2012-wide"\n[tail]\nwavelength = 1979-05-27\n', "tail.wavelength"),

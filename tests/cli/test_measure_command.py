@@ -54,6 +54,16 @@ def test_readings_by_hand_alone_are_measured(run: Run, tmp_path: Path, setup_fil
     assert run("observations", "check", str(folder / "observations.csv")).code == 0
 
 
+def test_two_readings_are_shown_without_interval_and_with_the_reason(run: Run, tmp_path: Path, setup_file: str) -> None:
+    marks = tmp_path / "marks.csv"
+    marks.write_text("time_s,x_mm,tail_phase_deg,body_angle_deg\n0,0,0,0\n2,3,360,-36\n")
+    common = ("--setup", setup_file, "--marks", str(marks), "--no-tracking", "--no-figures")
+    outcome = run("measure", "a.mp4", *common, "-o", str(tmp_path / "out"))
+    assert outcome.code == 0
+    assert "95 % interval" not in outcome.out
+    assert "no interval of forward velocity, body rotation rate, tail rotation rate" in outcome.out.replace("\n", " ")
+
+
 def test_feasibility_says_yes_and_no(run: Run, setup_file: str) -> None:
     common = ("measure", "--feasibility", "--setup", setup_file, "--expect-speed", "1mm/s", "--expect-body-rate=-0.1Hz")
     fine = run(*common, "--expect-tail-rate", "1.2Hz", "--view-width", "160mm")

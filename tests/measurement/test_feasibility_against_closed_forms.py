@@ -54,6 +54,27 @@ def test_sizes_and_time_in_view(setup_file: Path) -> None:
     assert "fewer than" in " ".join(coarse.warnings)
 
 
+def test_intervals_are_those_of_the_time_in_view(setup_file: Path) -> None:
+    """At 10 mm/s the 55 mm of room last 5.5 s, whatever the trial's length."""
+    common = {**RATES, "speed": "10 mm/s", "view_width": "160 mm"}
+    long, short = (feasibility(setup_file, **common, duration=time) for time in ("20 s", "5.5 s"))
+    assert long.measured == pytest.approx(5.5)
+    assert short.measured == pytest.approx(5.5)
+    assert long.feasible
+    for name, (reach, _) in short.intervals.items():
+        assert long.intervals[name][0] == pytest.approx(reach, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("view", "words"), [("60 mm", "never fits into a view of 60 mm"), ("105.05 mm", "fewer than the 4 frames")]
+)
+def test_a_robot_that_is_never_in_view_has_no_interval_and_no_verdict(setup_file: Path, view: str, words: str) -> None:
+    found = feasibility(setup_file, **RATES, view_width=view)
+    assert not found.feasible
+    assert dict(found.intervals) == {}
+    assert any(words in sentence for sentence in found.warnings)
+
+
 def test_unknown_numbers_are_predicted_or_left_out(setup_file: Path) -> None:
     found = feasibility(setup_file, tail_rate="1.2 Hz")
     value, source = found.expected["forward_velocity"]

@@ -44,6 +44,8 @@ def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robo
         assert dict(found.sizes) == {"time": 300, "space": 2}
         assert all("units" in variable.attrs for variable in found.data_vars.values())
         assert np.array_equal(found["position"].values, track.position)
+        assert found["body_angle"].attrs["known_modulo"] == pytest.approx(np.pi)  # two times four colours
+        assert found["tail_phase"].attrs["known_modulo"] == pytest.approx(2 * np.pi)
         line = found["position"].values[:, 0] - found["forward_velocity_residual"].values
         known = np.isfinite(line)
         slope = np.polyfit(track.time[known], line[known], 1)[0]
@@ -154,6 +156,8 @@ def test_the_report_stands_alone_and_says_flags_and_failures(
     page = (tmp_path / "out" / "report.html").read_text()
     assert "the robot left the view at 8 s &lt;b&gt;&amp;" in page
     assert "c.mp4 is no film" in page
+    assert "faster or slower by whole multiples of 30 Hz" in page
+    assert "a body that turns faster or slower by whole multiples of 15 Hz" in page
     assert "http" not in page.replace("http-equiv", "")
     assert page.count("data:image/png;base64,") == 1
     assert (tmp_path / "out" / "figures" / "series-b.svg").exists()
@@ -164,7 +168,9 @@ def test_the_report_stands_alone_and_says_flags_and_failures(
     ("options", "words"),
     [
         ({"tracking": False}, "--no-tracking without --marks"),
-        ({"start": 5.0, "end": 4.0}, "start = 5 s, end = 4.0 s"),
+        ({"start": 5.0, "end": 4.0}, "end = 4 s; allowed: later than the start, 5 s"),
+        ({"end": 0.0}, "end = 0 s; allowed: later than the start, 0 s"),
+        ({"start": -1.0}, "start = -1 s; allowed: 0 s or later"),
         ({"track": "t.csv"}, "track = t.csv with 2 videos; allowed: one video"),
         ({"overrides": {"tail.wavelength": "0 mm"}}, "tail.wavelength"),
     ],

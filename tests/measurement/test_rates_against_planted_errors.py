@@ -61,6 +61,20 @@ def test_intervals_cover_the_truth_as_often_as_they_say(errors: Callable[..., An
     assert covered >= 24
 
 
+def test_three_readings_by_hand_that_agree_by_chance_do_not_look_certain() -> None:
+    time, eye = np.array([0.0, 2.0, 4.0]), np.full(3, 0.1)
+    rate = rate_of(time, 1.5 * time, eye, read=np.ones(3, dtype=bool))
+    assert rate.value == pytest.approx(1.5)
+    # one residual of the eye's size beside one of none: t of two degrees of freedom, 4.303, times 0.1/sqrt(2)/sqrt(8)
+    assert rate.high - rate.value == pytest.approx(4.302653 * 0.1 / np.sqrt(2.0) / np.sqrt(8.0), rel=1e-6)
+    rng = np.random.default_rng(3)
+    inside = 0
+    for _ in range(300):
+        rate = rate_of(time, 1.5 * time + rng.normal(0.0, 0.1, 3), eye, read=np.ones(3, dtype=bool))
+        inside += rate.low <= 1.5 <= rate.high
+    assert inside >= 276  # of 300 at 95 %, fewer come up less than once in a hundred times
+
+
 def test_white_noise_gives_the_interval_of_least_squares() -> None:
     """sigma sqrt(12/n)/T, within the price of not knowing that it is white."""
     rng = np.random.default_rng(1)

@@ -9,7 +9,7 @@ import pytest
 
 from spirillum import InputError
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Ruled, check_times, corrected, read_marks, track_of_marks
+from spirillum.measurement.marks import Ruled, check_times, corrected, frames_read, read_marks, track_of_marks
 from spirillum.measurement.trials import trial_of
 from spirillum.tracking.track import Scale, Track
 
@@ -78,6 +78,36 @@ def test_a_corrected_frame_replaces_what_was_seen(tmp_path: Path, make_track: Ca
     assert np.array_equal(right.tail_phase[:100], track.tail_phase[:100])
     item = trial_of(right, robot).quantities["tail_rotation_rate"]
     assert item.low <= 7.0 <= item.high
+
+
+def test_readings_by_hand_stay_in_a_track_that_is_far_smoother(
+    tmp_path: Path, make_track: Callable[..., Track], robot: Any
+) -> None:
+    """Half a pixel off is 15 times the track's own noise, and nothing for a click; 100 pixels are a slip of the pen."""
+    track = make_track()
+    clicked = (319.5 + 1e-3 * frame / 30 / PIXEL + 0.5 for frame in (30, 90, 150, 210))
+    rows = [f"{frame},{x:.6f}" for frame, x in zip((30, 90, 150, 210), clicked, strict=True)]
+    path = written(tmp_path, "frame,x_px\n" + "\n".join([*rows, "270,900"]))
+    marks = read_marks(path)[""]
+    read = frames_read(track, marks)
+    assert list(np.flatnonzero(read)) == [30, 90, 150, 210, 270]
+    trial = trial_of(corrected(track, marks, RULED), robot, read=read)
+    residual = trial.fits["forward_velocity"].residual
+    assert np.isfinite(residual[[30, 90, 150, 210]]).all()
+    assert np.isnan(residual[270])
+    item = trial.quantities["forward_velocity"]
+    assert item.low <= 1e-3 <= item.high
+
+
+def test_two_readings_have_no_interval_and_say_why(
+    tmp_path: Path, make_track: Callable[..., Track], robot: Any
+) -> None:
+    marks = read_marks(written(tmp_path, "time_s,x_mm\n0,0\n2,3\n"))[""]
+    track = track_of_marks(marks, make_track().setup, "a.mp4", None, None)
+    assert track.flags[0].sentence == "both readings were taken by hand, from marks.csv"
+    answer = trial_of(track, robot).to_dict()["forward_velocity"]
+    assert answer == {"value": pytest.approx(1.5e-3), "unit": "m/s", "reason": answer["reason"]}
+    assert answer["reason"].startswith("two readings")
 
 
 def test_trackpy_and_deeplabcut_give_the_same_speed(

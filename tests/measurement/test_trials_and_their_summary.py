@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
+from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.summary import compared, summary_of
-from spirillum.measurement.trials import trial_of
+from spirillum.measurement.trials import RATE_NAMES, WOBBLES, trial_of
 from spirillum.tracking.track import Flag, Track
 
 Make = Callable[..., Track]
@@ -94,9 +95,36 @@ def test_a_body_that_hardly_turns_says_why_its_interval_is_wide(make_track: Make
 def test_two_frames_of_a_camera_are_not_a_measurement(make_track: Make, robot: Any) -> None:
     trial = trial_of(make_track(span=2 / 30), robot)
     assert trial.track.time.size == 2
+    assert [flag.name for flag in trial.flags] == ["too-few-frames"]
     answer = trial.to_dict()
-    assert answer["forward_velocity"]["value"] is None
-    assert answer["forward_velocity"]["reason"] == "it was read on too few frames, or on none"
+    for name in RATE_NAMES:
+        assert answer[name]["value"] is None
+        assert answer[name]["reason"] == "only 2 frames were measured; a rate needs at least 4"
+
+
+def test_a_flag_is_said_once_and_a_cause_without_its_consequence(make_track: Make, robot: Any) -> None:
+    body = ("body_rotation_rate",)
+    flags = (
+        Flag("no-stripes", "the robot has no stripes", body),
+        Flag("stripes-unreadable", "the stripes could be read on 0 of 300 frames", body),
+        Flag("tail-unreadable", "one cause"),
+        Flag("tail-unreadable", "one cause"),
+        Flag("tail-unreadable", "another cause"),
+    )
+    trial = trial_of(make_track(flags=flags), robot, "a")
+    assert [flag.sentence for flag in trial.flags] == ["the robot has no stripes", "one cause", "another cause"]
+    assert trial.quantities["body_rotation_rate"].reason == "the robot has no stripes"
+    rows = observation_rows([trial], robot, "setup.toml")
+    assert rows is not None
+    assert "flags: no-stripes, tail-unreadable\n" in rows
+
+
+def test_an_amplitude_over_trials_is_not_negative(make_track: Make, robot: Any) -> None:
+    trials = [trial_of(make_track(seed=seed, body=-1.9), robot) for seed in range(3)]
+    found = summary_of(trials).quantities
+    lows = [found[name].low for name in WOBBLES]
+    assert min(lows) == 0.0
+    assert all(np.isfinite(lows))
 
 
 def test_an_outlying_trial_is_flagged_and_still_counts(make_track: Make, robot: Any) -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from spirillum.errors import InputError
 from spirillum.robot import load
+from spirillum.robot.load import raw_table
 
 LENGTHS = 'for example "18 mm"'
 HUGE = 10**400
@@ -140,6 +141,15 @@ def test_duty_belongs_to_the_motor() -> None:
         load("biorob2012-wide", drive={"kind": "rate", "rate": "1 Hz", "duty": 0.5})
 
 
+def test_a_misspelt_field_is_told_before_the_one_that_is_missing_for_it() -> None:
+    table = raw_table("biorob2012-wide")[0]
+    table["tail"]["wavelenght"] = table["tail"].pop("wavelength")
+    with pytest.raises(
+        InputError, match=r"^the robot: tail.wavelenght is not a known field \(did you mean wavelength\?\)"
+    ):
+        load(table)
+
+
 def test_all_problems_are_kept_and_the_first_is_told() -> None:
     wrong = {"tail.wavelength": "25", "tail.handedness": "up", "fluid.viscosity": "-1 Pa s"}
     with pytest.raises(InputError, match=r"\(and 2 more: ") as caught:
@@ -160,9 +170,9 @@ WRONG_FILES: list[tuple[bytes, str]] = [
     (b"just words", "is not TOML"),
     (b"a = " + b"[" * 50_000, "nested too deeply"),
     (b"a = " + b"9" * 10_000, "too long"),
-    (b"a = " + b"[" * 300 + b"]" * 300, "is missing"),
-    (b"[" + b".".join([b"a"] * 5000) + b"]\nb = 1", "is missing"),
-    (b"[tail." + b".".join([b"a"] * 900) + b"]\nb = 1", "missing"),
+    (b"a = " + b"[" * 300 + b"]" * 300, "is not a known field"),
+    (b"[" + b".".join([b"a"] * 5000) + b"]\nb = 1", "is not a known field"),
+    (b"[tail." + b".".join([b"a"] * 900) + b"]\nb = 1", "is not a known field"),
     (b'extends = "biorob2012-wide"\n[tail.' + b".".join([b"a"] * 500) + b"]\nb = 1", "tail"),
     (b'extends = "biorob2012-wild"', "(did you mean biorob2012-wide?)"),
     (b"extends = 5", "biorob2012-narrow, biorob2012-wide"),

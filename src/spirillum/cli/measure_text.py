@@ -6,11 +6,11 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.text import Answer, grid, in_unit
+from spirillum.measurement.shown import UNITS, Shown, shown
+from spirillum.measurement.trials import MEASURED, RATE_NAMES
+from spirillum.units import shown_in
 
 __all__ = ["feasibility", "measurement"]
-
-_MAIN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate", "motor_rotation_rate")
-_UNITS = {"m/s": "mm/s", "rad/s": "Hz", "m": "mm", "rad": "deg", "s": "s"}
 
 
 def measurement(answer: Answer, console: Console) -> None:
@@ -22,17 +22,33 @@ def measurement(answer: Answer, console: Console) -> None:
     title = "means over trials" if several else f"{answer['robot']}: {trials[0]['name']}"
     table = grid(title, "quantity", "value", "low", "high", "unit", *(["trials"] if several else []))
     for name, item in summary.items():
-        if isinstance(item, dict) and (item["value"] is not None or name in _MAIN):
+        if isinstance(item, dict) and (item["value"] is not None or name in RATE_NAMES):
             table.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
     console.print(table)
-    words = "Student's t over trials" if several else "from the trial's own residuals"
-    scale = 100 * summary["scale_uncertainty"]
-    share = f"; the scale's standard uncertainty of {scale:.2g} % is in lengths whole" if scale else ""
-    console.print(f"low and high: 95 % interval, {words}{share}", highlight=False, soft_wrap=True)
+    _show_intervals(answer, console, several=several)
     if answer["files"]:
-        shown = [name for name in answer["files"] if not name.startswith("figures/")]
-        files = f"{len(answer['files'])} files, among them {', '.join(shown[-3:])}"
+        listed = [name for name in answer["files"] if not name.startswith("figures/")]
+        files = f"{len(answer['files'])} files, among them {', '.join(listed[-3:])}"
         console.print(escape(files), highlight=False, soft_wrap=True)
+
+
+def _show_intervals(answer: Answer, console: Console, *, several: bool) -> None:
+    """What the intervals are, and why there is none where there is none."""
+    scale = 100 * answer["summary"]["scale_uncertainty"]
+    known = [
+        (name.replace("_", " "), item)
+        for items in (answer["summary"], *answer["trials"])
+        for name, item in items.items()
+        if name in MEASURED and item["value"] is not None
+    ]
+    if any("low" in item for _, item in known):
+        words = "Student's t over trials" if several else "from the trial's own residuals"
+        share = f"; the scale's standard uncertainty of {scale:.2g} % is in lengths whole" if scale else ""
+        console.print(f"low and high: 95 % interval, {words}{share}", highlight=False, soft_wrap=True)
+    reasons = {item["reason"] for _, item in known if "low" not in item}
+    for reason in sorted(reasons):
+        names = dict.fromkeys(name for name, item in known if item.get("reason") == reason)
+        console.print(f"no interval of {', '.join(names)}: {escape(reason)}", highlight=False, soft_wrap=True)
 
 
 def _show_trials(answer: Answer, console: Console) -> None:
@@ -40,17 +56,13 @@ def _show_trials(answer: Answer, console: Console) -> None:
     title = f"{answer['robot']}: {len(trials)} trials"
     table = grid(title, "trial", "quantity", "value", "low", "high", "unit")
     for trial in trials:
-        for row, name in enumerate(_MAIN):
+        for row, name in enumerate(RATE_NAMES):
             table.add_row(escape(trial["name"]) if row == 0 else "", name.replace("_", " "), *_numbers(trial[name]))
     console.print(table)
 
 
-def _numbers(item: Answer) -> tuple[str, str, str, str]:
-    unit = _UNITS[item["unit"]]
-    if item["value"] is None:
-        return "-", "-", "-", ""
-    value, low, high = (in_unit(item.get(key), item["unit"], unit) for key in ("value", "low", "high"))
-    return value, low, high, unit
+def _numbers(item: Answer) -> Shown:
+    return shown(item["value"], item.get("low"), item.get("high"), item["unit"])
 
 
 def feasibility(answer: Answer, console: Console) -> None:
@@ -58,20 +70,20 @@ def feasibility(answer: Answer, console: Console) -> None:
     verdict = "all rates can be resolved" if answer["feasible"] else "[bold]not all rates can be resolved[/bold]"
     expected = grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from")
     for name, item in answer["expected"].items():
-        unit = _UNITS.get(item["unit"], item["unit"])
-        value = f"{item['value']:.4g}" if unit == item["unit"] else in_unit(item["value"], item["unit"], unit)
-        expected.add_row(name.replace("_", " "), value, unit, item["source"])
+        unit = UNITS.get(item["unit"], item["unit"])
+        expected.add_row(name.replace("_", " "), in_unit(item["value"], item["unit"], unit), unit, item["source"])
     console.print(expected)
     for check in answer["checks"]:
         mark = "yes" if check["passed"] else "[red]NO[/red] "
         console.print(f"{mark:<4} {escape(check['sentence'])}", highlight=False, soft_wrap=True)
     if answer["intervals"]:
-        table = grid("expected 95 % interval of one trial", "quantity", "half width", "unit", "share")
+        span = f"{answer['time_measured']['value']:.4g} s"
+        table = grid(f"expected 95 % interval of one trial, {span} long", "quantity", "half width", "unit", "share")
         for name, item in answer["intervals"].items():
             reach = item["half_width"]
-            unit = _UNITS[reach["unit"]]
+            unit = UNITS[reach["unit"]]
             share = "-" if item["share"] is None else f"{100 * item['share']:.2g} %"
-            table.add_row(name.replace("_", " "), in_unit(reach["value"], reach["unit"], unit), unit, share)
+            table.add_row(name.replace("_", " "), f"{shown_in(reach['value'], unit):.2g}", unit, share)
         console.print(table)
         console.print(f"basis: {answer['basis']}", highlight=False, soft_wrap=True)
     scale, parts = 100 * answer["scale_uncertainty"], answer["scale_sources"]

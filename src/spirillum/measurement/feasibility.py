@@ -14,7 +14,7 @@ from spirillum.measurement.depth import depth_shares
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.setup import Setup, load_setup
+from spirillum.tracking.setup import Setup, load_setup, stripes_of
 from spirillum.tracking.unwrapping import LARGEST_STEP
 from spirillum.units import KINDS, Hz, parse_option
 
@@ -36,6 +36,10 @@ _TOGETHER = 4.0
 _EDGE_TOGETHER = 20.0
 """The same of the stripes' edges."""
 _NORMAL = 1.959964
+_FEWEST = 4
+"""Fewest frames in view that give a rate."""
+_FOREVER = 1e9
+"""Time in view of a robot that does not move, s."""
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Fewest pixels with which the trackers' tests have been passed with room to spare."""
 _BASIS = (
@@ -80,7 +84,12 @@ class Feasibility:
     """What is expected: value in SI and where it is from."""
     checks: tuple[Check, ...]
     intervals: Mapping[str, tuple[float, float]]
-    """Half width of the 95 % interval that one trial is expected to have, and that share of the value."""
+    """Half width of the 95 % interval that one trial is expected to have, and that share of the value.
+
+    Empty where nothing tells how large a pixel is, or the robot never fits into the view.
+    """
+    measured: float
+    """Time of a trial in which the robot is in view as a whole, s."""
     shares: Mapping[str, float]
     """Relative standard uncertainty of lengths by what it comes from."""
     warnings: tuple[str, ...]
@@ -110,6 +119,7 @@ class Feasibility:
             "feasible": self.feasible,
             "expected": expected,
             "checks": [check.to_dict() for check in self.checks],
+            "time_measured": quantity(self.measured, "s"),
             "intervals": intervals,
             "scale_uncertainty": math.sqrt(sum(share**2 for share in self.shares.values())),
             "scale_sources": dict(self.shares),
@@ -168,10 +178,14 @@ def feasibility(
         "frames_per_second": (rate, source_of_rate),
     }
     expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
-    stripes = chosen.robot.stripes or (robot.seal.stripes if robot.seal else ())
+    stripes = stripes_of(chosen, robot)
     shares = depth_shares(chosen)
-    checks = [*_rates(expected, rate, tuple(stripes)), *_pixels(chosen, robot, pixel, len(stripes))]
-    checks += _views(expected, robot, pixel, width, span)
+    checks = [*_rates(expected, rate, stripes), *_pixels(chosen, robot, pixel, len(stripes))]
+    measured = span
+    if math.isfinite(pixel):
+        view = _view(expected, robot, pixel * width, span, rate)
+        checks.append(view)
+        measured = min(span, view.value)
     warnings = [check.sentence for check in checks if not check.passed]
     if not math.isfinite(pixel):
         warnings.append(
@@ -180,8 +194,9 @@ def feasibility(
         )
     if not shares:
         warnings.append("the setup gives no uncertainty of heights: 10 mm of depth can be 7 % of a length")
-    intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, span)
-    return Feasibility(robot, str(setup), expected, tuple(checks), intervals, shares, tuple(warnings))
+    seen = math.isfinite(pixel) and measured * rate >= _FEWEST
+    intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
+    return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, tuple(warnings))
 
 
 def _expected(
@@ -261,26 +276,33 @@ def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Chec
     for name, (words, length) in sizes.items():
         value, limit = length / pixel, _SMALLEST[name]
         passed = value >= limit
-        sentence = f"{words} is {value:.3g} pixels wide, {'at least' if passed else 'fewer than'} {limit:g}"
+        size = f"{value:.3g}"
+        pixels = "pixel" if size == "1" else "pixels"
+        sentence = f"{words} is {size} {pixels} wide, {'at least' if passed else 'fewer than'} {limit:g}"
         found.append(Check(f"{name}-pixels", value, limit, "1", passed, decides=False, sentence=sentence))
     return found
 
 
-def _views(
-    expected: Mapping[str, tuple[float, str]], robot: Robot, pixel: float, width: int, span: float
-) -> list[Check]:
-    if not math.isfinite(pixel):
-        return []
-    view, length = pixel * width, robot.body.length + robot.coupling.length + robot.tail.length
-    room, speed = max(view - length, 0.0), abs(expected["forward_velocity"][0])
-    time = room / speed if speed > 0 else 1e9
-    passed = time >= span
-    long = "long" if time >= 1e6 else f"{time:.4g} s"
+def _view(expected: Mapping[str, tuple[float, str]], robot: Robot, view: float, span: float, rate: float) -> Check:
+    """Whether the robot is in view for a whole trial; it decides if that is too short for any rate."""
+    length = robot.body.length + robot.coupling.length + robot.tail.length
+    whole = f"the whole robot ({1e3 * length:.4g} mm)"
+    if view <= length:
+        sentence = f"{whole} never fits into a view of {1e3 * view:.4g} mm: no rate and no interval can be expected"
+        return Check("time-in-view", 0.0, span, "s", passed=False, decides=True, sentence=sentence)
+    speed = abs(expected["forward_velocity"][0])
+    time = min((view - length) / speed, _FOREVER) if speed > 0 else _FOREVER
+    stays, few = time >= span, min(time, span) * rate < _FEWEST
+    long = "ever" if time >= _FOREVER else f"{time:.4g} s"
     sentence = (
-        f"the whole robot ({1e3 * length:.4g} mm) stays in a view of {1e3 * view:.4g} mm for "
-        f"{long}, {'as long as' if passed else 'shorter than'} a trial of {span:g} s"
+        f"{whole} stays in a view of {1e3 * view:.4g} mm for {long}, "
+        f"{'at least as long as' if stays else 'shorter than'} a trial of {span:g} s"
     )
-    return [Check("time-in-view", min(time, 1e9), span, "s", passed, decides=False, sentence=sentence)]
+    if few:
+        sentence += f": fewer than the {_FEWEST} frames that a rate needs"
+    elif not stays:
+        sentence += ": intervals are those of the time in view"
+    return Check("time-in-view", time, span, "s", stays and not few, decides=few, sentence=sentence)
 
 
 def _intervals(
@@ -293,9 +315,7 @@ def _intervals(
     span: float,
 ) -> dict[str, tuple[float, float]]:
     """Half widths of 95 % intervals of one trial: the slope of n frames over a time T has sigma sqrt(12/n)/T."""
-    if not math.isfinite(pixel):
-        return {}
-    slope = math.sqrt(12.0 * _TOGETHER / max(span * rate, 3.0)) / span
+    slope = math.sqrt(12.0 * _TOGETHER / (span * rate)) / span
     speed, body = expected["forward_velocity"][0], abs(expected["body_rotation_rate"][0])
     scale = math.sqrt(sum(share**2 for share in shares.values()))
     found = {"forward_velocity": math.hypot(_POSITION_ERROR * pixel * slope, scale * speed)}

@@ -11,12 +11,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
+from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.tables import Row, Table, read_table
-from spirillum.measurement.trials import BY_HAND
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag, Scale, Track
 
-__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "check_times", "corrected", "read_marks", "track_of_marks"]
+__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "check_times", "corrected", "frames_read", "read_marks", "track_of_marks"]
 
 _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
@@ -218,28 +218,35 @@ def track_of_marks(
     if np.any(np.diff(time[order]) <= 0):
         raise InputError(f"{marks.path}: two readings are of the same time; allowed: rising times")
     inside = order[(time[order] >= setup.start) & (time[order] <= (setup.end or np.inf))]
-    count = inside.size
     scale = ruled.scale if ruled else Scale(math.nan, 0.0, {}, 0, math.nan)
-    nothing = np.full(count, np.nan)
-    picture = np.concatenate([marks.pixels[inside], np.full((count, 2), np.nan)], axis=1)
-    click = _CLICK * (scale.length_per_pixel if ruled else 1e-4)
+    nothing = np.full(inside.size, np.nan)
+    picture = np.concatenate([marks.pixels[inside], np.full((inside.size, 2), np.nan)], axis=1)
+    click = nothing if ruled is None else np.full(inside.size, _CLICK * scale.length_per_pixel)
+    glance = np.full(inside.size, _GLANCE)
     return Track(
         time=time[inside], frame=marks.frame[inside], position=_positions(marks, ruled)[inside], heading=nothing,
         body_angle=marks.body_angle[inside], tail_phase=marks.tail_phase[inside],
-        position_error=nothing + click, body_angle_error=nothing + _GLANCE, tail_phase_error=nothing + _GLANCE,
+        position_error=click, body_angle_error=glance, tail_phase_error=glance,
         picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
         flags=(
-            Flag(BY_HAND, f"all {count} readings were taken by hand, from {marks.path.name}"), *_counted_flag(marks)
+            Flag(BY_HAND, f"{_all_readings(inside.size)} taken by hand, from {marks.path.name}"), *_counted_flag(marks)
         ),
     )  # fmt: skip
+
+
+def _all_readings(count: int) -> str:
+    """All readings, and the verb that goes with them."""
+    few = {1: "the only reading was", 2: "both readings were"}
+    return few.get(count, f"all {count} readings were")
 
 
 def _counted_flag(marks: Marks) -> tuple[Flag, ...]:
     """What has to be known where angles were read within a turn."""
     if not marks.counted:
         return ()
+    verb = "was" if len(marks.counted) == 1 else "were"
     sentence = (
-        f"{' and '.join(marks.counted)} was read within a turn, and counted on the shorter way between readings: "
+        f"{' and '.join(marks.counted)} {verb} read within a turn, and counted on the shorter way between readings: "
         "the rate is right only if less than half a turn passed between them"
     )
     return (Flag("counted-within-a-turn", sentence),)
@@ -259,6 +266,7 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
         InputError: if a reading belongs to no frame of the track; the sentence names its row.
     """
     index = _frames_of(track, marks)
+    frames = "1 frame carries a reading" if index.size == 1 else f"{index.size} frames carry readings"
     position, body, tail = track.position.copy(), track.body_angle.copy(), track.tail_phase.copy()
     errors = [track.position_error.copy(), track.body_angle_error.copy(), track.tail_phase_error.copy()]
     read = _positions(marks, ruled)
@@ -271,14 +279,30 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
         known = np.isfinite(by_hand)
         angle[index[known]] = _nearest_turn(track.time, angle, index[known], by_hand[known])
         error[index[known]] = _GLANCE
-    flag = Flag("corrected-by-hand", f"{index.size} frames carry readings by hand, from {marks.path.name}")
+    flag = Flag("corrected-by-hand", f"{frames} by hand, from {marks.path.name}")
     return replace(
         track, position=position, body_angle=body, tail_phase=tail, position_error=errors[0],
         body_angle_error=errors[1], tail_phase_error=errors[2], flags=(*track.flags, flag),
     )  # fmt: skip
 
 
+def frames_read(track: Track, marks: Marks) -> np.ndarray:
+    """Frames of a track that were read by hand, truth values, (n,).
+
+    Args:
+        track: the track.
+        marks: the readings.
+
+    Raises:
+        InputError: if a reading belongs to no frame of the track; the sentence names its row.
+    """
+    found = np.zeros(track.time.size, dtype=bool)
+    found[_frames_of(track, marks)] = True
+    return found
+
+
 def _frames_of(track: Track, marks: Marks) -> np.ndarray:
+    """Place in the track of each reading."""
     step = float(np.median(np.diff(track.time))) if track.time.size > 1 else np.inf
     found = np.empty(marks.frame.size, dtype=np.int64)
     for number, (frame, time) in enumerate(zip(marks.frame, marks.time, strict=True)):

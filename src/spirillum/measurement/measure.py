@@ -12,13 +12,14 @@ from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import output_folder, whole_file, write_dataset, write_text
 from spirillum.measurement.annotate import annotated_film
+from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Marks, check_times, corrected, read_marks, track_of_marks
+from spirillum.measurement.marks import Marks, check_times, corrected, frames_read, read_marks, track_of_marks
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_dataset, series_dataset
 from spirillum.measurement.sight import Sighted, sighted
 from spirillum.measurement.summary import Summary, compared, summary_of
-from spirillum.measurement.trials import RATE_NAMES, Trial, says_synthetic, trial_of
+from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.tracking.setup import Setup, load_setup
@@ -159,8 +160,10 @@ def _loaded(
         beside = Path(setup).parent / chosen.robot.file
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
     first, last = chosen.start if start is None else start, chosen.end if end is None else end
-    if not math.isfinite(first) or first < 0 or (last is not None and not last > first):
-        raise InputError(f"start = {first:g} s, end = {last} s; allowed: a start from 0 s on, and an end after it")
+    if not (math.isfinite(first) and first >= 0):
+        raise InputError(f"start = {first:g} s; allowed: 0 s or later")
+    if last is not None and not last > first:
+        raise InputError(f"end = {last:g} s; allowed: later than the start, {first:g} s")
     return chosen.model_copy(update={"start": first, "end": last}), robot
 
 
@@ -252,9 +255,11 @@ class _Work:
             ruled = sight.ruled
             track = replace(self._of_tables(path, sight, marks, table), words=sight.words)
             marks = marks if table is not None else None
+        read = None  # no frame was corrected
         if marks is not None:
+            read = frames_read(track, marks)
             track = corrected(track, marks, ruled)
-        trial = trial_of(track, self.robot, name)
+        trial = trial_of(track, self.robot, name, read)
         if self.folder is not None:
             self._write(self.folder / f"{name}.nc", series_dataset(trial, self.robot))
             self._write(self.folder / f"{name}.movement.nc", movement_dataset(trial, self.robot))

@@ -10,7 +10,7 @@ likelihood (Harville 1974), so that a short stretch with a long memory gives a w
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -71,12 +71,18 @@ class Rate:
         return bool(np.isfinite(self.value))
 
 
-NOTHING = Rate(np.nan, np.nan, np.nan, 0, 0, steady=True, memory=0.0)
+_NOTHING = Rate(np.nan, np.nan, np.nan, 0, 0, steady=True, memory=0.0)
 """A rate of a series without two frames."""
 
 
 def rate_of(
-    time: Samples, values: Samples, error: Samples | None = None, cycles: Sequence[Cycle] = (), level: float = 0.95
+    time: Samples,
+    values: Samples,
+    error: Samples | None = None,
+    cycles: Sequence[Cycle] = (),
+    level: float = 0.95,
+    *,
+    read: np.ndarray | None = None,
 ) -> Rate:
     """Mean rate of a series and its interval.
 
@@ -86,22 +92,26 @@ def rate_of(
         error: standard error of each frame, (n,); only their ratios are used.
         cycles: errors that come back with an angle.
         level: confidence level.
+        read: frames that were read by hand, truth values, (n,): they are left out only beyond six of their own errors,
+            which also widen the interval of a few readings that agree by chance.
 
     Returns:
         The slope; where the rate is seen to change, the mean from end to end.
     """
     known = np.isfinite(values) & np.isfinite(time)
-    stray = stray_frames(time, values)
+    stray = stray_frames(time, values, None if read is None or error is None else np.where(read, error, np.nan))
     used = known & ~stray
     count = int(used.sum())
     if count < 2 or np.ptp(time[used]) <= 0:
-        return NOTHING
+        return replace(_NOTHING, frames=count)
     weights = _weights(error, used)
     t, y = time[used], values[used]
     middle, half = 0.5 * float(t[0] + t[-1]), 0.5 * float(t[-1] - t[0])
     s = (t - middle) / half
     if count < _FEWEST:
-        value, low, high = _few(s, y, weights, level)
+        by_eye = error is not None and read is not None and read[used].all() and np.isfinite(error[used]).all()
+        eye = error[used] if error is not None and by_eye else None
+        value, low, high = _few(s, y, weights, level, eye)
         found = (value / half, low / half, high / half)
         line = np.polynomial.polynomial.polyfit(s, y, 1)
         residual = _residual(values, used, y - line[0] - line[1] * s)
@@ -159,8 +169,11 @@ def _weights(error: Samples | None, used: np.ndarray) -> Samples:
     return np.asarray(1.0 / np.clip(ratio, 1.0 / 3.0, 3.0) ** 2)
 
 
-def _few(s: Samples, y: Samples, weights: Samples, level: float) -> tuple[float, float, float]:
-    """Slope of a handful of readings with independent errors."""
+def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | None) -> tuple[float, float, float]:
+    """Slope of a handful of readings with independent errors.
+
+    Three readings may lie on a line by chance: where an eye's errors are known, they count as one more residual.
+    """
     from scipy.stats import t
 
     design = np.stack([np.ones_like(s), s], axis=1) * np.sqrt(weights)[:, None]
@@ -169,8 +182,10 @@ def _few(s: Samples, y: Samples, weights: Samples, level: float) -> tuple[float,
     free = s.size - 2
     if free == 0:
         return float(beta[1]), np.nan, np.nan
-    misfit = float(np.sum((y * np.sqrt(weights) - design @ beta) ** 2)) / free
-    reach = float(t.ppf(0.5 + 0.5 * level, free) * np.sqrt(misfit * inverse[1, 1]))
+    squares = float(np.sum((y * np.sqrt(weights) - design @ beta) ** 2))
+    if eye is not None:
+        squares, free = squares + float(np.mean(weights * eye**2)), free + 1
+    reach = float(t.ppf(0.5 + 0.5 * level, free) * np.sqrt(squares / free * inverse[1, 1]))
     return float(beta[1]), float(beta[1] - reach), float(beta[1] + reach)
 
 

@@ -43,7 +43,7 @@ def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str |
         text.write("# SYNTHETIC: the videos say that they are computed; nothing was measured.\n")
     text.write(f"# Measured from video with {_safe(setup)}: one row a trial, signed about the swimming direction.\n")
     for trial in kept:
-        flags = ", ".join(flag.name for flag in trial.flags)
+        flags = ", ".join(dict.fromkeys(flag.name for flag in trial.flags))
         text.write(f"# trial {_safe(trial.name)}: {_safe(trial.video)}{'; flags: ' + flags if flags else ''}\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow((*_KEYS, *_SEEN.values()))

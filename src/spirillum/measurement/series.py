@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer import versions
-from spirillum.measurement.trials import RATE_NAMES, Trial
+from spirillum.measurement.trials import LEVEL, RATE_NAMES, Trial
 from spirillum.robot.robot import Robot
+from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.setup import stripes_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,11 +31,16 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
     import xarray as xr
 
     track = trial.track
+    stripes = stripes_of(track.setup, robot)
     series = {
         "frame": (track.frame, "1", "number of the frame in the video"),
         "heading": (track.heading, "rad", "angle of the motor axis to the x axis in the plane of the picture"),
-        "body_angle": (track.body_angle, "rad", "angle by which the body has turned about +x, unwrapped"),
-        "tail_phase": (track.tail_phase, "rad", "phase of the tail about +x in the lab, unwrapped"),
+        "body_angle": (
+            track.body_angle,
+            "rad",
+            "angle by which the body has turned about +x, unwrapped; 0: stripe 1 faces +z",
+        ),
+        "tail_phase": (track.tail_phase, "rad", "phase phi of the tail about +x in the lab, unwrapped"),
         "position_error": (track.position_error, "m", "estimated standard error of x"),
         "body_angle_error": (track.body_angle_error, "rad", "estimated standard error of the body's angle"),
         "tail_phase_error": (track.tail_phase_error, "rad", "estimated standard error of the tail's phase"),
@@ -46,7 +53,10 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
     data: dict[str, Any] = {
         "position": (
             ("time", "space"), track.position,
-            {"units": "m", "long_name": "the body's mid-length from the middle of the picture, at the axis's height"},
+            {
+                "units": "m", "long_name": "the body's mid-length from the middle of the picture, at the axis's height",
+                "comment": "in the annotated film x counts from the first frame",
+            },
         ),
         "pixel": (
             ("time", "space"), track.picture[:, :2],
@@ -56,8 +66,13 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
     data |= {
         name: ("time", values, {"units": unit, "long_name": words}) for name, (values, unit, words) in series.items()
     }
+    for name, period in (("body_angle", pattern_period(stripes) if stripes else 2 * np.pi), ("tail_phase", 2 * np.pi)):
+        data[name][2].update(
+            known_modulo=period,
+            comment="all of it may be off by whole multiples of known_modulo (rad), after which everything looks alike",
+        )
     for name, item in trial.quantities.items():
-        more = {"low": item.low, "high": item.high, "level": 0.95} if np.isfinite(item.low) else {}
+        more = {"low": item.low, "high": item.high, "level": LEVEL} if np.isfinite(item.low) else {}
         reason = {"reason": item.reason} if item.reason else {}
         data[name if name != "heading" else "mean_heading"] = ((), item.value, {"units": item.unit, **more, **reason})
     return xr.Dataset(
@@ -73,6 +88,7 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
             "video": trial.video,
             "length_per_pixel": track.scale.length_per_pixel,
             "scale_relative_uncertainty": track.scale.relative_uncertainty,
+            "apparent_body_size": track.scale.apparent_size,
             "scale_sources": json.dumps(dict(track.scale.sources)),
             "flags": "\n".join(f"{flag.name}: {flag.sentence}" for flag in trial.flags),
             "setup": json.dumps(track.setup.model_dump(), sort_keys=True),

@@ -19,7 +19,7 @@ _LEAST = 0.25
 """A step that is small against the whole series' own spread is no stray, however smooth its neighbours are."""
 
 
-def stray_frames(time: Samples, values: Samples) -> np.ndarray:
+def stray_frames(time: Samples, values: Samples, error: Samples | None = None) -> np.ndarray:
     """Frames that lie more than six standard deviations (from the median deviation) from their neighbours.
 
     First from the median of nine neighbours about a robust line, which finds single frames; then from the line
@@ -28,6 +28,8 @@ def stray_frames(time: Samples, values: Samples) -> np.ndarray:
     Args:
         time: times, (n,).
         values: the series, (n,); NaN where it was not measured.
+        error: standard error of frames that are known to be less sure than their neighbours, such as those read by
+            hand, (n,); NaN of others. Such a frame is a stray only beyond six of it.
 
     Returns:
         Truth values, (n,).
@@ -38,13 +40,14 @@ def stray_frames(time: Samples, values: Samples) -> np.ndarray:
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
     if known.size < 2 * _WINDOW:
         return found
+    own = np.zeros(values.shape) if error is None else np.nan_to_num(error)
     level = values[known] - _robust_line(time[known], values[known])
     near = level - median_filter(level, _WINDOW, mode="nearest")
-    strays = _far(near, _LEAST * _spread(level))
+    strays = _far(near, np.maximum(_LEAST * _spread(level), own[known]))
     kept = known[~strays]
     found[known[strays]] = True
     level = values[kept] - _robust_line(time[kept], values[kept])
-    bursts = _far(level)
+    bursts = _far(level, own[kept])
     if bursts.mean() < 0.1:
         found[kept[bursts]] = True
     return found
@@ -54,11 +57,10 @@ def _spread(deviation: Samples) -> float:
     return _MAD * float(np.median(np.abs(deviation - np.median(deviation))))
 
 
-def _far(deviation: Samples, least: float = 0.0) -> np.ndarray:
-    spread = max(_spread(deviation), least)
-    if spread <= 0:
-        return np.zeros(deviation.shape, dtype=bool)
-    return np.asarray(np.abs(deviation - np.median(deviation)) > _REACH * spread)
+def _far(deviation: Samples, least: Samples) -> np.ndarray:
+    """Where a deviation is more than six of its spread, or of the least standard error of each."""
+    spread = np.maximum(_spread(deviation), least)
+    return np.asarray((np.abs(deviation - np.median(deviation)) > _REACH * spread) & (spread > 0))
 
 
 def _robust_line(time: Samples, values: Samples) -> Samples:

@@ -9,7 +9,7 @@ from typing import Any
 
 from spirillum.measurement.statistics import mean_with_interval
 from spirillum.measurement.strays import GRUBBS_LEVEL, outlying_trial
-from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, Measured, Trial
+from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial
 from spirillum.tracking.track import Flag
 
 __all__ = ["Summary", "compared", "summary_of"]
@@ -64,7 +64,10 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     reach = mean.half_width
     if name in _LENGTHS:
         reach = math.hypot(reach, _NORMAL * shared * mean.value)
-    return Measured(mean.value, mean.value - reach, mean.value + reach, measured[0].unit)
+    low = mean.value - reach
+    if name in WOBBLES:
+        low = max(low, 0.0)  # an amplitude
+    return Measured(mean.value, low, mean.value + reach, measured[0].unit)
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:

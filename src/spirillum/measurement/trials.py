@@ -11,28 +11,27 @@ import numpy as np
 
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
+from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
 from spirillum.measurement.strays import stray_frames
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.setup import stripes_of
 from spirillum.tracking.track import Flag, Track
 
 __all__ = [
-    "BY_HAND",
     "LEVEL",
     "MEASURED",
     "RATE_NAMES",
-    "SYNTHETIC",
     "WOBBLES",
     "Measured",
     "Trial",
-    "says_synthetic",
     "trial_of",
 ]
 
 LEVEL = 0.95
 """Level of all intervals."""
-RATE_NAMES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate", "motor_rotation_rate")
+RATE_NAMES = (*SEEN, "motor_rotation_rate")
 """What is measured by a slope."""
 WOBBLES = (
     "lateral_wobble_at_tail_rate",
@@ -43,10 +42,6 @@ WOBBLES = (
 """Amplitudes of the motion across, and of the heading, that come back with tail or body."""
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
 """All that a trial measures, and a summary over trials."""
-BY_HAND = "by-hand"
-"""Name of the flag of a track that was read by hand alone."""
-SYNTHETIC = "synthetic"
-"""The word by which computed videos are known, and the name of the flag."""
 _NORMAL = 1.959964
 _PIXEL_ERROR = 0.03
 """Least usual size of errors of the position that come back with an angle or with each pixel, pixels."""
@@ -63,17 +58,20 @@ _PLACE = 0.15
 _HEADING = math.radians(0.2)
 """The same of the heading, rad, for a body that is `_LONG` pixels long."""
 _LONG = 100.0
-_MANY_STRAYS = 0.02
 _FEW_TURNS = 2.0
 _DEGREE = 5
 _FEWEST = 12
 _UNSTEADY = 0.5
 """rad, root mean square."""
+_TOO_FEW = "it was read on too few frames"
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A number with its 95 % interval, SI; NaN where it was not measured, and then a reason."""
+    """A number with its 95 % interval, SI; NaN where it was not measured.
+
+    The reason says why there is no number, or no interval.
+    """
 
     value: float
     low: float
@@ -82,11 +80,11 @@ class Measured:
     reason: str = ""
 
     def to_dict(self, **more: Any) -> dict[str, Any]:
-        """As JSON: null with its reason where it was not measured, without an interval where there is none."""
+        """As JSON: with its interval; null where it was not measured, or without an interval, and then a reason."""
         if not math.isfinite(self.value):
             return quantity(None, self.unit, reason=self.reason or "it was not seen", **more)
         if not math.isfinite(self.low):
-            return quantity(self.value, self.unit, **more)
+            return quantity(self.value, self.unit, reason=self.reason, **more)
         interval = {"low": self.low, "high": self.high, "kind": "interval", "level": LEVEL}
         return quantity(self.value, self.unit, **interval, **more)
 
@@ -139,21 +137,26 @@ class Trial:
                 "relative_uncertainty": scale.relative_uncertainty,
                 "sources": dict(scale.sources),
                 "markers": scale.markers,
+                "apparent_body_size": scale.apparent_size if math.isfinite(scale.apparent_size) else None,
             },
             "flags": [{"name": f.name, "sentence": f.sentence, "spoils": list(f.spoils)} for f in self.flags],
         }
 
 
-def trial_of(track: Track, robot: Robot, name: str = "") -> Trial:
+def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None = None) -> Trial:
     """Measure one track.
 
     Args:
         track: what was seen on every frame.
         robot: the robot, for its stripes.
         name: name of the trial.
+        read: frames that were corrected by hand, truth values, (n,); all are where the track was read by hand alone.
     """
-    fits = _fits(track, robot)
-    flags = (*track.flags, *_own_flags(fits, track, robot))
+    by_hand = any(flag.name == BY_HAND for flag in track.flags)
+    if by_hand:
+        read = np.ones(track.time.size, dtype=bool)
+    fits = _fits(track, robot, read)
+    flags = flags_of(fits, track, robot)
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
     quantities |= {name: _widened(fits[name], "rad/s", *_slow_angles(track, name)) for name in rates}
@@ -161,7 +164,7 @@ def trial_of(track: Track, robot: Robot, name: str = "") -> Trial:
     quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _PLACE * pixel)
     quantities["heading"] = _mean(track, track.heading, "rad", _HEADING * _LONG * pixel / robot.body.length)
     quantities |= _wobbles(track)
-    if not any(flag.name == BY_HAND for flag in flags):
+    if not by_hand:
         quantities = {name: _with_interval(item) for name, item in quantities.items()}
     return Trial(track, _spoiled(quantities, flags), fits, flags, name)
 
@@ -170,14 +173,14 @@ def _with_interval(item: Measured) -> Measured:
     """No number of a camera stands without an interval; two readings by hand may."""
     if math.isfinite(item.low) or not math.isfinite(item.value):
         return item
-    return Measured.missing(item.unit, "it was read on too few frames, or on none")
+    return Measured.missing(item.unit, _TOO_FEW)
 
 
-def _fits(track: Track, robot: Robot) -> dict[str, Rate]:
+def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
     time, pixel = track.time, track.scale.length_per_pixel
     body, tail = _smooth(time, track.body_angle), _smooth(time, track.tail_phase)
     x = track.position[:, 0]
-    stripes = track.setup.robot.stripes or (robot.seal.stripes if robot.seal else ())
+    stripes = stripes_of(track.setup, robot)
     around = max(len(stripes), 1)
     repeats = round(2 * np.pi / pattern_period(stripes)) if stripes else 1
     of_x = []
@@ -195,10 +198,10 @@ def _fits(track: Track, robot: Robot) -> dict[str, Rate]:
     difference = track.tail_phase - track.body_angle
     error = np.hypot(track.tail_phase_error, track.body_angle_error)
     return {
-        "forward_velocity": rate_of(time, x, track.position_error, of_x),
-        "body_rotation_rate": rate_of(time, track.body_angle, track.body_angle_error, of_body),
-        "tail_rotation_rate": rate_of(time, track.tail_phase, track.tail_phase_error, of_tail),
-        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail]),
+        "forward_velocity": rate_of(time, x, track.position_error, of_x, read=read),
+        "body_rotation_rate": rate_of(time, track.body_angle, track.body_angle_error, of_body, read=read),
+        "tail_rotation_rate": rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
+        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read),
     }
 
 
@@ -232,7 +235,9 @@ def _turns(angle: Samples) -> bool:
 def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
     """A rate whose interval holds standard errors beside that of the fit."""
     if not rate.measured:
-        return Measured.missing(unit, "it was read on too few frames, or on none")
+        return Measured.missing(unit, _TOO_FEW if rate.frames else "it was not read on any frame")
+    if not math.isfinite(rate.low):
+        return Measured(rate.value, math.nan, math.nan, unit, "two readings leave no errors to tell it from")
     reach = _NORMAL * math.hypot(*errors)
     low = rate.value - math.hypot(rate.value - rate.low, reach)
     return Measured(rate.value, low, rate.value + math.hypot(rate.high - rate.value, reach), unit)
@@ -261,12 +266,13 @@ def _velocity(rate: Rate, track: Track) -> Measured:
 def _mean(track: Track, values: Samples, unit: str, lasting: float) -> Measured:
     """A mean, whose interval holds a standard error that lasts all along."""
     value, low, high = mean_of(track.time, values)
-    reason = "" if math.isfinite(value) else "it was not seen"
+    if not math.isfinite(value):
+        return Measured.missing(unit, "it was not seen")
+    if not math.isfinite(low):
+        return Measured(value, low, high, unit, "few readings do not tell how their errors hang together")
     shared = track.scale.relative_uncertainty * abs(value) if unit == "m" else 0.0
-    if math.hypot(shared, lasting) > 0.0:
-        reach = _NORMAL * math.hypot(shared, lasting)
-        low, high = value - math.hypot(value - low, reach), value + math.hypot(high - value, reach)
-    return Measured(value, low, high, unit, reason)
+    reach = _NORMAL * math.hypot(shared, lasting)
+    return Measured(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach), unit)
 
 
 def _wobbles(track: Track) -> dict[str, Measured]:
@@ -293,50 +299,9 @@ def _amplitude(time: Samples, values: Samples, angle: Samples, unit: str, part: 
     return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
 
 
-def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:
-    flags = []
-    if says_synthetic(track.words):
-        flags.append(Flag(SYNTHETIC, "the video says of itself that it is synthetic: nothing here is measured"))
-    for name in RATE_NAMES[:3]:
-        rate, words = fits[name], name.replace("_", " ")
-        if not rate.measured:
-            continue
-        if not rate.steady:
-            sentence = f"the {words} changes along the video; given is its mean from end to end"
-            flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
-        if rate.strays > _MANY_STRAYS * (rate.frames + rate.strays):
-            sentence = f"{rate.strays} frames lie far from their neighbours and were left out of the {words}"
-            flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
-    stripes = track.setup.robot.stripes or (robot.seal.stripes if robot.seal else ())
-    turned = _range(track.body_angle)
-    if stripes and fits["body_rotation_rate"].measured and turned < 2 * np.pi / len(stripes):
-        flags.append(
-            Flag(
-                "short-turn",
-                f"the body turned by {math.degrees(turned):.3g} deg, less than one stripe: errors that come back with "
-                "every stripe cannot be seen, so their usual size widens the interval of its rate",
-            )
-        )
-    return flags
-
-
-def says_synthetic(words: str) -> bool:
-    """Whether a file says of itself that it is synthetic.
-
-    Args:
-        words: its title and comment.
-    """
-    return SYNTHETIC in words.lower()
-
-
-def _range(values: Samples) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.ptp(known)) if known.size else 0.0
-
-
 def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dict[str, Measured]:
-    """Null what a flag spoils, and what follows from it."""
-    found = dict(quantities)
+    """Null what a flag spoils, and what follows from it; the first flag is the reason."""
+    found, spoiled = dict(quantities), set[str]()
     for flag in flags:
         names = set(flag.spoils)
         if names & {"tail_rotation_rate", "body_rotation_rate"}:
@@ -347,7 +312,7 @@ def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dic
             for kind in ("lateral", "heading")
             if f"{part}_rotation_rate" in flag.spoils
         }
-        for name in names & set(found):
-            if math.isfinite(found[name].value) or not found[name].reason:
-                found[name] = Measured.missing(found[name].unit, flag.sentence)
+        for name in (names & set(found)) - spoiled:
+            found[name] = Measured.missing(found[name].unit, flag.sentence)
+        spoiled |= names
     return found

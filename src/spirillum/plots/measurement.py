@@ -41,8 +41,8 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
     if len(measurement.trials) > 1:
         found["trials"] = Picture(
             "The trials",
-            "Each trial with its own 95 % interval, and the mean over trials with Student's interval (band), which for "
-            "the velocity holds the shared uncertainty of the scale.",
+            "Each trial with its own 95 % interval (where it is wider than the dot), and the mean over trials with "
+            "Student's interval (band), which for the velocity holds the shared uncertainty of the scale.",
             "Speeds and rates of the trials with error bars, and the band of their mean",
             lambda: trials_figure(measurement),
         )
@@ -83,9 +83,9 @@ def trial_figure(trial: Trial) -> Figure:
 
 
 def _say_synthetic(figure: Figure, *, synthetic: bool) -> None:
-    """In the upper right corner, where a video says of itself that it is computed."""
+    """In the lower right corner, where a video says of itself that it is computed."""
     if synthetic:
-        figure.text(0.99, 0.985, "synthetic", ha="right", va="top", size=8.0, color="#9c3d00")
+        figure.text(0.99, 0.015, "synthetic", ha="right", va="bottom", size=8.0, color="#9c3d00")
 
 
 def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate, words: str, unit: str) -> None:
@@ -104,6 +104,9 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
         return
     line = values - rate.residual
     left.plot(time[known], scale(line)[known], "-", color=COLOURS["black"], linewidth=0.9)
+    if not np.isfinite(rate.low):  # a line through two readings leaves nothing but rounding
+        right.text(0.5, 0.5, "two readings", transform=right.transAxes, ha="center", color="#777777")
+        return
     small = Scale.of(rate.residual, "m") if unit == "m" else Scale(np.pi / 180, "deg")
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
@@ -126,7 +129,7 @@ def trials_figure(measurement: Measurement) -> Figure:
             axes.axhline(mean.value / scale.factor, color="#444444", linewidth=0.8)
         reach = np.array([[item.value - item.low for item in items], [item.high - item.value for item in items]])
         reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
-        axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], capsize=2.5, linewidth=1.0)
+        axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
         axes.set_title(f"{title}, {scale.unit}", fontsize=8.0)
         axes.set_xlim(0.4, len(items) + 0.6)
         axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])

@@ -9,18 +9,21 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from spirillum.files import output_folder, write_text
+from spirillum.measurement.flags import BY_HAND
+from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured
 from spirillum.report.write import EmbeddedPicture
-from spirillum.units import Hz
+from spirillum.tracking.colours import pattern_period
+from spirillum.tracking.setup import stripes_of
 
 if TYPE_CHECKING:
     from spirillum.measurement.measure import Measurement
     from spirillum.measurement.trials import Trial
 
-__all__ = ["shown_quantities", "write_measurement_report"]
-
-_UNITS = {"m/s": (1e-3, "mm/s"), "rad/s": (Hz, "Hz"), "m": (1e-3, "mm"), "rad": (math.pi / 180, "deg")}
+__all__ = ["write_measurement_report"]
 
 
 def write_measurement_report(
@@ -64,13 +67,13 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = (files("spirillum.report") / "measurement.html.jinja").read_text(encoding="utf-8")
-    scale = measurement.trials[0].track.scale
+    scale = max((trial.track.scale for trial in measurement.trials), key=lambda scale: scale.relative_uncertainty)
     sources = sorted(scale.sources.items(), key=lambda item: -item[1])
     return environment.from_string(template).render(
         title=f"{measurement.robot.name}: measured from video",
         setup=Path(measurement.setup).name,
         trials=[_trial(trial, pictures, thumbnails) for trial in measurement.trials],
-        summary=shown_quantities(measurement.summary.quantities, measurement.summary.counts),
+        summary=_rows(measurement.summary.quantities, measurement.summary.counts),
         count=len(measurement.trials),
         failures=measurement.failures,
         interrupted=measurement.interrupted,
@@ -78,6 +81,8 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
         overview=[picture for picture in pictures if picture.name == "trials"],
         scale=f"{100 * scale.relative_uncertainty:.2g} %",
         sources=[(name, f"{100 * share:.2g} %") for name, share in sources],
+        alike=_looks_alike(measurement),
+        intervals=any(math.isfinite(item.low) for trial in measurement.trials for item in trial.quantities.values()),
         files=[name for name in measurement.files if not name.startswith("figures/")],
         versions=versions(),
     )
@@ -91,45 +96,41 @@ def _trial(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Mapping[st
         "name": trial.name,
         "video": trial.video,
         "size": f"{track.time.size} frames, {span:.4g} s",
-        "rows": shown_quantities(trial.quantities),
+        "rows": _rows(trial.quantities),
         "flags": trial.flags,
         "thumbnail": f"data:image/jpeg;base64,{base64.b64encode(data).decode('ascii')}" if data else "",
         "pictures": [picture for picture in pictures if picture.name == f"series-{trial.name}"],
     }
 
 
-def shown_quantities(
-    quantities: Mapping[str, Measured], counts: Mapping[str, int] | None = None
-) -> list[dict[str, str]]:
-    """Rows of a table for people: name, value, low, high, unit, number of trials, and why a value is missing.
+def _looks_alike(measurement: Measurement) -> str:
+    """What no camera can tell of a rate, with the numbers of these films where all have the same."""
+    angles = ("body_rotation_rate", "tail_rotation_rate")
+    seen = [trial for trial in measurement.trials if any(trial.fits[name].frames > 2 for name in angles)]
+    seen = [trial for trial in seen if all(flag.name != BY_HAND for flag in trial.flags)]
+    if not seen:
+        return ""
+    pace = {f"{1.0 / np.median(np.diff(trial.track.time)):.4g}" for trial in seen}
+    stripes = stripes_of(seen[0].track.setup, measurement.robot)
+    tail, body = "the frame rate", "the frame rate times the turns after which the stripes look the same"
+    if len(pace) == 1:
+        (text,) = pace
+        tail, body = f"{text} Hz", f"{float(text) * pattern_period(stripes or ('',)) / (2 * np.pi):.4g} Hz"
+    also = f", and so does a body that turns faster or slower by whole multiples of {body}" if stripes else ""
+    return (
+        f"What no camera can tell: a tail that turns faster or slower by whole multiples of {tail} looks the same from "
+        f"frame to frame{also}. Where a rate is given, nothing that was seen spoke for that."
+    )
 
-    Args:
-        quantities: by the names of `MEASURED`.
-        counts: trials that each rests on.
-    """
-    return [_row(name, quantities[name], counts[name] if counts else None) for name in MEASURED]
 
-
-def _row(name: str, item: Measured, count: int | None) -> dict[str, str]:
-    factor, unit = _UNITS[item.unit]
-    decimals = _decimals(item, factor) if math.isfinite(item.value) else 0
-    texts = [
-        f"{value / factor:.{decimals}f}" if math.isfinite(value) else "-" for value in (item.value, item.low, item.high)
+def _rows(quantities: Mapping[str, Measured], counts: Mapping[str, int] | None = None) -> list[dict[str, str]]:
+    """Rows of a table: name, value, low, high, unit, number of trials, and why value or interval is missing."""
+    return [
+        {
+            "name": name.replace("_", " "),
+            **shown(item.value, item.low, item.high, item.unit)._asdict(),
+            "trials": str(counts[name]) if counts else "",
+            "reason": item.reason,
+        }
+        for name, item in ((name, quantities[name]) for name in MEASURED)
     ]
-    return {
-        "name": name.replace("_", " "),
-        "value": texts[0],
-        "low": texts[1],
-        "high": texts[2],
-        "unit": unit,
-        "n": "" if count is None else str(count),
-        "reason": item.reason if not math.isfinite(item.value) else "",
-    }
-
-
-def _decimals(item: Measured, factor: float) -> int:
-    """Decimals down to a tenth of the interval's half width."""
-    reach = 0.5 * (item.high - item.low) / factor
-    if not math.isfinite(reach) or reach <= 0:
-        reach = 1e-3 * abs(item.value) / factor or 1.0
-    return min(max(1 - math.floor(math.log10(reach)), 0), 9)

@@ -16,12 +16,15 @@ _M = TypeVar("_M", bound=BaseModel)
 
 
 def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
-    """Check a raw table; return the model, or every problem as a sentence."""
+    """Check a raw table; return the model, or every problem as a sentence, unknown fields first.
+
+    A misspelt field is missing under its right name, too; its own sentence says what to do.
+    """
     try:
         return model.model_validate(table)
     except ValidationError as error:
         sentences: list[str] = []
-        for problem in error.errors(include_url=False):
+        for problem in sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden"):
             sentences += _sentences(model, problem)
         return list(dict.fromkeys(sentences))
     except RecursionError:

@@ -1,0 +1,94 @@
+"""What to know about a trial: flags, each a name for machines and a sentence for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.measurement.rates import Rate
+from spirillum.robot.robot import Robot
+from spirillum.tracking.setup import stripes_of
+from spirillum.tracking.track import Flag, Track
+
+__all__ = ["BY_HAND", "IMPORTED", "SEEN", "SYNTHETIC", "flags_of", "says_synthetic"]
+
+SEEN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+"""Rates that a camera sees; the motor's follows from them."""
+BY_HAND = "by-hand"
+"""Name of the flag of a track that was read by hand alone."""
+IMPORTED = "imported"
+"""Name of the flag of a track that another program has found."""
+SYNTHETIC = "synthetic"
+"""The word by which computed videos are known, and the name of the flag."""
+_MANY_STRAYS = 0.02
+_FEWEST_FRAMES = 4
+"""A video of which fewer were measured gives no rates."""
+_FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
+"""Flags that are no news where there are hardly any frames."""
+
+
+def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag, ...]:
+    """The trackers' flags and our own: each once, and a cause without what is said because of it.
+
+    Args:
+        fits: the fitted lines by the names of `SEEN`, and others.
+        track: the track, with the trackers' flags.
+        robot: the robot, for its stripes.
+    """
+    both = (*track.flags, *_own_flags(fits, track, robot))
+    flags = list({(flag.name, flag.sentence): flag for flag in both}.values())
+    names = {flag.name for flag in flags}
+    unsaid = {"stripes-unreadable"} if "no-stripes" in names else set()
+    count = track.time.size
+    if count < _FEWEST_FRAMES and not {BY_HAND, IMPORTED} & names:
+        frames = "1 frame was" if count == 1 else f"{count} frames were"
+        few = f"only {frames} measured; a rate needs at least {_FEWEST_FRAMES}"
+        flags.insert(0, Flag("too-few-frames", few, SEEN))
+        unsaid |= _FOLLOWING
+    return tuple(flag for flag in flags if flag.name not in unsaid)
+
+
+def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:
+    flags = []
+    if says_synthetic(track.words):
+        flags.append(Flag(SYNTHETIC, "the video says of itself that it is synthetic: nothing here is measured"))
+    for name in SEEN:
+        rate, words = fits[name], name.replace("_", " ")
+        if not rate.measured:
+            continue
+        if not rate.steady:
+            sentence = f"the {words} changes along the video; given is its mean from end to end"
+            flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
+        if rate.strays > _MANY_STRAYS * (rate.frames + rate.strays):
+            far = "1 frame lies far from its neighbours and was"
+            far = far if rate.strays == 1 else f"{rate.strays} frames lie far from their neighbours and were"
+            sentence = f"{far} left out of the {words}"
+            flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
+    stripes = stripes_of(track.setup, robot)
+    turned = _range(track.body_angle)
+    if stripes and fits["body_rotation_rate"].measured and turned < 2 * np.pi / len(stripes):
+        flags.append(
+            Flag(
+                "short-turn",
+                f"the body turned by {math.degrees(turned):.3g} deg, less than one stripe: errors that come back with "
+                "every stripe cannot be seen, so their usual size widens the interval of its rate",
+            )
+        )
+    return flags
+
+
+def says_synthetic(words: str) -> bool:
+    """Whether a file says of itself that it is synthetic.
+
+    Args:
+        words: its title and comment.
+    """
+    return SYNTHETIC in words.lower()
+
+
+def _range(values: Samples) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if known.size else 0.0
