@@ -28,7 +28,10 @@ _PEAKS = 0.25
 """Correlation below the best one down to which a shift is looked at closely: a ruler fits at many."""
 _EDGES = 0.8
 """Share of the picture that is too smooth to tell a shift."""
-_STEPS = 8
+_MOST = 6
+"""Most shifts that are looked at closely, beside none."""
+_STEPS, _STILL = 8, 0.01
+"""Steps of least squares at most, and the change, pixels, at which they end."""
 _CLEARER = 0.7
 """What is left of the edges at a shift over what is left near none, below which it is believed."""
 _AROUND = 6
@@ -95,14 +98,14 @@ def shift_between(one: Samples, other: Samples) -> float:
     cv2 = required("cv2", "measuring a video", "video")
     inside = slice(_REACH, -_REACH), slice(_REACH, -_REACH)
     alike = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
-    peaks = (alike >= cv2.dilate(alike, np.ones((3, 3)))) & (alike > alike.max() - _PEAKS)
-    peaks[_REACH, _REACH] = True
+    peaks = np.argwhere((alike >= cv2.dilate(alike, np.ones((3, 3)))) & (alike > alike.max() - _PEAKS))
+    peaks = peaks[np.argsort(-alike[tuple(peaks.T)])[:_MOST]].tolist()
     slope_u, slope_v = (0.5 * cv2.Sobel(one, cv2.CV_32F, *order, ksize=1)[inside] for order in ((1, 0), (0, 1)))
     steep = np.hypot(slope_u, slope_v)
     edge = steep > np.quantile(steep, _EDGES)
     slopes, there = np.stack([slope_u[edge], slope_v[edge]], axis=1), one[inside][edge]
     found = []
-    for row, column in np.argwhere(peaks):
+    for row, column in [*peaks, [_REACH, _REACH]]:
         shift = np.array([column, row], dtype=float) - _REACH
         rest = np.zeros(0)
         for _ in range(_STEPS):
@@ -112,7 +115,10 @@ def shift_between(one: Samples, other: Samples) -> float:
             scale = 3.0 * 1.4826 * float(np.median(np.abs(rest))) + 1e-3
             weight = np.clip(1.0 - (rest / scale) ** 2, 0.0, None) ** 2
             normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(2)
-            shift -= np.clip(np.linalg.solve(normal, slopes.T @ (weight * rest)), -1.0, 1.0)
+            step = np.clip(np.linalg.solve(normal, slopes.T @ (weight * rest)), -1.0, 1.0)
+            shift -= step
+            if np.abs(step).max() < _STILL:
+                break
         found.append((float(np.median(np.abs(rest))), float(shift[0])))
     best, near = min(found), min(found, key=lambda one: abs(one[1]))
     return best[1] if best[0] < _CLEARER * near[0] else near[1]
