@@ -112,6 +112,26 @@ def test_two_robots_give_no_numbers(flat_pictures, tmp_path):
     assert "forward_velocity" in flag.spoils
 
 
+def test_what_has_neither_stripes_nor_tail_of_the_robot_gives_no_numbers(flat_pictures, tmp_path):
+    plain = {"stripes": ("white", "black") * 4, "wire": flat_pictures.Flat.floor}
+    found = track(flat_pictures.Flat(frames=4, fps=2.0, **plain), tmp_path)
+    (flag,) = [flag for flag in found.flags if flag.name == "not-the-robot"]
+    assert {"forward_velocity", "body_rotation_rate", "tail_rotation_rate", "lateral_position"} <= set(flag.spoils)
+
+
+def test_a_robot_in_full_view_for_a_while_is_measured_then(flat_pictures, tmp_path):
+    film = flat_pictures.Flat(frames=30, fps=5.0, start=(0.035, 0.0), velocity=0.008, body_rate=-0.3, tail_rate=3.0)
+    found = track(film, tmp_path)
+    assert "they are left out" in next(f.sentence for f in found.flags if f.name == "robot-partly-out-of-view")
+    seen = np.isfinite(found.position[:, 0])
+    nose = film.truth(found.time)["x"] + 0.5 * film.robot.body.length
+    edge = 0.5 * film.size[0] * (film.camera_height - film.axis_height) / film.focal
+    assert not seen[nose > edge].any()
+    assert seen[nose < edge - 0.003].all()
+    assert slope(found.time, found.position[:, 0]) == pytest.approx(0.008, rel=2e-3)
+    assert slope(found.time, found.tail_phase) == pytest.approx(3.0, rel=2e-3)
+
+
 def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
     empty = flat_pictures.Flat(frames=2, start=(1.0, 0.0), noise=4.0)
     with pytest.raises(InputError, match="no robot like 'biorob2012-wide'"):

@@ -162,3 +162,13 @@ def test_what_a_file_says_of_itself_is_kept(tmp_path):
         for packet in stream.encode():
             container.mux(packet)
     assert open_video(tmp_path / "a.mp4").words == "synthetic"
+
+
+def test_a_folder_named_like_a_picture_is_no_frame(tmp_path):
+    for number in (3, 4, 6):
+        cv2.imwrite(str(tmp_path / f"f{number:05d}.png"), picture(number))
+    (tmp_path / "f00005.png").mkdir()
+    (tmp_path / "f00005b.png").mkdir()
+    video = open_video(tmp_path, frames_per_second=10.0)
+    assert [frame.time for frame in video.frames()] == pytest.approx([0.0, 0.1, 0.3])
+    assert video.flags == []

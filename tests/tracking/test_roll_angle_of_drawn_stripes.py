@@ -124,6 +124,18 @@ def test_a_wrong_order_is_said_and_spoils_the_rate(
     assert word in flag.sentence
 
 
+@pytest.mark.parametrize("order", [PRESET[:4], PRESET[:4] * 3, PRESET[:3]], ids=["half", "more", "three"])
+def test_a_wrong_number_of_stripes_is_said_and_spoils_the_rate(
+    flat_pictures: ModuleType, tmp_path: Path, order: tuple[str, ...]
+) -> None:
+    said = str(list(order)).replace("'", '"')
+    stripes, _, _ = learnt(film(flat_pictures), tmp_path, robot_stripes=said)
+    (flag,) = stripes.flags
+    assert flag.name in ("stripes-do-not-fit", "stripe-order")
+    assert flag.spoils == ("body_rotation_rate",)
+    assert not stripes.fits
+
+
 def test_an_even_picture_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
     stripes, pictures, _ = learnt(film(flat_pictures), tmp_path)
     rng = np.random.default_rng(3)

@@ -10,12 +10,22 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.robot.mesh import STRIPE_COLOURS
 
-__all__ = ["colour_classes", "named_colours", "named_rightly", "order_seen", "pattern_period", "without_glare"]
+__all__ = [
+    "colour_classes",
+    "named_colours",
+    "named_rightly",
+    "order_seen",
+    "pattern_period",
+    "width_seen",
+    "without_glare",
+]
 
 _MANY = 6
 """More classes than this are matched to names by the least total distance alone."""
 _PAIRS = 3
 """Kinds of neighbouring stripes that have to be seen before their order is judged."""
+_WHOLE = 4
+"""Angles that a stripe and those beside it have at least, when its width is taken."""
 _GLARE = 240.0
 """Brightness of glare to begin with."""
 _PALE = 0.7
@@ -177,16 +187,38 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
     return by_name
 
 
+def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples]) -> float:
+    """Usual width of stripes that are seen whole, rad; NaN where hardly any is.
+
+    Args:
+        profiles: colours along the angle, for some frames, (f, n, 3); NaN where none is seen.
+        angles: these angles, rad, (n,).
+        palettes: what `colour_classes` found.
+    """
+    palette, _, glare = palettes
+    step, widths = float(angles[1] - angles[0]), []
+    for profile in profiles:
+        runs = _runs(profile, palette, glare)
+        for before, run, after in zip(runs, runs[1:], runs[2:], strict=False):
+            if before[0] >= 0 and run[0] >= 0 and after[0] >= 0 and min(len(before), len(run), len(after)) >= _WHOLE:
+                widths.append(len(run) * step)
+    return float(np.median(widths)) if len(widths) >= _PAIRS else float("nan")
+
+
+def _runs(profile: Samples, palette: Samples, glare: Samples) -> list[np.ndarray]:
+    """Classes along the angle, split where they change; -1 where there is glare or nothing."""
+    good = np.isfinite(profile).all(axis=1)
+    classes = np.where(good, _nearest(np.nan_to_num(profile), np.concatenate([palette, glare])), -1)
+    classes = np.where(classes < len(palette), classes, -1)
+    return np.split(classes, np.flatnonzero(np.diff(classes)) + 1)
+
+
 def _neighbours(profiles: Samples, angles: Samples, palette: Samples, glare: Samples, width: float) -> Samples:
     """How often a class is seen next to another one, towards larger angles, (classes, classes)."""
     seen = np.zeros((len(palette), len(palette)))
     step = float(angles[1] - angles[0])
     for profile in profiles:
-        good = np.isfinite(profile).all(axis=1)
-        classes = np.where(good, _nearest(np.nan_to_num(profile), np.concatenate([palette, glare])), -1)
-        classes = np.where(classes < len(palette), classes, -1)
-        bounds = np.flatnonzero(np.diff(classes)) + 1
-        runs = np.split(classes, bounds)
+        runs = _runs(profile, palette, glare)
         wide = [int(run[0]) for run in runs if len(run) * step > 0.35 * width]
         for one, two in pairwise(wide):
             if one != two and one >= 0 and two >= 0:

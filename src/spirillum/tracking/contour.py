@@ -24,7 +24,15 @@ __all__ = ["GROUPS", "Contour", "contour_of"]
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Kinds of edges: front and rear end, the sides at +y and -y, and where the seal begins."""
 
-_TRUSTED = {"front": 0.04, "rear": 0.06, "side": 0.04, "striped side": 0.3, "coupling": 0.15, "seal": 0.03}
+_TRUSTED = {
+    "front": 0.04,
+    "rear": 0.06,
+    "side": 0.04,
+    "striped side": 0.3,
+    "coupling": 0.15,
+    "seal": 0.03,
+    "bare rear": 0.5,
+}
 """What places of edges are never known better than, pixels."""
 _ORDERS = 9, 4
 """Orders of the polynomials along and across."""
@@ -141,7 +149,9 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0].T
     factors = np.ascontiguousarray(factors).reshape(*found.shape[2:], *(order + 1 for order in _ORDERS))
     group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
-    trusted = [_TRUSTED[name] for name in ("front", "rear", *[kind for _, kind, _ in sides] * 2, "seal")]
+    # The near and the far rim of a flat end without stripes look alike, and move otherwise.
+    rear = "rear" if striped or _flat(outline, -1) is None else "bare rear"
+    trusted = [_TRUSTED[name] for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
     floor = np.repeat(trusted, [size for _, size in kinds])
     middle = found[_NODES[0] // 2, _NODES[1] // 2, 0]
     return Contour(group, _normals(middle, group), floor, factors, np.array(reach))

@@ -14,26 +14,23 @@ from spirillum.robot.robot import Robot
 from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
 from spirillum.tracking.frames import Video
+from spirillum.tracking.identity import Introduced, introduced
 from spirillum.tracking.optics import BodyPose, Optics, placed, places_seen_by
-from spirillum.tracking.roll import Stripes
 from spirillum.tracking.ruler import still_picture
 from spirillum.tracking.scale import Sight
 from spirillum.tracking.search import candidates, refined
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.size import doubted
-from spirillum.tracking.start import Start, first_look, on_the_way
+from spirillum.tracking.start import Start, on_the_way
 from spirillum.tracking.steadiness import camera_flags
-from spirillum.tracking.tail import Wire
 from spirillum.tracking.track import Flag, Track
-from spirillum.tracking.unwrapping import contradictions, unwrapped
-from spirillum.tracking.warnings import gaps_of, sight_flags
+from spirillum.tracking.unwrapping import contradictions, nothing_moves, unwrapped
+from spirillum.tracking.warnings import cut_off, gaps_of, sight_flags
 
 __all__ = ["Seen", "follow", "scale_of"]
 
 _LOOK_AGAIN = 15
 """Frames between two searches of the whole picture for a robot that was lost."""
-_SOME = 0.2
-"""Share of frames on which stripes have to be read, or else the tail, in what is taken for the robot."""
 _MEMORY = 12
 """Frames from which the next place is guessed."""
 
@@ -92,12 +89,8 @@ def follow(
     still = still_picture(images)
     sight = sight_of(video, setup, still, folder)
     bounds = bounds_of(setup, video)
-    stated = BodyFinder(robot, sight.optics, bounds)
-    start = first_look(video.name, stated, frames, still)
-    stripes, wire = _readers(robot, setup, start)
-    if not _readable(stripes, wire, start):  # what was found may be a part of a larger robot
-        start = first_look(video.name, stated, frames, still, any_size=True)
-        stripes, wire = _readers(robot, setup, start)
+    known = introduced(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
+    start, stripes, wire = known.start, known.stripes, known.wire
     body, moved = start.body, camera_flags(frames, start, ruled=setup.markers.spacing is not None)
     rows = _Row()
     total = video.count
@@ -119,22 +112,8 @@ def follow(
             on_frame(frame.index, frame.image, Seen(frame.time, pose, read[0][0], read[1][0], body.optics))
         if progress is not None:
             progress(len(rows.time), total)
-    every = (*video.flags, *sight.flags, *moved, *start.flags, *stripes.flags, *wire.flags)
-    return _track(video, setup, robot, sight, start, rows, stripes.period, wire.handedness(), every)
-
-
-def _readers(robot: Robot, setup: Setup, start: Start) -> tuple[Stripes, Wire]:
-    """Readers of stripes and tail that know what they look like."""
-    stripes, wire = Stripes(robot, setup, start.body.optics), Wire(robot, setup, start.body.optics)
-    stripes.learn(start.seen)
-    wire.learn(start.seen)
-    return stripes, wire
-
-
-def _readable(stripes: Stripes, wire: Wire, start: Start) -> bool:
-    """Whether stripes or tail look like the robot's."""
-    read = [np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]
-    return float(np.mean(read)) > _SOME or not any(flag.spoils for flag in wire.flags)
+    every = (*video.flags, *sight.flags, *moved, *known.flags, *start.flags, *stripes.flags, *wire.flags)
+    return _track(video, setup, sight, known, rows, every)
 
 
 def _guess(rows: _Row, time: float, start: Start) -> BodyPose:
@@ -169,30 +148,24 @@ def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start,
     return lost
 
 
-def _track(
-    video: Video,
-    setup: Setup,
-    robot: Robot,
-    sight: Sight,
-    start: Start,
-    rows: _Row,
-    period: float,
-    hand: int,
-    flags: tuple[Flag, ...],
-) -> Track:
-    time = np.array(rows.time)
-    known = np.array([one.known for one in rows.placed])
-    pose = np.where(known[:, None], np.array([one.pose for one in rows.placed]), np.nan)
+def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _Row, flags: tuple[Flag, ...]) -> Track:
+    body, time = known.start.body, np.array(rows.time)
+    seen = np.array([one.known for one in rows.placed])
+    pose = np.where(seen[:, None], np.array([one.pose for one in rows.placed]), np.nan)
     errors = np.array([one.error for one in rows.placed])
     roll, tail = np.array(rows.roll), np.array(rows.tail)
-    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], period)
-    tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    optics = start.body.optics  # shows the body as large as it looks; lengths are those of the stated scale
-    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
-    scale, size_flags = doubted(sight.scale, start.body, start.size)
-    odd = contradictions(time, body_angle, tail_phase, position[:, 0], robot, hand)
-    frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
+    optics = body.optics  # shows the body as large as it looks; lengths are those of the stated scale
     seen_flags = sight_flags(time, pose, errors, rows.placed, optics, setup)
+    cut = cut_off(rows.placed)
+    pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
+    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
+    tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
+    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    scale, size_flags = doubted(sight.scale, body, known.size)
+    hand = known.wire.handedness()
+    motion = time, body_angle, tail_phase, position[:, 0], body.robot
+    odd = (*nothing_moves(*motion), *contradictions(*motion, hand))
+    frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
     return Track(
         time=time,
         frame=frame,
@@ -203,7 +176,7 @@ def _track(
         position_error=errors[:, 0] * optics.focal / sight.optics.focal,
         body_angle_error=np.where(np.isfinite(body_angle), roll[:, 1], np.nan),
         tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
-        picture=_drawn(pose, robot, optics),
+        picture=_drawn(pose, body.robot, optics),
         size=video.size,
         scale=scale,
         setup=setup,

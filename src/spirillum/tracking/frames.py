@@ -282,7 +282,8 @@ def _film(path: Path, frames_per_second: float | None) -> Video:
 
 
 def _folder(path: Path, frames_per_second: float | None) -> Video:
-    names = [entry for entry in path.iterdir() if entry.suffix.lower() in PICTURES and not entry.name.startswith(".")]
+    pictures = (entry for entry in path.iterdir() if entry.suffix.lower() in PICTURES and entry.is_file())
+    names = [entry for entry in pictures if not entry.name.startswith(".")]
     if not names:
         raise InputError(f"{path} holds no images; allowed: {_WHAT}")
     if frames_per_second is None:

@@ -23,7 +23,7 @@ from spirillum.tracking.scale import with_source
 from spirillum.tracking.search import Candidate, close_places
 from spirillum.tracking.track import Flag, Scale
 
-__all__ = ["SURE", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
+__all__ = ["LENGTHS", "SURE", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
@@ -32,10 +32,8 @@ _LOOKED_AT = 3
 """Frames on which they are tried."""
 SURE = 3.0
 """Clearness from which on a robot is one: score over that of the third best place."""
-_CLEARER = 1.5
-"""How much more it has to look like a robot at another size."""
 _STATED = 1.25
-"""The same of an outline that is a little larger or smaller than stated."""
+"""How much better an outline has to fit that is a little larger or smaller than stated."""
 _BUILT, _EDGE = 0.005, 0.2
 """Standard errors of the apparent size: how well a robot is built, relative, and where its edges appear, pixels.
 
@@ -74,16 +72,16 @@ def _likeness(found: Sequence[Sequence[Candidate]]) -> float:
     return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
 
 
-def another_size(
-    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, found: Sequence[Sequence[Candidate]]
-) -> float | None:
-    """A size at which something looks far more like the robot than at the stated one; None if there is none.
+def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> float | None:
+    """The size, from half to twice the stated one, at which something looks most like the robot.
 
     Args:
         body: the robot's body at the stated scale.
         images: some frames, 8-bit RGB, (h, w, 3) each.
         still: what stands still in them, (h, w, 3).
-        found: the likeliest places at the stated scale.
+
+    Returns:
+        The size over the stated one; None if nothing stands out as a robot does.
     """
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, _LOOKED_AT).round().astype(int))]
 
@@ -95,7 +93,7 @@ def another_size(
         tried = list(pool.map(at, _SIZES))
     alike = [_likeness(places) if clearness(places) > SURE else 0.0 for places in tried]
     best = int(np.argmax(alike))
-    return float(_SIZES[best]) if alike[best] > _CLEARER * _likeness(found) else None
+    return float(_SIZES[best]) if alike[best] > 0.0 else None
 
 
 def resized(body: BodyFinder, size: float) -> BodyFinder:

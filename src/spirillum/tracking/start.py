@@ -15,9 +15,9 @@ from spirillum.tracking.body import BodyFinder
 from spirillum.tracking.frames import Frame
 from spirillum.tracking.optics import BodyPose, places_seen_by
 from spirillum.tracking.search import Candidate, close_places, most_likely, refined
-from spirillum.tracking.size import SURE, OutlineFit, another_size, clearness, outline_seen, resized
+from spirillum.tracking.size import OutlineFit, clearness, outline_seen, resized
 from spirillum.tracking.track import Flag
-from spirillum.tracking.warnings import start_flags
+from spirillum.tracking.warnings import FULL_VIEW, rivals_in, turned_flags
 
 __all__ = ["Start", "first_look", "on_the_way"]
 
@@ -30,6 +30,8 @@ _OFTEN = 0.25
 """Share of the frames on which it has to be as clear as that."""
 _FAINT = 0.4
 """Score of a robot over that on its best frames, below which it is not learnt from: it is partly out of view."""
+_WHOLE = 4
+"""Frames in full view that are enough to learn stripes and tail from."""
 _AGAIN = 3
 """How often a body is learnt again at the size and place at which its outline lies."""
 _ALLOWED = "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
@@ -42,13 +44,17 @@ class Start:
     body: BodyFinder = field(repr=False)
     """The body, which has learnt, in front of a camera that shows it as large as it looks."""
     size: float
-    """How large it looks, over what its file says at the stated scale."""
+    """How large it looks, over the body that was looked for."""
     seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which the robot was found, 8-bit RGB, and where."""
     path: list[tuple[float, BodyPose]]
     """When it was where."""
     score: float
     """How clear its edges usually are, grey per pixel."""
+    clearness: float
+    """How clearly it stands out: `spirillum.tracking.size.clearness`."""
+    rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
+    """Frames on which something else stands out as clearly, and where."""
     flags: tuple[Flag, ...]
 
     def expected(self, time: float) -> BodyPose:
@@ -67,6 +73,8 @@ class _Learnt(NamedTuple):
     poses: list[BodyPose]
     score: float
     """How clear its edges usually are, grey per pixel."""
+    whole: list[bool]
+    """Whether it is in full view."""
 
     @property
     def typical(self) -> BodyPose:
@@ -74,34 +82,25 @@ class _Learnt(NamedTuple):
         return self.poses[len(self.poses) // 2]
 
 
-def first_look(
-    name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples, *, any_size: bool = False
-) -> Start:
-    """Find the robot on some frames, and learn how large it is and what its edges look like.
-
-    A robot that does not stand out clearly is looked for at other sizes too, which takes some seconds.
+def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> Start:
+    """Find the robot on some frames, and learn how large it is, within a tenth, and what its edges look like.
 
     Args:
         name: name of the video.
-        body: the robot's body at the stated scale.
+        body: the robot's body, about as large as it looks.
         frames: frames spread over the video.
         still: what stands still in them, (h, w, 3).
-        any_size: look for it at other sizes in any case.
 
     Raises:
         InputError: if there is no robot.
     """
     every = np.unique(np.linspace(0, len(frames) - 1, min(_SEARCHED, len(frames))).round().astype(int)).tolist()
-    images = [frames[k].image for k in every]
-    stated, found = body.optics, _places(body, images, still)
-    doubtful = any_size or clearness(found) < SURE
-    if doubtful and (size := another_size(body, images, still, found)) is not None:
-        body = resized(body, size)
-        found = _places(body, images, still)
+    images, focal = [frames[k].image for k in every], body.optics.focal
+    found = _places(body, images, still)
     if not _clear(found):
         raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
     chosen = most_likely(found, body.robot.body.length)
-    flags = start_flags(body, images, still, found, chosen)
+    rivals, flags = rivals_in(body, images, found, chosen), turned_flags(body, images, still, found, chosen)
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
     learnt = _learnt(name, body, _roughly(body, known, frames, still))
     outline = outline_seen(body, learnt.typical)
@@ -110,10 +109,12 @@ def first_look(
             break
         body, learnt = _relearnt(name, body, learnt, outline)
         outline = outline_seen(body, learnt.typical)
-    size = body.optics.focal / stated.focal * outline.size
-    seen = [(frame.image, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
+    size = body.optics.focal / focal * outline.size
+    every = range(len(learnt.poses))
+    whole = [k for k in every if learnt.whole[k]]
+    seen = [(learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= _WHOLE else every)]
     path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
-    return Start(body, size, seen, path, learnt.score, flags)
+    return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
 
 
 def _places(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> list[list[Candidate]]:
@@ -132,7 +133,7 @@ def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequ
     ]
     usual = float(np.quantile([one.score for one in found], 0.8))
     clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > _FAINT * usual]
-    return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual)
+    return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
 
 
 def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
@@ -143,10 +144,11 @@ def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
     """
     times = np.array([frame.time for frame in about.frames])
     found = body.learn([frame.image for frame in about.frames], about.poses, times)
-    good = [(frame, one.pose) for frame, one in zip(about.frames, found, strict=True) if one.known]
+    good = [(frame, one) for frame, one in zip(about.frames, found, strict=True) if one.known]
     if not good:
         raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {_ALLOWED}")
-    return _Learnt([frame for frame, _ in good], [pose for _, pose in good], about.score)
+    whole = [one.inside >= FULL_VIEW for _, one in good]
+    return _Learnt([frame for frame, _ in good], [one.pose for _, one in good], about.score, whole)
 
 
 def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit) -> tuple[BodyFinder, _Learnt]:
@@ -155,7 +157,7 @@ def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit)
     moved = np.array(learnt.poses) + np.array(outline.move)
     there = places_seen_by(other.optics, body.optics, moved[:, :2])
     poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
-    return other, _learnt(name, other, _Learnt(learnt.frames, poses, learnt.score))
+    return other, _learnt(name, other, _Learnt(learnt.frames, poses, learnt.score, learnt.whole))
 
 
 def _clear(found: Sequence[list[Candidate]]) -> bool:

@@ -86,6 +86,7 @@ class Wire:
         self.width = max(tail.wire_diameter, 2.0 * pixel)
         self.contrast: Samples | None = None
         self.usual = 0.0
+        self.readable = 0.0
         self._flags: list[Flag] = []
         self._hand: list[tuple[float, float]] = []
         coarse = np.linspace(first, tail.length, _COARSE)
@@ -122,8 +123,9 @@ class Wire:
             self._sharpen(strips)
         fits = np.array([self._fit(image, strip)[0] for image, strip in strips])
         readable = fits[:, 2] > _SHARE
-        self._check_shape(strips, fits[readable], float(np.mean(readable)))
-        if readable.mean() < 0.2 and not self._flags:
+        self.readable = float(np.mean(readable))
+        self._check_shape(strips, fits[readable], self.readable)
+        if self.readable < 0.2 and not self._flags:
             self._flags = [self._unseen()]
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
@@ -133,14 +135,25 @@ class Wire:
             image: the picture, 8-bit RGB (h, w, 3).
             pose: where the body is in it.
         """
+        found, hand = self._reading(image, pose)
+        if hand is not None:
+            self._hand.append(hand)
+        return found
+
+    def reads(self, image: np.ndarray, pose: BodyPose) -> bool:
+        """Whether a tail like the robot's is there; nothing is kept of it."""
+        return bool(np.isfinite(self._reading(image, pose)[0][0]))
+
+    def _reading(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float] | None]:
+        """Phase and its error, and what is said of the hand."""
+        nothing = (np.nan, np.nan), None
         if self.contrast is None:
-            return np.nan, np.nan
+            return nothing
         answer, rival = self._fit(image, self._strip(pose))
         if not np.isfinite(answer[:2]).all() or answer[2] < _SHARE or rival > _RIVAL:
-            return np.nan, np.nan
-        if answer[6] > 0.0:
-            self._hand.append((float(answer[5]), float(answer[6])))
-        return float(answer[0] % (2.0 * np.pi)), float(np.hypot(answer[1], _FLOOR))
+            return nothing
+        hand = (float(answer[5]), float(answer[6])) if answer[6] > 0.0 else None
+        return (float(answer[0] % (2.0 * np.pi)), float(np.hypot(answer[1], _FLOOR))), hand
 
     @property
     def flags(self) -> tuple[Flag, ...]:

@@ -18,7 +18,7 @@ from spirillum.tracking.setup import Setup, stripes_of
 from spirillum.tracking.track import Flag
 from spirillum.units import show
 
-__all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nyquist", "unwrapped"]
+__all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
 
 LARGEST_STEP = 0.45
 """Step from frame to frame, in periods, from which on its sense is doubtful."""
@@ -36,7 +36,8 @@ _DRIFT = 0.05
 """Change of the rate over a gap, relative, that has to be reckoned with."""
 _TURNED = 0.35
 """Least angle, rad, that counts as turning when two senses of rotation are compared."""
-
+_RESTS, _STILL = 0.005, 0.02
+"""Least way, over the body's length, and turn, rad, of something that is not a part of the background."""
 _WALLS = 1.5
 """What walls may add to the largest advance of a helix in a turn."""
 
@@ -233,6 +234,28 @@ def _slope(time: Samples, value: Samples) -> tuple[float, float]:
     centred = t - t.mean()
     rate = float(centred @ (v - v.mean()) / max(float(centred @ centred), 1e-300))
     return rate, rate * float(t[-1] - t[0])
+
+
+def nothing_moves(
+    time: Samples, body_angle: Samples, tail_phase: Samples, x: Samples, robot: Robot
+) -> tuple[Flag, ...]:
+    """Something that neither moves nor turns and has no tail: it may be a part of the background.
+
+    Args:
+        time: s, (n,).
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        x: place along the channel, m, (n,).
+        robot: the robot.
+    """
+    moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
+    if np.isfinite(tail_phase).any() or moved > _RESTS * robot.body.length or turned > _STILL:
+        return ()
+    sentence = (
+        "what was followed neither moves nor turns, and its tail is not seen: it may be something that stands in "
+        "the picture; nothing is given"
+    )
+    return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
 
 
 def contradictions(

@@ -9,12 +9,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.tracking.body import BodyFinder, Placed
-from spirillum.tracking.optics import Optics
+from spirillum.tracking.optics import BodyPose, Optics
 from spirillum.tracking.search import Candidate, close_places
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 
-__all__ = ["gaps_of", "sight_flags", "start_flags"]
+__all__ = ["EVERYTHING", "FULL_VIEW", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
 
 _THREADS = 2
 EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
@@ -33,20 +33,47 @@ _ASKED = 3
 """Every how manieth frame is looked at the other way round first."""
 _LOST = 0.03
 """Share of frames without the robot that is said."""
-_PART = 0.97
+FULL_VIEW = 0.97
 """Share of the edges in the picture below which the robot is partly out of view."""
+_ENOUGH = 0.2
+"""Share of frames on which it is in full view, from which on the others are left out."""
 _HIDDEN = 0.55
 """Share of the edges that fit below which glare, shadows or bubbles are said."""
 
 
-def start_flags(
+def rivals_in(
+    body: BodyFinder,
+    images: Sequence[np.ndarray],
+    found: Sequence[list[Candidate]],
+    chosen: Sequence[Candidate | None],
+) -> list[tuple[np.ndarray, BodyPose]]:
+    """Frames on which another place stands out as the robot's does, and where; none unless it does on most of them.
+
+    Args:
+        body: the robot's body.
+        images: the frames that were searched, 8-bit RGB.
+        found: candidates of each frame.
+        chosen: the one that was taken for the robot.
+    """
+    half, rivals, count = 0.5 * body.robot.body.length, [], 0
+    for image, others, one in zip(images, found, chosen, strict=True):
+        if one is None:
+            continue
+        count += 1
+        apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
+        clear = [other for other in apart if other.score > max(_SECOND * one.score, _CLEAR * others[2].score)]
+        rivals += [(image, other.pose) for other in clear[:1]]
+    return rivals if len(rivals) > _OFTEN * count else []
+
+
+def turned_flags(
     body: BodyFinder,
     images: Sequence[np.ndarray],
     still: Samples,
     found: Sequence[list[Candidate]],
     chosen: Sequence[Candidate | None],
 ) -> tuple[Flag, ...]:
-    """Two robots, or a nose at the other end.
+    """A nose at the other end.
 
     Args:
         body: the robot's body.
@@ -55,39 +82,18 @@ def start_flags(
         found: candidates of each frame.
         chosen: the one that was taken for the robot.
     """
-    flags, second, count = [], 0, 0
-    seen: list[tuple[np.ndarray, float]] = []
-    half = 0.5 * body.robot.body.length
-    for image, others, one in zip(images, found, chosen, strict=True):
-        if one is None:
-            continue
-        count += 1
-        apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
-        second += any(other.score > max(_SECOND * one.score, _CLEAR * others[2].score) for other in apart)
-        seen.append((image, others[0].score))
-    if count and second > _OFTEN * count:
-        flags.append(
-            Flag(
-                "two-robots",
-                f"more than one robot is in view (on {second} of {count} frames looked at): it is not known which is "
-                "meant, so that nothing is given; a [region] around one of them in the setup would say",
-                EVERYTHING,
-            )
-        )
+    seen = [(image, some[0].score) for image, some, one in zip(images, found, chosen, strict=True) if one is not None]
     turned = _turned(body, seen[::_ASKED], still)
     if turned > _MAYBE:
         turned = _turned(body, seen, still)
-    if turned > _TURNED:
-        side = "left" if body.optics.leftward else "right"
-        flags.append(
-            Flag(
-                "nose-on-the-other-side",
-                f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits "
-                f"{turned:.2g} times better; all signs would be wrong, so that nothing is given",
-                EVERYTHING,
-            )
-        )
-    return tuple(flags)
+    if turned <= _TURNED:
+        return ()
+    side = "left" if body.optics.leftward else "right"
+    sentence = (
+        f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits {turned:.2g} times "
+        "better; all signs would be wrong, so that nothing is given"
+    )
+    return (Flag("nose-on-the-other-side", sentence, EVERYTHING),)
 
 
 def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
@@ -139,6 +145,14 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
     return index[0] + whole, flags
 
 
+def cut_off(found: Sequence[Placed]) -> np.ndarray:
+    """Frames that are left out because the robot is partly out of view, if it is in full view often enough, (n,)."""
+    part = np.array([one.known and one.inside < FULL_VIEW for one in found])
+    whole = np.array([one.known and one.inside >= FULL_VIEW for one in found])
+    enough = int(whole.sum()) > _ENOUGH * int((part | whole).sum())
+    return part if enough else np.zeros(part.shape, dtype=bool)
+
+
 def sight_flags(
     time: Samples, pose: Samples, errors: Samples, found: Sequence[Placed], optics: Optics, setup: Setup
 ) -> tuple[Flag, ...]:
@@ -179,13 +193,13 @@ def sight_flags(
                 "left out",
             )
         )
-    part = known & (inside < _PART)
+    part = known & (inside < FULL_VIEW)
     if part.mean() > _LOST:
         flags.append(
             Flag(
                 "robot-partly-out-of-view",
-                f"the robot is partly out of view on {100 * part.mean():.0f} % of the frames: its place there is "
-                "less sure",
+                f"the robot is partly out of view on {100 * part.mean():.0f} % of the frames: "
+                + ("they are left out" if cut_off(found).any() else "its place there is less sure"),
             )
         )
     share = np.array([one.share for one in found])
