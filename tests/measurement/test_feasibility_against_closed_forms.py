@@ -49,9 +49,26 @@ def test_sizes_and_time_in_view(setup_file: Path) -> None:
     assert checks["stripe-pixels"].value == pytest.approx(np.pi * 18 / 8 / 0.25)
     assert checks["time-in-view"].value == pytest.approx(55.0)
     assert not checks["time-in-view"].passed
-    coarse = feasibility(setup_file, **RATES, view_width="160 mm", picture_width=64)
-    assert coarse.feasible  # small pictures warn; only rates decide
+    coarse = feasibility(setup_file, **RATES, view_width="160 mm", picture_width=256)
+    assert coarse.feasible  # small pictures warn
     assert "fewer than" in " ".join(coarse.warnings)
+
+
+def test_lines_closer_than_three_pixels_and_a_robot_shorter_than_twenty_cannot_be_measured(
+    setup_file: Path, setup_text: str
+) -> None:
+    """Lines 2 mm apart: 3 pixels at 240 over 160 mm. Without a ruler, 105 mm of robot: 20 pixels at 5.25 mm each."""
+    for width, feasible in ((241, True), (239, False)):
+        found = feasibility(setup_file, **RATES, view_width="160 mm", picture_width=width)
+        assert found.feasible is feasible
+        assert bool(found.intervals) is feasible
+    assert "its lines cannot be told apart" in " ".join(found.warnings)
+    for pixel, feasible in (("5.2 mm", True), ("5.3 mm", False)):
+        setup_file.write_text(setup_text.replace('spacing = "2 mm"\nheight = "0 mm"', f'length_per_pixel = "{pixel}"'))
+        found = feasibility(setup_file, **RATES)
+        assert found.feasible is feasible
+        assert ("robot-pixels" in [check.name for check in found.checks]) is not feasible
+    assert dict(found.intervals) == {}
 
 
 def test_intervals_are_those_of_the_time_in_view(setup_file: Path) -> None:
@@ -129,6 +146,7 @@ def test_a_new_setup_file_is_valid_and_is_not_overwritten(tmp_path: Path) -> Non
     [
         ({"duration": "0 s"}, "duration = 0 s"),
         ({"frames_per_second": -1.0}, "fps = -1"),
+        ({"frames_per_second": 0.0}, "fps = 0; allowed"),
         ({"tail_rate": "6 1/s"}, "expect-tail-rate"),
         ({"view_width": "3 s"}, "view-width"),
         ({"picture_width": 3}, "width = 3"),

@@ -9,7 +9,15 @@ import pytest
 
 from spirillum import InputError
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Ruled, check_times, corrected, frames_read, read_marks, track_of_marks
+from spirillum.measurement.marks import (
+    Ruled,
+    check_pixels,
+    check_times,
+    corrected,
+    frames_read,
+    read_marks,
+    track_of_marks,
+)
 from spirillum.measurement.trials import trial_of
 from spirillum.tracking.track import Scale, Track
 
@@ -61,6 +69,36 @@ def test_a_time_after_the_end_of_the_video_is_refused(tmp_path: Path) -> None:
     check_times(marks, 100.0)
     with pytest.raises(InputError, match=r"row 4, column time_s: 100; allowed: 0 to 8\.03 s"):
         check_times(marks, 8.03)
+
+
+@pytest.mark.parametrize("scale", ["mm", "px"])
+def test_three_readings_on_a_line_have_the_interval_of_an_eyes_error(
+    tmp_path: Path, make_track: Callable[..., Track], robot: Any, scale: str
+) -> None:
+    """No residuals but the eye's own: s^2 = eye^2 / 2 of two, and times -1, 0, 1 s have a sum of squares of 2."""
+    rows = [(time, time if scale == "mm" else 100 + 1e-3 * time / PIXEL) for time in (0, 1, 2)]
+    text = "\n".join(f"{time},{x:.9f}" for time, x in rows)
+    marks = read_marks(written(tmp_path, f"time_s,x_{scale}\n{text}\n"))[""]
+    track = track_of_marks(marks, make_track().setup, "a.mp4", None if scale == "mm" else RULED, None)
+    item = trial_of(track, robot).quantities["forward_velocity"]
+    assert item.value == pytest.approx(1e-3)
+    eye = 0.5e-3 if scale == "mm" else PIXEL
+    student = 4.302653  # 97.5 %, two degrees of freedom: one of the line, one of the eye
+    assert 0.5 * (item.high - item.low) == pytest.approx(student * np.sqrt(eye**2 / 2 / 2), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("640,240", "row 3, column x_px: 640; allowed: 0 to 639, inside the picture"),
+        ("-1000,240", "row 3, column x_px: -1000; allowed: 0 to 639"),
+        ("0,99999", "row 3, column y_px: 99999; allowed: 0 to 479"),
+    ],
+)
+def test_a_reading_outside_the_picture_is_refused(tmp_path: Path, row: str, words: str) -> None:
+    check_pixels(read_marks(written(tmp_path, "time_s,x_px,y_px\n0,0,0\n1,639,479\n2,,\n"))[""], (640, 480))
+    with pytest.raises(InputError, match=words):
+        check_pixels(read_marks(written(tmp_path, f"time_s,x_px,y_px\n0,1,1\n1,{row}\n"))[""], (640, 480))
 
 
 def test_a_corrected_frame_replaces_what_was_seen(tmp_path: Path, make_track: Callable[..., Track], robot: Any) -> None:
@@ -151,6 +189,7 @@ def test_trackpy_and_deeplabcut_give_the_same_speed(
         ("frame,x_px\n1,2\n1,3\n", "rows 2 and 3 are of the same frame"),
         ("frame,x_px\n1,2,3\n", "row 2: 3 cells; allowed: 2"),
         ("frame,time_s,x_px\n,,3\n", "row 2: neither frame nor time_s"),
+        ("time_s,x_px\n0,1\n-5,1\n", "row 3, column time_s: '-5'; allowed: 0 or later"),
         ("frame,x_px\n", "holds no readings"),
         ("", "is empty"),
     ],
@@ -169,6 +208,11 @@ def test_a_bad_table_of_readings_is_one_sentence(tmp_path: Path, text: str, word
         ("x,y,frame,particle\n1,2,0,0\n1,2,1,1\n", "column particle: 2 particles; allowed: the robot's alone"),
         ("x,y,frame\n1,2,0\n1,2,0\n", "frame 0 stands twice"),
         ("x,y,frame\n1,2,-1\n", "row 2, column frame: '-1'"),
+        ("x,y,frame\n1,2,0\n15000,2,1\n", "row 3, column x: '15000'; allowed: 0 to 639, inside the picture"),
+        (
+            "scorer,s,s\nbodyparts,centre,centre\ncoords,x,y\n0,1,-9\n",
+            "row 4, column centre y: '-9'; allowed: 0 to 479",
+        ),
         ("scorer,s,s\nbodyparts,eye,eye\ncoords,x,y\n0,1,2\n", "points eye; allowed: nose and rear, or centre"),
         ("scorer,s,s\nindividuals,a,a\nbodyparts,nose,nose\n0,1,2\n", "holds several individuals"),
         ("scorer,s,s\nbodyparts,centre,centre\ncoords,x,y\n0,1,far\n", "row 4, column centre y: 'far'"),

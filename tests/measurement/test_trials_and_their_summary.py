@@ -107,16 +107,19 @@ def test_a_flag_is_said_once_and_a_cause_without_its_consequence(make_track: Mak
     flags = (
         Flag("no-stripes", "the robot has no stripes", body),
         Flag("stripes-unreadable", "the stripes could be read on 0 of 300 frames", body),
-        Flag("tail-unreadable", "one cause"),
-        Flag("tail-unreadable", "one cause"),
-        Flag("tail-unreadable", "another cause"),
+        Flag("tail-does-not-fit", "one cause"),
+        Flag("tail-does-not-fit", "one cause"),
+        Flag("tail-does-not-fit", "another cause"),
+        Flag("tail-unreadable", "the wire is not seen"),
+        Flag("tail-unreadable", "the tail could be read on 0 of 300 frames"),
     )
     trial = trial_of(make_track(flags=flags), robot, "a")
-    assert [flag.sentence for flag in trial.flags] == ["the robot has no stripes", "one cause", "another cause"]
+    sentences = ["the robot has no stripes", "one cause", "another cause", "the wire is not seen"]
+    assert [flag.sentence for flag in trial.flags] == sentences
     assert trial.quantities["body_rotation_rate"].reason == "the robot has no stripes"
     rows = observation_rows([trial], robot, "setup.toml")
     assert rows is not None
-    assert "flags: no-stripes, tail-unreadable\n" in rows
+    assert "flags: no-stripes, tail-does-not-fit, tail-unreadable\n" in rows
 
 
 def test_an_amplitude_over_trials_is_not_negative(make_track: Make, robot: Any) -> None:

@@ -36,6 +36,24 @@ def test_all_files_are_there_and_a_rerun_keeps_them(tmp_path: Path) -> None:
         virtual_experiment(None, folder, **(SMALL | {"trials": 3}))
 
 
+def test_damaged_files_are_made_again(tmp_path: Path) -> None:
+    options = SMALL | {"trials": 1, "study": {"robots": ["biorob2012-wide"]}, "output": tmp_path / "e"}
+    virtual_experiment(**options)
+    folder = tmp_path / "e" / "biorob2012-wide"
+    assert virtual_experiment(**options).kept == 1
+    for name, damage in (
+        ("trial-1.mp4", ""),
+        ("trial-1.truth.json", "{"),
+        ("trial-1.truth.nc", "nc"),
+        ("setup.toml", ""),
+    ):
+        whole = (folder / name).read_bytes()
+        (folder / name).write_text(damage)
+        assert virtual_experiment(**options).kept == 0
+        assert (folder / name).read_bytes()[:8] == whole[:8]
+    assert virtual_experiment(**options).kept == 1
+
+
 def test_the_table_is_an_observations_file_and_every_rate_has_the_same_factor(tmp_path: Path) -> None:
     found = virtual_experiment({"robots": ["biorob2012-wide"]}, tmp_path / "e", **SMALL, spread=0.1)
     rows = read_observations(found.observations)
@@ -73,7 +91,13 @@ def test_the_planted_spread_has_its_size() -> None:
 
 @pytest.mark.parametrize(
     ("options", "words"),
-    [({"trials": 0}, "trials"), ({"spread": 0.5}, "spread"), ({"jobs": 0}, "jobs"), ({"model": "x"}, "model")],
+    [
+        ({"trials": 0}, "trials"),
+        ({"spread": 0.5}, "spread"),
+        ({"jobs": 0}, "jobs"),
+        ({"model": "x"}, "model"),
+        ({"duration": "0 s"}, "duration"),
+    ],
 )
 def test_wrong_options_get_one_sentence(tmp_path: Path, options: dict[str, Any], words: str) -> None:
     with pytest.raises(sp.InputError, match=words):

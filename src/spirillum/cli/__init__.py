@@ -7,8 +7,12 @@ import os
 import sys
 from collections.abc import Sequence
 from io import TextIOWrapper
+from itertools import pairwise
 
 __all__ = ["main"]
+
+_NAMING = ("measure", "setup", "virtual-experiment")
+"""Commands whose arguments name files and folders."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -27,6 +31,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal without box characters shows others instead
     try:
+        _check_names(sys.argv[1:] if arguments is None else arguments)
         code = app(args=arguments, prog_name="spirillum", standalone_mode=False)
     except BrokenPipeError:  # the reader of our output has left, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered goes nowhere
@@ -37,6 +42,23 @@ def _run(arguments: Sequence[str] | None) -> int:
             raise
         return code
     return _fail("interrupted", 130) if code == 130 else int(code or 0)
+
+
+def _check_names(arguments: Sequence[str]) -> None:
+    """Refuse empty names, which would else be taken for the folder one works in.
+
+    Raises:
+        InputError: if there is one.
+    """
+    from spirillum.errors import InputError
+
+    if not arguments or arguments[0] not in _NAMING:
+        return
+    for before, word in pairwise(arguments):
+        if not word:
+            raise InputError(f"an empty word after {before[:60]}; allowed: a name or a value")
+        if word.startswith("--") and word.find("=") == len(word) - 1:
+            raise InputError(f"an empty word after {word[:60]}; allowed: a name or a value")
 
 
 def _explained(error: BaseException) -> int | None:

@@ -42,6 +42,8 @@ _FOREVER = 1e9
 """Time in view of a robot that does not move, s."""
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Fewest pixels with which the trackers' tests have been passed with room to spare."""
+_NEEDED = {"robot": 20.0, "spacing": 3.0}
+"""Fewest pixels below which nothing is found: no lines of a ruler, and no robot that can be told from a speck."""
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
     f"{_WAVE_ERROR:g} pixels of the wire across; {_TOGETHER:g} neighbouring frames err alike, "
@@ -86,7 +88,8 @@ class Feasibility:
     intervals: Mapping[str, tuple[float, float]]
     """Half width of the 95 % interval that one trial is expected to have, and that share of the value.
 
-    Empty where nothing tells how large a pixel is, or the robot never fits into the view.
+    Empty where nothing tells how large a pixel is, robot or ruler are too small to be found, or the robot never fits
+    into the view.
     """
     measured: float
     """Time of a trial in which the robot is in view as a whole, s."""
@@ -163,8 +166,11 @@ def feasibility(
         beside = Path(setup).parent / chosen.robot.file
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
     expected = _expected(robot, tail_rate, body_rate, speed)
-    rate = frames_per_second or chosen.camera.frames_per_second or _FRAMES_PER_SECOND
-    source_of_rate = "given" if frames_per_second else "setup" if chosen.camera.frames_per_second else "assumed"
+    rate, source_of_rate = chosen.camera.frames_per_second or _FRAMES_PER_SECOND, "assumed"
+    if frames_per_second is not None:
+        rate, source_of_rate = frames_per_second, "given"
+    elif chosen.camera.frames_per_second:
+        source_of_rate = "setup"
     if not 0.01 <= rate <= 1e5:
         raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
@@ -180,7 +186,9 @@ def feasibility(
     expected |= {"length_per_pixel": (pixel, source)} if math.isfinite(pixel) else {}
     stripes = stripes_of(chosen, robot)
     shares = depth_shares(chosen)
-    checks = [*_rates(expected, rate, stripes), *_pixels(chosen, robot, pixel, len(stripes))]
+    sizes = _pixels(chosen, robot, pixel, len(stripes))
+    found = all(check.passed for check in sizes if check.decides)
+    checks = [*_rates(expected, rate, stripes), *sizes]
     measured = span
     if math.isfinite(pixel):
         view = _view(expected, robot, pixel * width, span, rate)
@@ -194,7 +202,7 @@ def feasibility(
         )
     if not shares:
         warnings.append("the setup gives no uncertainty of heights: 10 mm of depth can be 7 % of a length")
-    seen = math.isfinite(pixel) and measured * rate >= _FEWEST
+    seen = found and math.isfinite(pixel) and measured * rate >= _FEWEST
     intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
     return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, tuple(warnings))
 
@@ -262,6 +270,7 @@ def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tupl
 
 
 def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Check]:
+    """Sizes in the picture; they decide where robot or ruler are too small to be found at all."""
     if not math.isfinite(pixel):
         return []
     sizes = {
@@ -272,14 +281,22 @@ def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Chec
         sizes["stripe"] = ("a stripe that faces the camera", math.pi * robot.body.diameter / stripes)
     if setup.markers.spacing is not None:
         sizes["spacing"] = ("the ruler's spacing", setup.markers.spacing)
+    long = (robot.body.length + robot.coupling.length + robot.tail.length) / pixel
+    if long < (limit := _NEEDED["robot"]):
+        sentence = f"the whole robot is {long:.3g} pixels long, fewer than the {limit:g} without which it is not found"
+        return [Check("robot-pixels", long, limit, "1", passed=False, decides=True, sentence=sentence)]
     found = []
     for name, (words, length) in sizes.items():
-        value, limit = length / pixel, _SMALLEST[name]
+        value = length / pixel
+        decides = value < _NEEDED.get(name, 0.0)
+        limit = _NEEDED[name] if decides else _SMALLEST[name]
         passed = value >= limit
         size = f"{value:.3g}"
         pixels = "pixel" if size == "1" else "pixels"
         sentence = f"{words} is {size} {pixels} wide, {'at least' if passed else 'fewer than'} {limit:g}"
-        found.append(Check(f"{name}-pixels", value, limit, "1", passed, decides=False, sentence=sentence))
+        if decides:
+            sentence += ": its lines cannot be told apart, and there is no scale"
+        found.append(Check(f"{name}-pixels", value, limit, "1", passed, decides, sentence=sentence))
     return found
 
 

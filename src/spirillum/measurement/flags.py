@@ -27,7 +27,9 @@ _MANY_STRAYS = 0.02
 _FEWEST_FRAMES = 4
 """A video of which fewer were measured gives no rates."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
-"""Flags that are no news where there are hardly any frames."""
+"""Flags that are no news where there are hardly any frames, or no robot."""
+_ONCE = {"stripes-unreadable", "tail-unreadable"}
+"""Flags of which the first says enough."""
 
 
 def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag, ...]:
@@ -39,9 +41,15 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag
         robot: the robot, for its stripes.
     """
     both = (*track.flags, *_own_flags(fits, track, robot))
-    flags = list({(flag.name, flag.sentence): flag for flag in both}.values())
+    flags: list[Flag] = []
+    for flag in both:
+        same = [other for other in flags if other.name == flag.name]
+        if not same or (flag.name not in _ONCE and all(other.sentence != flag.sentence for other in same)):
+            flags.append(flag)
     names = {flag.name for flag in flags}
     unsaid = {"stripes-unreadable"} if "no-stripes" in names else set()
+    if "not-the-robot" in names:
+        unsaid |= {*_FOLLOWING, "nothing-moves"}
     count = track.time.size
     if count < _FEWEST_FRAMES and not {BY_HAND, IMPORTED} & names:
         frames = "1 frame was" if count == 1 else f"{count} frames were"

@@ -12,8 +12,8 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
 from spirillum.measurement.flags import IMPORTED
-from spirillum.measurement.marks import Ruled
-from spirillum.measurement.tables import read_table
+from spirillum.measurement.marks import EDGE, Ruled
+from spirillum.measurement.tables import Row, read_table
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag, Track
 
@@ -49,7 +49,7 @@ def read_track(
     """
     path = Path(path)
     first = read_text(path, _WHAT, 256 << 20).lstrip().split(",", 1)[0].strip().lower()
-    frame, nose, rear, centre = _deeplabcut(path) if first == "scorer" else _trackpy(path)
+    frame, nose, rear, centre = (_deeplabcut if first == "scorer" else _trackpy)(path, ruled.size)
     order = np.argsort(frame, kind="stable")
     frame, nose, rear, centre = frame[order], nose[order], rear[order], centre[order]
     if np.any(np.diff(frame) <= 0):
@@ -74,10 +74,21 @@ def read_track(
     )  # fmt: skip
 
 
+def _check_inside(rows: tuple[Row, ...], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
+    """Refuse points from outside the picture.
+
+    Raises:
+        InputError: if there is one; the sentence names row and column.
+    """
+    for name, values, pixels in zip(names, points.T, size, strict=True):
+        for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
+            raise rows[place].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")
+
+
 _Points = tuple[Samples, Samples, Samples, Samples]
 
 
-def _trackpy(path: Path) -> _Points:
+def _trackpy(path: Path, size: tuple[int, int]) -> _Points:
     table = read_table(path, _WHAT)
     places = {name: table.column(name) for name in ("x", "y", "frame", "particle")}
     for name in ("x", "y", "frame"):
@@ -99,10 +110,11 @@ def _trackpy(path: Path) -> _Points:
         if particles.size > 1:
             raise InputError(f"{path}, column particle: {particles.size} particles; allowed: the robot's alone")
     centre = np.stack([column("x"), column("y")], axis=1)
+    _check_inside(table.rows, centre, ("x", "y"), size)
     return column("frame"), np.full_like(centre, np.nan), np.full_like(centre, np.nan), centre
 
 
-def _deeplabcut(path: Path) -> _Points:
+def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
     table = read_table(path, _WHAT, headers=3)
     parts, coordinates = (tuple(cell.lower() for cell in head) for head in table.headers[1:3])
     if parts[0] == "individuals":
@@ -124,6 +136,7 @@ def _deeplabcut(path: Path) -> _Points:
         if "likelihood" in place:
             likely = np.array([row.number(place["likelihood"], f"{name} likelihood") for row in table.rows])
             found[~(likely >= _LIKELY)] = np.nan
+        _check_inside(table.rows, found, (f"{name} x", f"{name} y"), size)
         return found
 
     nose, rear, centre = point(_FRONTS), point(_REARS), point(_MIDDLES)

@@ -16,7 +16,18 @@ from spirillum.measurement.tables import Row, Table, read_table
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag, Scale, Track
 
-__all__ = ["MARK_COLUMNS", "Marks", "Ruled", "check_times", "corrected", "frames_read", "read_marks", "track_of_marks"]
+__all__ = [
+    "EDGE",
+    "MARK_COLUMNS",
+    "Marks",
+    "Ruled",
+    "check_pixels",
+    "check_times",
+    "corrected",
+    "frames_read",
+    "read_marks",
+    "track_of_marks",
+]
 
 _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
@@ -26,8 +37,13 @@ _NEAR = 0.51
 """A reading belongs to the frame that is nearer than this share of the time between frames."""
 _CLICK = 1.0
 """Standard error that is taken for a click with the mouse, pixels."""
+_RULE = 0.5e-3
+"""Standard error that is taken for a length read by eye where the scale is not known, m: a quarter of the 2 mm between
+the markers of the paper's ruler; assumed."""
 _GLANCE = math.radians(5.0)
 """Standard error that is taken for an angle read by eye, rad."""
+EDGE = 0.5
+"""From the centre of a picture's outermost pixels, which are at whole numbers, to its edge, pixels."""
 _LATER = 1.02
 """Latest time of a reading over the length of the video, which is known to about a frame."""
 
@@ -128,6 +144,8 @@ def _marks(table: Table, rows: list[Row]) -> Marks:
             raise InputError(f"{table.path}, row {row.line}: neither frame nor time_s; allowed: at least one of them")
         if math.isfinite(number) and (number < 0 or number != round(number)):
             raise row.error("frame", f"{number:g}", "a whole number from 0")
+        if moment < 0:
+            raise row.error("time_s", f"{moment:g}", "0 or later, the beginning of the video")
     order = np.lexsort((frame, time)) if np.isfinite(time).all() else np.argsort(frame, kind="stable")
     keys = time[order] if np.isfinite(time).all() else frame[order]
     twice = np.flatnonzero(np.diff(keys) == 0)
@@ -177,6 +195,24 @@ def check_times(marks: Marks, duration: float | None) -> None:
         )
 
 
+def check_pixels(marks: Marks, size: tuple[int, int]) -> None:
+    """Refuse readings from outside the picture.
+
+    Args:
+        marks: the readings.
+        size: width and height of the picture, pixels.
+
+    Raises:
+        InputError: if there is one; the sentence names its row.
+    """
+    for name, values, pixels in zip(("x_px", "y_px"), marks.pixels.T, size, strict=True):
+        for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
+            row = f"row {marks.lines[place]}" if marks.lines else f"reading {place + 1}"
+            raise InputError(
+                f"{marks.path}, {row}, column {name}: {values[place]:g}; allowed: 0 to {pixels - 1}, inside the picture"
+            )
+
+
 def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
     """Where the readings put the body, m, (k, 2); a coordinate that was not read is taken from the picture's middle."""
     position = marks.position.copy()
@@ -221,7 +257,7 @@ def track_of_marks(
     scale = ruled.scale if ruled else Scale(math.nan, 0.0, {}, 0, math.nan)
     nothing = np.full(inside.size, np.nan)
     picture = np.concatenate([marks.pixels[inside], np.full((inside.size, 2), np.nan)], axis=1)
-    click = nothing if ruled is None else np.full(inside.size, _CLICK * scale.length_per_pixel)
+    click = np.full(inside.size, _RULE if ruled is None else _CLICK * scale.length_per_pixel)
     glance = np.full(inside.size, _GLANCE)
     return Track(
         time=time[inside], frame=marks.frame[inside], position=_positions(marks, ruled)[inside], heading=nothing,

@@ -14,7 +14,15 @@ from spirillum.files import output_folder, whole_file, write_dataset, write_text
 from spirillum.measurement.annotate import annotated_film
 from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.marks import Marks, check_times, corrected, frames_read, read_marks, track_of_marks
+from spirillum.measurement.marks import (
+    Marks,
+    check_pixels,
+    check_times,
+    corrected,
+    frames_read,
+    read_marks,
+    track_of_marks,
+)
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_dataset, series_dataset
 from spirillum.measurement.sight import Sighted, sighted
@@ -108,7 +116,7 @@ def measure(
     A video that cannot be measured does not stop the others.
 
     Args:
-        videos: films or folders of images; all of them with the same setup and robot.
+        videos: films or folders of images, each once; all of them with the same setup and robot.
         setup: the setup file.
         output: folder for the results; None writes nothing.
         marks: table of readings by hand, which replace what is seen on their frames.
@@ -125,7 +133,12 @@ def measure(
         InputError: if setup, robot or a table is wrong, or no video could be measured.
         KeyboardInterrupt: if it was interrupted; the trials that were finished are written.
     """
-    paths = [Path(videos)] if isinstance(videos, (str, Path)) else [Path(video) for video in videos]
+    given = [videos] if isinstance(videos, (str, Path)) else list(videos)
+    words = [*(("video", video) for video in given), ("output", output), ("marks", marks), ("track", track)]
+    for what, word in words:
+        if word == "":  # else it would be the folder one works in
+            raise InputError(f'{what} = ""; allowed: a name')
+    paths = [Path(video) for video in given]
     chosen, robot = _loaded(setup, overrides, start, end)
     readings = _readings(paths, marks, track, tracking=tracking)
     names = _names(paths)
@@ -172,7 +185,10 @@ def _names(paths: Sequence[Path]) -> list[str]:
     if not paths:
         raise InputError("no video; allowed: at least one, or --feasibility")
     found: list[str] = []
-    for path in paths:
+    real = [path.resolve() for path in paths]
+    for place, path in enumerate(paths):
+        if real[place] in real[:place]:
+            raise InputError(f"{path} is given twice; allowed: each video once, as trials are independent")
         stem = path.resolve().name if path.is_dir() else path.stem
         name, number = stem or "trial", 2
         while name in found:
@@ -253,10 +269,13 @@ class _Work:
         else:
             sight = sighted(path, self.setup, self.beside, needed=table is not None or _in_pixels(marks))
             ruled = sight.ruled
+            if marks is not None and ruled is not None:
+                check_pixels(marks, ruled.size)
             track = replace(self._of_tables(path, sight, marks, table), words=sight.words)
             marks = marks if table is not None else None
         read = None  # no frame was corrected
         if marks is not None:
+            check_pixels(marks, track.size)
             read = frames_read(track, marks)
             track = corrected(track, marks, ruled)
         trial = trial_of(track, self.robot, name, read)

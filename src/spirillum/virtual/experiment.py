@@ -24,6 +24,7 @@ from spirillum.virtual.beside import SYNTHETIC, rate_quantities
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.options import DIRECTIONS, VIEWS, checked_fps, checked_seed, checked_size, one_of, whole_number
+from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render, room
 
 __all__ = ["Planned", "VirtualExperiment", "virtual_experiment"]
@@ -113,7 +114,7 @@ def virtual_experiment(
 
     Args:
         study: study file or its tables; None: the paper's robots in both of its tubes.
-        output: folder; a finished trial that is there is kept, another experiment in it is refused.
+        output: folder; a finished trial that is there and whole is kept, another experiment in it is refused.
         trials: of each robot, 1 to 1000.
         model: hydrodynamic model; None: the study's first, `sbt` without a study.
         friction: reading of the friction; None: the robot's own.
@@ -147,6 +148,8 @@ def virtual_experiment(
         "size": checked_size(size),
     }
     longest = None if duration is None else parse_option("duration", duration, KINDS["time"])
+    if longest is not None and longest * look["fps"] < 1.0:
+        raise InputError(f"duration = {longest:g} s; allowed: at least the {1.0 / look['fps']:.4g} s of a frame")
     robots, model = _robots(study, model)
     if len(robots) * trials > _MOST:
         raise InputError(f"{len(robots)} robots with {trials} trials each; allowed: at most {_MOST} videos")
@@ -250,9 +253,22 @@ def _planned(
 
 
 def _finished(folder: Path, plan: Planned) -> bool:
-    """Whether a trial is there: its files appear together."""
+    """Whether a trial is there: its files appear together, and none of them was damaged since in a way that shows."""
     trial = folder / plan.folder / f"trial-{plan.number}"
-    return all(trial.with_name(f"{trial.name}.{end}").is_file() for end in ("mp4", "truth.json", "truth.nc"))
+    known = ["setup.toml"] if is_preset(plan.robot) else ["setup.toml", "robot.toml"]
+    try:
+        json.loads(trial.with_name(f"{trial.name}.truth.json").read_text(encoding="utf-8"))
+        begins = {end: _first_bytes(trial.with_name(f"{trial.name}.{end}")) for end in ("mp4", "truth.nc")}
+        whole = begins["mp4"][4:] == b"ftyp" and begins["truth.nc"] == b"\x89HDF\r\n\x1a\n"
+        return whole and all((trial.parent / name).stat().st_size > 0 for name in known)
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def _first_bytes(path: Path) -> bytes:
+    """The eight bytes that tell a kind of file."""
+    with path.open("rb") as file:
+        return file.read(8)
 
 
 def _render_all(

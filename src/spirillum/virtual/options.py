@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,7 +13,10 @@ from spirillum.units import KINDS, parse_option
 __all__ = [
     "DIRECTIONS",
     "VIEWS",
+    "checked_axis",
+    "checked_distortion",
     "checked_fps",
+    "checked_heading",
     "checked_seed",
     "checked_size",
     "one_of",
@@ -27,6 +31,12 @@ DIRECTIONS = ("right", "left")
 """Where the nose points in the picture."""
 
 _SMALLEST, _LARGEST = 64, 4096
+_BENT = 0.5
+"""Largest coefficient of distortion: with more, the corners of a wide picture come out near its middle."""
+_OBLIQUE = 45.0
+"""Largest heading, degrees: the setup knows only right and left."""
+_THIN = 1e-6
+"""Least depth of floor and surface below and above the axis that a setup states, m."""
 
 
 def video_target(path: str | Path) -> Path:
@@ -115,3 +125,47 @@ def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
     if not all(_SMALLEST <= value <= _LARGEST and value % 2 == 0 for value in (width, height)):
         raise InputError(f"size = {width}x{height}; allowed: {allowed}")
     return width, height
+
+
+def checked_distortion(value: float) -> float:
+    """The coefficient k1 of radial distortion.
+
+    Raises:
+        InputError: if it is no number, or out of range.
+    """
+    if isinstance(value, bool) or not abs(value) <= _BENT:
+        raise InputError(f"distortion = {value!r}; allowed: {-_BENT:g} to {_BENT:g}")
+    return float(value)
+
+
+def checked_heading(value: str | float) -> float:
+    """The angle of the robot's axis to the channel, with its unit or in rad.
+
+    Raises:
+        InputError: if it is none, or so oblique that the nose points neither right nor left.
+    """
+    angle = parse_option("heading", value, KINDS["angle"])
+    if abs(angle) > math.radians(_OBLIQUE) * (1.0 + 1e-9):
+        raise InputError(f"heading = {math.degrees(angle):.4g} deg; allowed: {-_OBLIQUE:g} to {_OBLIQUE:g} deg")
+    return angle
+
+
+def checked_axis(height: float, error: str | float, surface: float) -> float:
+    """The height of the robot's axis as the setup states it, m: wrong by an error, but between floor and surface.
+
+    Args:
+        height: the true height, m.
+        error: by which it is wrong, with its unit or in m.
+        surface: height of the oil's surface, m.
+
+    Raises:
+        InputError: if the error is no length, or a setup with it would not be valid.
+    """
+    wrong = signed_length("depth_error", error)
+    if not _THIN <= height + wrong <= surface - _THIN:
+        low, high = -1e3 * height, 1e3 * (surface - height)
+        raise InputError(
+            f"depth_error = {1e3 * wrong:.4g} mm; allowed: between {low:.4g} and {high:.4g} mm, "
+            "an axis above the floor and below the oil's surface"
+        )
+    return height + wrong

@@ -28,7 +28,10 @@ from spirillum.virtual.optics import Lens
 from spirillum.virtual.options import (
     DIRECTIONS,
     VIEWS,
+    checked_axis,
+    checked_distortion,
     checked_fps,
+    checked_heading,
     checked_seed,
     checked_size,
     one_of,
@@ -154,7 +157,8 @@ def render(
         duration: of the video, with its unit or a float in s.
         start: x of the body's mid-length at the first frame, from below the lens; None: its way is in mid-picture.
         lateral: horizontal offset across the channel (y of the lab, forward x and upward z), with its unit or in m.
-        heading: angle of the robot's axis to the channel in the picture's plane, with its unit or in rad.
+        heading: angle of the robot's axis to the channel in the picture's plane, at most 45 degrees, with its unit or
+            in rad.
         wobble: amplitude of a motion across the channel at the tail's rate, in the picture's plane, with its unit or
             in m.
         body_angle: of the body at the first frame.
@@ -165,10 +169,10 @@ def render(
         fps: frames a second.
         size: width and height in pixels, even numbers, or ``"640x480"``.
         exposure: of each frame, with its unit or a float in s.
-        distortion: coefficient k1 of the lens's radial distortion.
+        distortion: coefficient k1 of the lens's radial distortion, -0.5 to 0.5.
         degradation: `clean`, `degraded`, or a `Degradation`.
         seed: of all random numbers.
-        depth_error: by which the setup's height of the robot's axis is wrong on purpose.
+        depth_error: by which the setup's height of the robot's axis is wrong on purpose; it stays in the oil.
         depth_uncertainty: standard uncertainty of that height that the setup states.
         setup: the setup file; None: beside the video.
         progress: told what is done, how many frames are done, and how many there are.
@@ -183,6 +187,7 @@ def render(
     seen_from = one_of("view", view, VIEWS)
     leftwards = one_of("direction", direction, DIRECTIONS) == "left"
     what, seed = degradation_of(degradation), checked_seed(seed)
+    bend, turned = checked_distortion(distortion), checked_heading(heading)
     open_for = parse_option("exposure", exposure, KINDS["time"])
     if open_for > 1.0 / rate:
         raise InputError(f"exposure = {open_for:.4g} s; allowed: at most the {1.0 / rate:.4g} s of a frame")
@@ -200,7 +205,7 @@ def render(
         placement={
             "gap": parse_option("gap", gap, KINDS["length or zero"]),
             "lateral": signed_length("lateral", lateral),
-            "heading": parse_option("heading", heading, KINDS["angle"]),
+            "heading": turned,
             "wobble": parse_option("wobble", wobble, KINDS["length or zero"]),
             "body_angle": parse_option("body_angle", body_angle, KINDS["angle"]),
             "tail_phase": parse_option("tail_phase", tail_phase, KINDS["angle"]),
@@ -217,7 +222,7 @@ def render(
         pixels,
         leftwards=leftwards,
         tilt=tilt_of(what, seed),
-        distortion=(float(distortion), 0.0),
+        distortion=(bend, 0.0),
     )
     _check_fits(loaded, tank, lens)
     way = _placed(motion, lens, None if start is None else signed_length("start", start))
@@ -238,7 +243,7 @@ def render(
         surface=SURFACE,
         index=INDEX,
         spacing=_SPACING,
-        axis=float(way.position[:, 2].mean()) + signed_length("depth_error", depth_error),
+        axis=checked_axis(float(way.position[:, 2].mean()), depth_error, SURFACE),
         axis_uncertainty=parse_option("depth_uncertainty", depth_uncertainty, KINDS["length or zero"]),
         fps=None if target.suffix == ".mp4" else rate,
     )
