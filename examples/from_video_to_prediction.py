@@ -40,7 +40,7 @@ with tempfile.TemporaryDirectory() as name:
         "robots": [robot_file(folder, *t) for t in TAILS],
     }
     sp.virtual_experiment(
-        study, folder / "films", trials=2, duration="5 s", tail_rate="1.2 Hz", size="320x240", fps=15, seed=1
+        study, folder / "films", trials=2, duration="5 s", tail_rate="1.2 Hz", size="320x240", fps=10, seed=1
     )
 
     files = []
@@ -68,7 +68,7 @@ with tempfile.TemporaryDirectory() as name:
     speeds = [answer.to_dict()["forward_velocity"]["value"] for answer in (predicted, planted)]
     print(f"a new tail: {1e3 * speeds[0]:.4f} mm/s predicted, {1e3 * speeds[1]:.4f} mm/s planted")
 
-# Films of 75 frames at 320 x 240: speeds to a percent, and factors to what a percent of speed is worth.
+# Films of 50 frames at 320 x 240: speeds to a percent, and factors to what a percent of speed is worth.
 assert abs(speeds[0] / speeds[1] - 1) < 0.01
 for name, true in (("body_drag", TRUE_DRAG), ("body_rotation", TRUE_ROTATION)):
     assert np.isclose(found.values[name].value, true, rtol=0.03)

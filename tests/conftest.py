@@ -1,5 +1,6 @@
 """Array shapes in annotations are checked while tests run; robots that many tests share."""
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -37,9 +38,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """No answer comes from another run, nor stays behind."""
+    """No answer comes from another run; within a run the workers share what one of them has solved."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SPIRILLUM_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("SPIRILLUM_CACHE", str(folder / "solved"))
         yield
 
 

@@ -138,8 +138,9 @@ def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str,
 def test_any_robot_can_be_drawn(fields: dict[str, str], sphere: Any, tmp_path: Path) -> None:
     robot = sp.load(WIDE, **fields)
     flow = Flow(sp.predict(robot), replace(sphere, radius=0.5 * robot.body.diameter), 0.0, "lab")
+    figure = flow_figure(flow, flow.plane(resolution=30))
     for suffix in ("png", "pdf", "svg"):
-        save_as(flow_figure(flow, flow.plane(resolution=30)), tmp_path / f"flow.{suffix}")
+        save_as(figure, tmp_path / f"flow.{suffix}")
         assert (tmp_path / f"flow.{suffix}").stat().st_size > 5_000
 
 

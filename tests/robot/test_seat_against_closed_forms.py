@@ -1,6 +1,7 @@
 """Where a robot sits in its tube, against closed forms and against points on its surface."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -37,15 +38,18 @@ def in_tube(points: np.ndarray, e: float, pitch: float) -> np.ndarray:
     return np.hypot(y, -e + x * np.sin(pitch) + z * np.cos(pitch))
 
 
-def surface(outline: Outline, along: int = 400, around: int = 721) -> np.ndarray:
-    """Points on the whole surface of revolution, edges included."""
+@lru_cache
+def surface(shape: str, along: int = 400, around: int = 361) -> np.ndarray:
+    """Points on one side of a surface of revolution, edges included: the other side is its mirror image in y."""
+    outline = SHAPES[shape]
     x, rho = (
         np.concatenate(part) for part in zip(*(p.points(np.linspace(0, 1, along)) for p in outline.pieces), strict=True)
     )
-    theta = np.linspace(0, 2 * np.pi, around)[:, None]
+    theta = np.linspace(-np.pi / 2, np.pi / 2, around)[:, None]
     return np.stack([x + 0 * theta, rho * np.cos(theta), rho * np.sin(theta)], axis=-1).reshape(-1, 3)
 
 
+@lru_cache(maxsize=8)
 def helix(phase: float = 0.0, count: int = 1501) -> np.ndarray:
     """The paper's tail (25, 2.5 mm)."""
     columns = {"root": 0.0275, "wavelength": 0.025, "amplitude": 0.0025, "length": 0.06, "taper": 100.0, "hand": 1.0}
@@ -56,7 +60,7 @@ def helix(phase: float = 0.0, count: int = 1501) -> np.ndarray:
 @pytest.mark.parametrize("shape", SHAPES)
 @given(e=offsets, pitch=pitches)
 def test_gap_against_points_on_the_surface(shape: str, e: float, pitch: float) -> None:
-    brute = R - in_tube(surface(SHAPES[shape]), e, pitch).max()
+    brute = R - in_tube(surface(shape), e, pitch).max()
     found = body_gap(SHAPES[shape], R, e, pitch)
     assert found <= brute + 1e-15  # no point of the surface is closer
     assert found == pytest.approx(brute, abs=1e-6)
@@ -124,7 +128,7 @@ def test_straight_rod(e: float, pitch: float, drop: float) -> None:
 @given(e=st.floats(0.0, 0.009), pitch=pitches, drop=st.floats(0.0, 0.003))
 def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
     """The closed form is the limit of many phases, attained at the phase and point that it names."""
-    points = helix()
+    points = helix(count=301)
     whole = tail_clearance(points, 0.0005, R, e, pitch, drop)
     many = tail_clearance(points, 0.0005, R, e, pitch, drop, np.linspace(0, 2 * np.pi, 361))
     assert 0 <= many.clearance - whole.clearance + 1e-15 <= 0.0025 * np.radians(1) ** 2
@@ -134,8 +138,8 @@ def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
 
 @given(phase=st.floats(0.0, 6.28), e=st.floats(0.0, 0.009), pitch=pitches)
 def test_phase_is_that_of_the_wires_equation(phase: float, e: float, pitch: float) -> None:
-    found = tail_clearance(helix(), 0.0005, R, e, pitch, phases=np.array([phase]))
-    turned = in_tube(helix(phase), e, pitch)
+    found = tail_clearance(helix(count=301), 0.0005, R, e, pitch, phases=np.array([phase]))
+    turned = in_tube(helix(phase, count=301), e, pitch)
     assert found.clearance == pytest.approx(R - 0.0005 - turned.max(), abs=1e-14)
 
 

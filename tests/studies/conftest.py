@@ -34,7 +34,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     def write(
         study: dict[str, object] | None, model: str, friction: str, effective: float, spread: float = 0.0
     ) -> Path:
-        made = sp.study(study, overrides={"friction.effective": f"{effective} N m s/rad"})
+        made = sp.study(study, models=[model], overrides={"friction.effective": f"{effective} N m s/rad"})
         chosen = made.sel(model=model, friction=friction)
         rows = ["# synthetic: made by a model with a planted friction, nothing here is measured"]
         rows.append(
