@@ -58,12 +58,12 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     with ThreadPoolExecutor(_THREADS) as pool:
         stills = list(pool.map(lambda part: still_picture([frames[k].image for k in part]), parts))
         lines = list(pool.map(lambda still: lines_in(still, bounds) if ruled else None, stills))
-    smooth = [_flat(still, bounds, rows) for still in stills]
-    shifts = [0.0]
-    for one, found in zip(smooth[1:], lines[1:], strict=True):
-        rough = shift_between(smooth[0], one)
-        shifts.append(rough if lines[0] is None or found is None else _by_lines(lines[0], found, rough))
-    bound = _MOVED if lines[0] is not None else _MOVED_ROUGHLY
+        smooth = list(pool.map(lambda still: _flat(still, bounds, rows), stills))
+        roughly = list(pool.map(lambda other: shift_between(smooth[0], other), smooth[1:]))
+    first, shifts = lines[0], [0.0]
+    for rough, found in zip(roughly, lines[1:], strict=True):
+        shifts.append(rough if first is None or found is None else _by_lines(first, found, rough))
+    bound = _MOVED if first is not None else _MOVED_ROUGHLY
     if np.ptp(shifts) < bound:
         return ()
     step = int(np.argmax([abs(b - a) for a, b in pairwise(shifts)]))
