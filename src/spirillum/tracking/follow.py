@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -91,8 +92,10 @@ def follow(
     bounds = bounds_of(setup, video)
     known = introduced(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
     start, stripes, wire = known.start, known.stripes, known.wire
-    body, moved = start.body, camera_flags(frames, start, ruled=setup.markers.spacing is not None)
-    rows = _Row()
+    body, rows = start.body, _Row()
+    aside = ThreadPoolExecutor(1)  # ends while the frames are followed
+    moved = aside.submit(camera_flags, frames, start, ruled=setup.markers.spacing is not None)
+    aside.shutdown(wait=False)
     total = video.count
     for frame in video.frames(setup.start, setup.end):
         guess = _guess(rows, frame.time, start)
@@ -112,7 +115,7 @@ def follow(
             on_frame(frame.index, frame.image, Seen(frame.time, pose, read[0][0], read[1][0], body.optics))
         if progress is not None:
             progress(len(rows.time), total)
-    every = (*video.flags, *sight.flags, *moved, *known.flags, *start.flags, *stripes.flags, *wire.flags)
+    every = (*video.flags, *sight.flags, *moved.result(), *known.flags, *start.flags, *stripes.flags, *wire.flags)
     return _track(video, setup, sight, known, rows, every)
 
 
