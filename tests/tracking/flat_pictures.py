@@ -266,6 +266,7 @@ class Flat:
             stream: Any = container.add_stream("libx264", rate=rate, options={"crf": "14", "preset": "veryfast"})
             stream.width, stream.height, stream.pix_fmt = *self.size, "yuv420p"
             stream.time_base = stream.codec_context.time_base = tick
+            stream.codec_context.thread_count = 1  # two give now and then another film
             for time, picture in self.pictures():
                 frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
                 frame.pts, frame.time_base = round(time / tick), tick

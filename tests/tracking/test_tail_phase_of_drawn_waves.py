@@ -10,10 +10,10 @@ import pytest
 from spirillum.robot.load import load
 from spirillum.tracking.optics import BodyPose, optics_of
 from spirillum.tracking.setup import load_setup
-from spirillum.tracking.tail import Wire
+from spirillum.tracking.tail import TailWave
 
 
-def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
+def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[TailWave, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
     path = folder / "setup.toml"
     path.write_text(film.setup_text())
     setup, robot = load_setup(path)
@@ -24,12 +24,12 @@ def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[Wire, list[tu
         (picture, BodyPose(float(x), float(y), film.heading))
         for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
     ]
-    wire = Wire(robot, setup, optics_of(setup, film.size, film.focal))
+    wire = TailWave(robot, setup, optics_of(setup, film.size, film.focal))
     wire.learn(pictures[::2])
     return wire, pictures, true["tail_phase"]
 
 
-def errors(wire: Wire, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def errors(wire: TailWave, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     read = np.array([wire.read(*picture) for picture in pictures])
     return (read[:, 0] - phase + np.pi) % (2 * np.pi) - np.pi, read[:, 1]
 

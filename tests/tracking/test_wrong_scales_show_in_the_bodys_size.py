@@ -67,7 +67,7 @@ def test_a_stated_uncertainty_of_depth_explains_it(film):
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
-@pytest.mark.parametrize(("spacing", "size"), [("4 mm", 2.0)])
+@pytest.mark.parametrize(("spacing", "size"), [("4 mm", 2.0), ("1 mm", 0.5)])
 def test_a_scale_off_by_two_gives_rates_and_no_speed(film, spacing, size):
     flat, tracked = film
     found = tracked(markers_spacing=f'"{spacing}"')

@@ -15,7 +15,7 @@ from spirillum.tracking.optics import BodyPose, Optics, seen
 from spirillum.tracking.setup import Setup
 from spirillum.tracking.track import Flag
 
-__all__ = ["Wire"]
+__all__ = ["TailWave"]
 
 _TAIL = ("tail_rotation_rate",)
 _PHASES = 40
@@ -51,7 +51,7 @@ class _Strip(NamedTuple):
     """How the picture moves along (e) and across (f) and grows (g) with height, (rows, 3)."""
 
 
-class Wire:
+class TailWave:
     """Reads the phase phi of the tail in the lab, modulo 2 pi.
 
     Known are the wave's length, amplitude, taper and hand from the robot; unknown the phase, and a small sideways

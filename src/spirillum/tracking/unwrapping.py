@@ -272,7 +272,7 @@ def contradictions(
         tail_phase: unwrapped, rad, (n,).
         x: place along the channel, m, (n,).
         robot: the robot.
-        hand_seen: `Wire.handedness()`.
+        hand_seen: `TailWave.handedness()`.
     """
     if robot.drive is not None and robot.drive.joint == "fixed":
         return ()  # body and tail are one: they turn together
