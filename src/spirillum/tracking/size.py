@@ -9,6 +9,7 @@ lengths are those of the stated scale, and doubted.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -24,6 +25,7 @@ from spirillum.tracking.track import Flag, Scale
 
 __all__ = ["LENGTHS", "SURE", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
 
+_THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
 """Sizes that are tried over the stated one; those between are found from the edges."""
 _LOOKED_AT = 3
@@ -83,10 +85,12 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
     """
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, _LOOKED_AT).round().astype(int))]
 
-    tried = []
-    for size in _SIZES:
+    def at(size: float) -> list[list[Candidate]]:
         other = resized(body, float(size))
-        tried.append([close_places(image, still, other.contour, other.optics, other.bounds) for image in few])
+        return [close_places(image, still, other.contour, other.optics, other.bounds) for image in few]
+
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+        tried = list(pool.map(at, _SIZES))
     alike = [_likeness(places) if clearness(places) > SURE else 0.0 for places in tried]
     best = int(np.argmax(alike))
     return float(_SIZES[best]) if alike[best] > 0.0 else None
