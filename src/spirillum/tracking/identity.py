@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -99,8 +100,8 @@ def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame],
 def _looked(name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float) -> Introduced:
     start = first_look(name, body, frames, still)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
-    stripes.learn(start.seen)
-    wire.learn(start.seen)
+    with ThreadPoolExecutor(2) as pool:  # the compiled loops run side by side
+        list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))
     read = float(np.mean([np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]))
     striped = stripes.fits and read > _READ
     total = size * start.size
