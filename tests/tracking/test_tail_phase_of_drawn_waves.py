@@ -1,5 +1,6 @@
 """The phase that a wire is drawn at is the phase that is read."""
 
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,7 +14,9 @@ from spirillum.tracking.setup import load_setup
 from spirillum.tracking.tail import TailWave
 
 
-def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[TailWave, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
+def learnt(
+    film: Any, folder: Path, **robot_changes: Any
+) -> tuple[TailWave, list[tuple[np.ndarray, BodyPose]], np.ndarray]:
     path = folder / "setup.toml"
     path.write_text(film.setup_text())
     setup, robot = load_setup(path)
@@ -29,7 +32,9 @@ def learnt(film: Any, folder: Path, **robot_changes: Any) -> tuple[TailWave, lis
     return wire, pictures, true["tail_phase"]
 
 
-def errors(wire: TailWave, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def errors(
+    wire: TailWave, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     read = np.array([wire.read(*picture) for picture in pictures])
     return (read[:, 0] - phase + np.pi) % (2 * np.pi) - np.pi, read[:, 1]
 
@@ -81,7 +86,17 @@ def test_perspective_shows_a_wrong_hand(flat_pictures: ModuleType, tmp_path: Pat
 def test_a_tail_of_another_wavelength_does_not_fit(flat_pictures: ModuleType, tmp_path: Path, change: Any) -> None:
     wire, _, _ = learnt(film(flat_pictures), tmp_path, **change)
     assert wire.flags[0].name == "tail-does-not-fit"
-    assert "25 mm" in wire.flags[0].sentence or "24 mm" in wire.flags[0].sentence or "26 mm" in wire.flags[0].sentence
+    assert re.search(r"looks like 2[456]\.", wire.flags[0].sentence)
+
+
+@pytest.mark.parametrize("amplitude", ["1.6 mm", "4 mm"])
+def test_a_tail_of_another_amplitude_does_not_fit_and_its_wavelength_is_not_blamed(
+    flat_pictures: ModuleType, tmp_path: Path, amplitude: str
+) -> None:
+    wire, _, _ = learnt(film(flat_pictures), tmp_path, **{"tail.amplitude": amplitude})
+    assert wire.flags[0].name == "tail-does-not-fit"
+    assert "amplitude looks like 2." in wire.flags[0].sentence  # 2.5 mm
+    assert "wavelength" not in wire.flags[0].sentence
 
 
 def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> None:

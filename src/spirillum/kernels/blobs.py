@@ -140,5 +140,7 @@ def moment_matrices(points: Samples, e2: Samples, moments: Samples) -> tuple[Sam
             block = gradients[q * i : q * i + q, q * j : q * j + q]
             _moment_gradients(square, r2, here, there, moments[i], moments[j], block)
             if j < i:
-                gradients[q * j : q * j + q, q * i : q * i + q] = block.T
+                for s in range(q):
+                    for t in range(q):
+                        gradients[q * j + s, q * i + t] = block[t, s]
     return velocities, gradients

@@ -1,4 +1,7 @@
-"""How loops are compiled: by Numba, once for each machine."""
+"""How loops are compiled: by Numba, once for each machine.
+
+Kernels assign and multiply element by element: slices of arrays and `@` take seconds longer to compile.
+"""
 
 from __future__ import annotations
 

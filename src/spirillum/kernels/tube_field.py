@@ -65,15 +65,36 @@ def _along(k: float, x: Samples, forces: Samples, real: Samples, imaginary: Samp
 
 
 @compiled
+def _pressed(layer: Samples, inverse: Samples, half: Samples, out: Samples) -> None:
+    """Fill out (3, 3) with the inverse times the layer times the transposed inverse; `half` is work space."""
+    for i in range(3):
+        for j in range(3):
+            half[i, j] = 0.0
+            for c in range(3):
+                half[i, j] += layer[i, c] * inverse[3 * j + c]
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 0.0
+            for c in range(3):
+                out[i, j] += inverse[3 * i + c] * half[c, j]
+
+
+@compiled
 def _reflect(weight: float, layers: Samples, inverses: Samples, amplitudes: Samples) -> None:
     """Turn waves times forces, (2, 2, orders, 3), into the amplitudes of what the wall reflects of them."""
+    half, pressed, wave = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     for p in range(len(layers)):
         share = -weight if p == 0 else -2.0 * weight
-        inverse = inverses[p, :9].copy().reshape(3, 3)
-        pressed = inverse @ (layers[p] @ inverse.T)
+        _pressed(layers[p], inverses[p], half, pressed)
         for parity in range(2):
             for phase in range(2):
-                amplitudes[parity, phase, p] = share * (pressed @ amplitudes[parity, phase, p])
+                for i in range(3):
+                    wave[i] = amplitudes[parity, phase, p, i]
+                for i in range(3):
+                    total = 0.0
+                    for c in range(3):
+                        total += pressed[i, c] * wave[c]
+                    amplitudes[parity, phase, p, i] = share * total
 
 
 @compiled_parallel
@@ -132,7 +153,8 @@ def wave_amplitudes(
                             out * imaginary[parity, 1] + around * imaginary[parity, 2] + along * real[parity, 0]
                         )
                 scale *= r[p] / inverses[p, 9]
-        steps[n, :count] = inverses[:, 9]
+        for p in range(count):
+            steps[n, p] = inverses[p, 9]
         _reflect(weights[n], wall_layers(wall, bessel[n], count), inverses, amplitudes[n])
 
 

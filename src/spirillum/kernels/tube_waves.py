@@ -115,7 +115,9 @@ def _wall_inverses(wall: float, orders: int, inverses: Samples) -> None:
     for p in range(orders):
         _flows(p, wall, wall, r, v)
         _invert(v, inverse)
-        inverses[p, :9] = inverse.ravel()
+        for i in range(3):
+            for j in range(3):
+                inverses[p, 3 * i + j] = inverse[i, j]
         inverses[p, 9] = r[p]
 
 

@@ -84,7 +84,9 @@ def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spo
 def _turned(drag: Samples, phase: float, out: Samples) -> None:
     """A(phi) = Q A(0) Q' with Q the rotation by phi about x of velocities and of rotations."""
     cos, sin = math.cos(phase), math.sin(phase)
-    out[:] = drag
+    for i in range(7):
+        for j in range(7):
+            out[i, j] = drag[i, j]
     for first in (1, 4):
         for i in range(7):
             a, b = out[i, first], out[i, first + 1]
@@ -232,7 +234,9 @@ def _films(
 @compiled
 def _assembled(fluid: Samples, friction: Samples, fixed: bool, a: Samples) -> None:  # noqa: FBT001 - compiled
     """The matrix of the balance; friction is between Omega_x and omega_m only."""
-    a[:] = fluid
+    for i in range(7):
+        for j in range(7):
+            a[i, j] = fluid[i, j]
     for i in range(3, 7, 3):
         a[i, 3] += friction[i, 3]
         a[i, 6] += friction[i, 6]

@@ -40,6 +40,8 @@ _CLICK = 1.0
 _RULE = 0.5e-3
 """Standard error that is taken for a length read by eye where the scale is not known, m: a quarter of the 2 mm between
 the markers of the paper's ruler; assumed."""
+_APART = 0.75
+"""Difference from which on frame and time of a row contradict each other, s: times may be whole seconds."""
 _GLANCE = math.radians(5.0)
 """Standard error that is taken for an angle read by eye, rad."""
 EDGE = 0.5
@@ -213,6 +215,16 @@ def check_pixels(marks: Marks, size: tuple[int, int]) -> None:
             )
 
 
+def _check_agreement(marks: Marks, time: Samples) -> None:
+    """Refuse a reading whose frame was not taken at its time; `time` is that of its frame, s, or NaN."""
+    for place in np.flatnonzero(np.abs(marks.time - time) > _APART):
+        row = f"row {marks.lines[place]}" if marks.lines else f"reading {place + 1}"
+        raise InputError(
+            f"{marks.path}, {row}: frame {marks.frame[place]:g} is at {time[place]:.4g} s, but time_s is "
+            f"{marks.time[place]:g}; allowed: one of them, or both alike"
+        )
+
+
 def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
     """Where the readings put the body, m, (k, 2); a coordinate that was not read is taken from the picture's middle."""
     position = marks.position.copy()
@@ -250,6 +262,8 @@ def track_of_marks(
                 "in the setup"
             )
         time[missing] = time_of(marks.frame[missing])
+    if setup.camera.frames_per_second is not None:
+        _check_agreement(marks, marks.frame / setup.camera.frames_per_second)
     order = np.argsort(time, kind="stable")
     if np.any(np.diff(time[order]) <= 0):
         raise InputError(f"{marks.path}: two readings are of the same time; allowed: rising times")
@@ -350,6 +364,7 @@ def _frames_of(track: Track, marks: Marks) -> np.ndarray:
             what = f"frame {frame:g}" if by_frame else f"time_s {time:g}"
             raise InputError(f"{marks.path}, row {line}: {what} was not measured; allowed: a frame of the video")
         found[number] = nearest
+    _check_agreement(marks, track.time[found])
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -33,6 +34,8 @@ _AHEAD = 12
 _LARGEST = 50_000_000
 """Most pixels of a picture."""
 _SMALLEST = 32
+_FEW = 10
+"""Images whose usual size is that of a folder's pictures."""
 _NEAR = 10.0
 """Seconds that are rather decoded through than jumped over."""
 
@@ -132,8 +135,7 @@ class Video:
         if picture is None or picture.shape[1::-1] != self.size:
             self._note(
                 "unreadable-frames",
-                f"{self.images[index].name} cannot be read or has another size than the first image: "
-                "such images are left out",
+                f"{self.images[index].name} cannot be read or is not as large as most: such images are left out",
             )
             return None
         return Frame(index, float(self._stamps()[index]), picture)
@@ -294,16 +296,16 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
     steps = np.diff(numbers)
     if len(names) > 1 and (steps.min() != 1 or steps.max() > 1e6):
         numbers = np.arange(len(names))
-    first = next((picture for picture in map(_read_image, names[:10]) if picture is not None), None)
-    if first is None:
+    sizes = [picture.shape[1::-1] for picture in map(_read_image, names[:_FEW]) if picture is not None]
+    if not sizes:
         raise InputError(f"{path}: {names[0].name} cannot be read as an image; allowed: {_WHAT}")
-    size = first.shape[1], first.shape[0]
-    _check_size(path, size)
+    width, height = Counter(sizes).most_common(1)[0][0]
+    _check_size(path, (width, height))
     counted = tuple(int(number - numbers[0]) for number in numbers)
     duration = (counted[-1] + 1) / frames_per_second
     return Video(
         path,
-        size,
+        (width, height),
         duration,
         frames_per_second,
         frames_per_second,
@@ -314,7 +316,7 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
 
 
 def _ahead(frames: Iterator[Frame]) -> Iterator[Frame]:
-    """The same frames, taken by a thread of its own before they are asked for."""
+    """The same frames, taken by a thread before they are asked for."""
     queue: Queue[Frame | BaseException | None] = Queue(_AHEAD)
     left = Event()
 

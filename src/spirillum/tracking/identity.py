@@ -28,7 +28,7 @@ _READ = 0.5
 _ALIKE = 0.03
 """Relative difference from the stated size beyond which both have to be read: chance makes stripes of many things."""
 _SURELY = 0.75
-"""Share on which the tail has to be read then: at half the size it was on 0.52, of a hundred robots on 0.83 and more."""
+"""Share on which the tail has to be read then: 0.83 and more of a hundred robots, 0.52 of one at half the size."""
 
 
 class Introduced(NamedTuple):

@@ -38,6 +38,10 @@ _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0
 """Weights of red, green and blue that are tried first: a darker, brighter, more yellow, ... wire than its sides."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
 """Wavelengths that are tried, over that of the robot file."""
+_AMPLITUDES = (0.5, 0.63, 0.8, 1.25, 1.6, 2.0)
+"""Amplitudes that are tried with them where another wavelength fits better, over that of the robot file."""
+_CLEARLY = 2.0
+"""How much better one of them has to fit to be what is wrong."""
 
 
 class _Strip(NamedTuple):
@@ -111,9 +115,11 @@ class TailWave:
         for weights in _CONTRASTS:
             contrast = np.array(weights, dtype=float)
             contrast /= np.linalg.norm(contrast)
-            clear = np.nanmean([self._clearness(image, strip, contrast) for image, strip in strips] or [np.nan])
+            found = np.array([self._clearness(image, strip, contrast) for image, strip in strips])
+            found = found[np.isfinite(found)]
+            clear = float(found.mean()) if found.size else 0.0
             if clear > best:
-                best, chosen = float(clear), contrast
+                best, chosen = clear, contrast
         self.contrast = chosen
         if chosen is None:
             self._flags = [self._unseen()]
@@ -313,10 +319,13 @@ class TailWave:
                 sampled(image, curve + shift * self.width / self.step * strip.across, found)
                 colours.append(found)
             sides = np.stack(colours[1:])
-            steps.append(np.nanmedian(colours[0] - sides.mean(axis=0), axis=0))
-            rest = (sides - np.nanmean(sides, axis=(0, 1))).reshape(-1, 3)
+            rest = sides.reshape(-1, 3)
             rest = rest[np.isfinite(rest).all(axis=1)]
-            spreads.append(rest.T @ rest / max(1, len(rest)))
+            if not len(rest):
+                continue
+            steps.append(np.nanmedian(colours[0] - sides.mean(axis=0), axis=0))
+            rest -= rest.mean(axis=0)
+            spreads.append(rest.T @ rest / len(rest))
         if steps:
             step = np.median(steps, axis=0)
             noise = np.median(spreads, axis=0) + 9.0 * np.eye(3)
@@ -329,40 +338,46 @@ class TailWave:
         self.usual = 0.5 * float(np.median(peaks)) if peaks else 0.0
 
     def _check_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]], fits: Samples, readable: float) -> None:
-        """Compare other wavelengths, and the amplitude, with those of the robot file."""
-        scores = np.zeros(_FACTORS.size)
+        """Compare other wavelengths and amplitudes with those of the robot file."""
         if self.contrast is None:
             return
-        counted = 0
-        for image, strip in strips[:: max(1, len(strips) // 12)]:
-            ridge = self._ridge(image, strip, self.contrast)
-            found = []
-            for factor in _FACTORS:
-                wave = self.wave / np.array([factor, factor, 1.0, 1.0])
-                found.append(self._scores(ridge, strip, wave).max())
-            if np.isfinite(found).all():
-                scores += found
-                counted += 1
-        if not counted:
+        few = strips[:: max(1, len(strips) // 12)]
+        ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in few]
+        scores = self._likeness(ridges, 1.0)
+        if scores is None:
             return
-        own = float(np.interp(1.0, _FACTORS, scores))
+        tail, own = self.robot.tail, float(np.interp(1.0, _FACTORS, scores))
         best = int(np.argmax(scores))
-        factor, given = _FACTORS[best], self.robot.tail.wavelength
-        if abs(factor - 1.0) > 0.07 and scores[best] > 1.15 * own:
-            spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
+        if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
+            what, seen, given, score = "wavelength", _FACTORS[best], tail.wavelength, scores[best]
+            tried = [self._likeness(ridges, factor) for factor in _AMPLITUDES]
+            highest = [-np.inf if one is None else one.max() for one in tried]
+            if max(highest) > _CLEARLY * max(score, 0.0):
+                what, given, score = "amplitude", tail.amplitude, max(highest)
+                seen = _AMPLITUDES[int(np.argmax(highest))]
+            spoils = _TAIL if readable < 0.8 or own < 0.7 * score else ()
             sentence = (
-                f"the tail's wavelength looks like {factor * given * 1e3:.0f} mm, but tail.wavelength is "
-                f"{given * 1e3:.3g} mm: check the robot file"
-                + ("; the tail's rotation is not given" if spoils else "; its rotation is read all the same")
+                f"the tail's {what} looks like {seen * given * 1e3:.1f} mm, but tail.{what} is {given * 1e3:.3g} mm: "
+                "check the robot file; "
+                + ("the tail's rotation is not given" if spoils else "its rotation is read all the same")
             )
             self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             return
         if len(fits):
             share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
             if abs(share) > 0.2:
-                given = self.robot.tail.amplitude
                 sentence = (
-                    f"the tail's amplitude looks like {(1.0 + share) * given * 1e3:.1f} mm or further from that of the "
-                    f"robot file, {given * 1e3:.3g} mm: check it; the rotation is read all the same"
+                    f"the tail's amplitude looks like {(1.0 + share) * tail.amplitude * 1e3:.1f} mm or further from "
+                    f"that of the file, {tail.amplitude * 1e3:.3g} mm: check it; its rotation is read all the same"
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence))
+
+    def _likeness(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
+        """How well waves of `_FACTORS` times the wavelength fit; None where too little of the tail is in view."""
+        found = []
+        for ridge, strip in ridges:
+            waves = [self.wave * np.array([1.0 / factor, 1.0 / factor, 1.0, amplitude]) for factor in _FACTORS]
+            scores = np.array([self._scores(ridge, strip, wave).max() for wave in waves])
+            if np.isfinite(scores).all():
+                found.append(scores)
+        return np.sum(found, axis=0) if found else None
