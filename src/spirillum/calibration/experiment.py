@@ -19,6 +19,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.strays import stray_trials
 from spirillum.errors import InputError
 from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
+from spirillum.measurement.statistics import student_t_quantile
 from spirillum.robot.robot import Robot
 
 __all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "tail_words", "with_tail"]
@@ -300,10 +301,8 @@ def _of_trials(values: Samples) -> _Trials:
 
 def _of_a_mean(item: Observation, velocity: float, tail: float, body: float, motor: float, *, by_motor: bool) -> _Seen:
     """A row that is a mean over trials: its interval gives the trials' scatter back (Student's t)."""
-    from scipy.stats import t
-
     count = item.trials
-    quantile = float(t.ppf(0.975, count - 1))
+    quantile = student_t_quantile(0.975, count - 1)
     u, w, b, m = (half * np.sqrt(count) / quantile for half in item.intervals)  # standard deviations of a trial
     rate, of_rate = (motor, m) if by_motor else (tail, w)
 

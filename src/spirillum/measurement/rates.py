@@ -9,6 +9,7 @@ likelihood (Harville 1974), so that a short stretch with a long memory gives a w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.measurement.statistics import student_t, student_t_quantile
 from spirillum.measurement.strays import stray_frames
 
 __all__ = ["Cycle", "Rate", "mean_of", "rate_of"]
@@ -174,8 +176,6 @@ def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | 
 
     Three readings may lie on a line by chance: where an eye's errors are known, they count as one more residual.
     """
-    from scipy.stats import t
-
     design = np.stack([np.ones_like(s), s], axis=1) * np.sqrt(weights)[:, None]
     inverse = np.linalg.inv(design.T @ design)
     beta = inverse @ design.T @ (y * np.sqrt(weights))
@@ -185,7 +185,7 @@ def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | 
     squares = float(np.sum((y * np.sqrt(weights) - design @ beta) ** 2))
     if eye is not None:
         squares, free = squares + float(np.mean(weights * eye**2)), free + 1
-    reach = float(t.ppf(0.5 + 0.5 * level, free) * np.sqrt(squares / free * inverse[1, 1]))
+    reach = float(student_t_quantile(0.5 + 0.5 * level, free) * np.sqrt(squares / free * inverse[1, 1]))
     return float(beta[1]), float(beta[1] - reach), float(beta[1] + reach)
 
 
@@ -315,7 +315,6 @@ def _solved(blocks: _Blocks, columns: int, noise: _Noise) -> _Solved:
 def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _Fit:
     """A combination of the coefficients, averaged over all noises."""
     from scipy.optimize import brentq
-    from scipy.stats import t
 
     noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _MEMORIES))
     solved = [_solved(blocks, columns, noise) for noise in noises]
@@ -331,7 +330,7 @@ def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _F
 
     def quantile(share: float) -> float:
         def excess(at: float) -> float:
-            return float(weights @ t.cdf((at - centres) / np.maximum(widths, 1e-300), free)) - share
+            return float(weights @ student_t((at - centres) / np.maximum(widths, 1e-300), free)) - share
 
         return float(brentq(excess, value - reach, value + reach, xtol=1e-6 * reach))
 
@@ -347,15 +346,13 @@ def _bend(blocks: _Blocks) -> bool:
     A bent line has to explain the series far better than a straight one with errors of whatever memory (likelihood
     ratio of both at their best noise).
     """
-    from scipy.stats import chi2
-
     count = blocks.s.size
     if count < 24:
         return False
     noises = _noises(blocks, _SHARES[1::2], np.geomspace(2.0 / count, 2.0, 5))
     straight, bent = ([_solved(blocks, columns, noise) for noise in noises] for columns in (2, 4))
     gain = 2.0 * (max(item.fit for item in bent) - max(item.fit for item in straight))
-    if chi2.sf(gain, 2) > _UNSTEADY_P:
+    if gain < -2.0 * math.log(_UNSTEADY_P):  # chi-squared with two degrees of freedom: exp(-gain/2)
         return False
     beta = max(bent, key=lambda item: item.fit).beta
     slope = np.polynomial.legendre.legval(np.linspace(-1, 1, 41), np.polynomial.legendre.legder(beta))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.measurement.statistics import student_t_quantile
 
 __all__ = ["GRUBBS_LEVEL", "outlying_trial", "stray_frames"]
 
@@ -34,15 +35,14 @@ def stray_frames(time: Samples, values: Samples, error: Samples | None = None) -
     Returns:
         Truth values, (n,).
     """
-    from scipy.ndimage import median_filter
-
     found = np.zeros(values.shape, dtype=bool)
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(time))
     if known.size < 2 * _WINDOW:
         return found
     own = np.zeros(values.shape) if error is None else np.nan_to_num(error)
     level = values[known] - _robust_line(time[known], values[known])
-    near = level - median_filter(level, _WINDOW, mode="nearest")
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(level, _WINDOW // 2, mode="edge"), _WINDOW)
+    near = level - np.median(around, axis=1)
     strays = _far(near, np.maximum(_LEAST * _spread(level), own[known]))
     kept = known[~strays]
     found[known[strays]] = True
@@ -64,14 +64,15 @@ def _far(deviation: Samples, least: Samples) -> np.ndarray:
 
 
 def _robust_line(time: Samples, values: Samples) -> Samples:
-    """Siegel's line through the medians of some stretches: half of them may be wrong."""
-    from scipy.stats import siegelslopes
-
+    """Siegel's line (1982, repeated medians) through the medians of some stretches: half of them may be wrong."""
     pieces = np.array_split(np.arange(time.size), min(60, time.size))
     t = np.array([np.median(time[piece]) for piece in pieces])
     y = np.array([np.median(values[piece]) for piece in pieces])
-    slope, start = siegelslopes(y, t)[:2]
-    return np.asarray(start + slope * time)
+    apart = ~np.eye(t.size, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        slopes = (y[:, None] - y) / (t[:, None] - t)
+    slope = np.median(np.median(slopes[apart].reshape(t.size, -1), axis=1))
+    return np.asarray(np.median(y - slope * t) + slope * time)
 
 
 def outlying_trial(values: Sequence[float]) -> int | None:
@@ -83,8 +84,6 @@ def outlying_trial(values: Sequence[float]) -> int | None:
     Returns:
         Its index; None if all fit, or with fewer than three.
     """
-    from scipy.stats import t
-
     numbers = np.asarray(values, dtype=float)
     known = np.flatnonzero(np.isfinite(numbers))
     count = known.size
@@ -94,7 +93,7 @@ def outlying_trial(values: Sequence[float]) -> int | None:
     if spread <= 0:
         return None
     distance = np.abs(numbers[known] - numbers[known].mean()) / spread
-    quantile = float(t.ppf(1.0 - GRUBBS_LEVEL / (2 * count), count - 2))
+    quantile = student_t_quantile(1.0 - GRUBBS_LEVEL / (2 * count), count - 2)
     bound = (count - 1) / np.sqrt(count) * np.sqrt(quantile**2 / (count - 2 + quantile**2))
     worst = int(np.argmax(distance))
     return int(known[worst]) if distance[worst] > bound else None

@@ -126,8 +126,6 @@ def _frequency(flat: Samples) -> float | None:
     length = 4 * 1 << int(np.ceil(np.log2(width)))
     power = np.abs(np.fft.rfft(flat * np.hanning(width), length, axis=1)) ** 2
     frequency = np.fft.rfftfreq(length)
-    from scipy.ndimage import median_filter
-
     # a ruler's wave runs through the whole width: its peak is as narrow as the width allows, and stands out of a row
     share = power / np.maximum(power[:, frequency > 1.0 / width].sum(axis=1, keepdims=True), 1e-9)
     score = np.sum(share**2 * np.sqrt(power), axis=0)
@@ -137,7 +135,7 @@ def _frequency(flat: Samples) -> float | None:
         return None
     peak = int(np.argmax(np.where(allowed, score, 0.0)))
     around = int(40 * length / width) | 1
-    usual = median_filter(level, around, mode="nearest")[peak]
+    usual = np.median(np.pad(level, around // 2, mode="edge")[peak : peak + around])
     if not level[peak] > _CLEAR * usual:
         return None
     return float(frequency[peak])
