@@ -14,6 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
+from spirillum.tracking.cuts import cuts_in
 from spirillum.tracking.frames import Video
 from spirillum.tracking.identity import Introduced, introduced
 from spirillum.tracking.optics import BodyPose, Optics, placed, places_seen_by
@@ -168,6 +169,7 @@ def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _R
     hand = known.wire.handedness()
     motion = time, body_angle, tail_phase, position[:, 0], body.robot
     odd = (*nothing_moves(*motion), *contradictions(*motion, hand))
+    cuts = cuts_in(time, position[:, 0], body_angle, tail_phase, optics.length_per_pixel)
     frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
     return Track(
         time=time,
@@ -185,7 +187,7 @@ def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _R
         setup=setup,
         video=video.name,
         words=video.words,
-        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *roll_flags, *tail_flags, *odd),
+        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *cuts, *roll_flags, *tail_flags, *odd),
     )
 
 

@@ -1,0 +1,58 @@
+"""A piece that is missing from a film shows in place, body and tail at once; noise, gaps and pushes do not."""
+
+import numpy as np
+import pytest
+
+from spirillum.tracking.cuts import cuts_in
+
+PIXEL = 2.5e-4
+
+
+def series(noise=1.0, frames=300, fps=30.0, missing=(), seed=1):
+    """Times that go on evenly, and what a robot of 1 mm/s, -0.12 Hz and 1.2 Hz shows; `missing`: true seconds."""
+    rng = np.random.default_rng(seed)
+    true = np.arange(frames + 200) / fps
+    for start, end in missing:
+        true = true[(true < start) | (true >= end)]
+    true = true[:frames]
+    x = 1e-3 * true + noise * 0.05 * PIXEL * rng.normal(size=true.size)
+    body = -2 * np.pi * 0.12 * true + noise * 0.01 * rng.normal(size=true.size)
+    tail = 2 * np.pi * 1.2 * true + noise * 0.03 * rng.normal(size=true.size)
+    return true, x, body, tail
+
+
+def unwrapped(angle, period):
+    return np.unwrap(angle, period=period)
+
+
+@pytest.mark.parametrize(("start", "end"), [(4.0, 6.0), (2.0, 3.1), (7.0, 7.4)])
+def test_a_missing_piece_is_found_where_it_is(start, end):
+    true, x, body, tail = series(missing=[(start, end)])
+    (flag,) = cuts_in(np.arange(true.size) / 30.0, x, unwrapped(body, np.pi), unwrapped(tail, 2 * np.pi), PIXEL)
+    assert flag.name == "video-is-cut"
+    assert f"at {start - 0.5 / 30:.2f} s" in flag.sentence
+    assert "forward_velocity" in flag.spoils
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whole_films_are_whole(seed):
+    _, x, body, tail = series(noise=3.0, seed=seed)
+    assert cuts_in(np.arange(x.size) / 30.0, x, body, tail, PIXEL) == ()
+
+
+def test_a_gap_with_true_times_is_honest():
+    true, x, body, tail = series(missing=[(4.0, 6.0)])
+    assert cuts_in(true, x, body, tail, PIXEL) == ()
+
+
+def test_a_push_moves_the_robot_alone():
+    true, x, body, tail = series()
+    assert cuts_in(true, np.where(true > 5.0, x + 2e-3, x), body, tail, PIXEL) == ()
+
+
+def test_short_and_unseen_series_say_nothing():
+    true, x, body, tail = series(frames=20)
+    assert cuts_in(true, x, body, tail, PIXEL) == ()
+    assert cuts_in(true[:1], x[:1], body[:1], tail[:1], PIXEL) == ()
+    true, x, body, tail = series()
+    assert cuts_in(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan), PIXEL) == ()
