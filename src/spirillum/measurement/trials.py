@@ -51,6 +51,8 @@ _PHASE_ERROR = math.radians(1.0)
 """Usual size of errors of the tail's phase that come back once or twice a turn, rad."""
 _SLOW_PIXELS = 0.01
 """Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
+_SLOW_BARE = 0.1
+"""The same of a body without stripes, which its nose alone places along the channel; 0.12 and less on rendered films."""
 _SLOW_ANGLE = math.radians(0.1)
 """The same of an angle, rad; at least the standard error of a frame, of which glare makes a slow one."""
 _PLACE = 0.15
@@ -260,7 +262,8 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     """A velocity: the interval holds the scale's uncertainty too."""
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
-    return _widened(rate, "m/s", _slow(track, _SLOW_PIXELS * pixel), scale)
+    bare = any(flag.name == "no-stripes" for flag in track.flags)
+    return _widened(rate, "m/s", _slow(track, (_SLOW_BARE if bare else _SLOW_PIXELS) * pixel), scale)
 
 
 def _mean(track: Track, values: Samples, unit: str, lasting: float) -> Measured:
