@@ -230,3 +230,13 @@ def test_a_reading_of_a_frame_that_is_not_there_is_refused(tmp_path: Path, make_
     marks = read_marks(written(tmp_path, "frame,x_mm\n5,1\n9999,2\n"))[""]
     with pytest.raises(InputError, match="row 3: frame 9999 was not measured"):
         corrected(make_track(), marks, None)
+
+
+def test_frame_and_time_of_a_reading_have_to_agree(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    track = make_track()
+    frame, time = int(track.frame[60]), float(track.time[60])
+    marks = read_marks(written(tmp_path, f"frame,time_s,x_mm\n{frame},{time + 0.5:.3f},1\n"))[""]  # to whole seconds
+    corrected(track, marks, None)
+    marks = read_marks(written(tmp_path, f"frame,time_s,x_mm\n0,0,0\n{frame},{time + 2:.3f},1\n"))[""]
+    with pytest.raises(InputError, match=f"row 3: frame {frame} is at .* s, but time_s is"):
+        corrected(track, marks, None)

@@ -140,3 +140,10 @@ def test_an_outlying_trial_is_flagged_and_still_counts(make_track: Make, robot: 
     summary = summary_of(judged)
     assert summary.counts["tail_rotation_rate"] == 6
     assert summary.quantities["tail_rotation_rate"].value == pytest.approx((5 * 7.02 + 9.0) / 6, rel=1e-3)
+
+
+def test_a_copy_of_a_trial_is_said(make_track: Make, robot: Any) -> None:
+    trials = compared([trial_of(make_track(seed=seed), robot, name) for seed, name in ((1, "a"), (2, "b"), (1, "c"))])
+    copies = [[flag for flag in trial.flags if flag.name == "copy-of-a-trial"] for trial in trials]
+    assert [len(flags) for flags in copies] == [0, 0, 1]
+    assert "the same as a," in copies[2][0].sentence

@@ -172,3 +172,12 @@ def test_a_folder_named_like_a_picture_is_no_frame(tmp_path):
     video = open_video(tmp_path, frames_per_second=10.0)
     assert [frame.time for frame in video.frames()] == pytest.approx([0.0, 0.1, 0.3])
     assert video.flags == []
+
+
+def test_one_image_of_another_size_does_not_decide_for_all(tmp_path):
+    for index in range(5):
+        cv2.imwrite(str(tmp_path / f"{index:03d}.png"), np.full((40, 50 if index == 0 else 60, 3), 90, np.uint8))
+    video = open_video(tmp_path, 30.0)
+    assert video.size == (60, 40)
+    assert [frame.index for frame in video.frames()] == [1, 2, 3, 4]
+    assert [flag.name for flag in video.flags] == ["unreadable-frames"]

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from spirillum.measurement.statistics import mean_with_interval
 from spirillum.measurement.strays import GRUBBS_LEVEL, outlying_trial
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial
@@ -71,8 +73,8 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:
-    """The same trials; one that does not fit in with the others carries a flag. None is dropped."""
-    found = list(trials)
+    """The same trials; one that does not fit in with the others, or is a copy, carries a flag. None is dropped."""
+    found = [_told_apart(trial, trials[:place]) for place, trial in enumerate(trials)]
     for name in RATE_NAMES:
         worst = outlying_trial([trial.quantities[name].value for trial in trials])
         if worst is None:
@@ -83,3 +85,15 @@ def compared(trials: Sequence[Trial]) -> list[Trial]:
         )
         found[worst] = found[worst].flagged(Flag(f"outlier-{name.replace('_', '-')}", sentence))
     return found
+
+
+def _told_apart(trial: Trial, others: Sequence[Trial]) -> Trial:
+    """The trial; flagged if it shows frame by frame what another one does."""
+    x = trial.track.position[:, 0]
+    twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
+    if twin is None or not np.isfinite(x).any():
+        return trial
+    sentence = (
+        f"it shows the same as {twin.name}, frame by frame: a copy is no second trial, yet it counts in the means"
+    )
+    return trial.flagged(Flag("copy-of-a-trial", sentence))

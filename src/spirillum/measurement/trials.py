@@ -52,7 +52,7 @@ _PHASE_ERROR = math.radians(1.0)
 _SLOW_PIXELS = 0.01
 """Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
 _SLOW_BARE = 0.1
-"""The same of a body without stripes, which its nose alone places along the channel; 0.12 and less on rendered films."""
+"""The same of a body without stripes, which its nose alone places along the channel; to 0.12 on rendered films."""
 _SLOW_ANGLE = math.radians(0.1)
 """The same of an angle, rad; at least the standard error of a frame, of which glare makes a slow one."""
 _PLACE = 0.15
