@@ -86,7 +86,8 @@ def test_perspective_shows_a_wrong_hand(flat_pictures: ModuleType, tmp_path: Pat
 def test_a_tail_of_another_wavelength_does_not_fit(flat_pictures: ModuleType, tmp_path: Path, change: Any) -> None:
     wire, _, _ = learnt(film(flat_pictures), tmp_path, **change)
     assert wire.flags[0].name == "tail-does-not-fit"
-    assert re.search(r"looks like 2[456]\.", wire.flags[0].sentence)
+    assert re.search(r"tail.wavelength looks like 2[456]\.", wire.flags[0].sentence)
+    assert "amplitude" not in wire.flags[0].sentence
 
 
 @pytest.mark.parametrize("amplitude", ["1.6 mm", "4 mm"])

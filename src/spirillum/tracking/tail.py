@@ -38,10 +38,8 @@ _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0
 """Weights of red, green and blue that are tried first: a darker, brighter, more yellow, ... wire than its sides."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
 """Wavelengths that are tried, over that of the robot file."""
-_AMPLITUDES = (0.5, 0.63, 0.8, 1.25, 1.6, 2.0)
-"""Amplitudes that are tried with them where another wavelength fits better, over that of the robot file."""
-_CLEARLY = 2.0
-"""How much better one of them has to fit to be what is wrong."""
+_AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
+"""Amplitudes that are tried with them where the tail does not fit, over that of the robot file."""
 
 
 class _Strip(NamedTuple):
@@ -346,23 +344,15 @@ class TailWave:
         scores = self._likeness(ridges, 1.0)
         if scores is None:
             return
-        tail, own = self.robot.tail, float(np.interp(1.0, _FACTORS, scores))
-        best = int(np.argmax(scores))
+        own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
         if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
-            what, seen, given, score = "wavelength", _FACTORS[best], tail.wavelength, scores[best]
-            tried = [self._likeness(ridges, factor) for factor in _AMPLITUDES]
-            highest = [-np.inf if one is None else one.max() for one in tried]
-            if max(highest) > _CLEARLY * max(score, 0.0):
-                what, given, score = "amplitude", tail.amplitude, max(highest)
-                seen = _AMPLITUDES[int(np.argmax(highest))]
-            spoils = _TAIL if readable < 0.8 or own < 0.7 * score else ()
-            sentence = (
-                f"the tail's {what} looks like {seen * given * 1e3:.1f} mm, but tail.{what} is {given * 1e3:.3g} mm: "
-                "check the robot file; "
-                + ("the tail's rotation is not given" if spoils else "its rotation is read all the same")
+            spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
+            sentence = f"the tail does not look as the robot file says{self._seen_shape(few)}: check the file; " + (
+                "the tail's rotation is not given" if spoils else "its rotation is read all the same"
             )
             self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
             return
+        tail = self.robot.tail
         if len(fits):
             share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
             if abs(share) > 0.2:
@@ -371,6 +361,27 @@ class TailWave:
                     f"that of the file, {tail.amplitude * 1e3:.3g} mm: check it; its rotation is read all the same"
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence))
+
+    def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> str:
+        """The wavelength and amplitude that look likeliest, in whatever colours, in words; empty if none does."""
+        tail, found = self.robot.tail, []
+        for weights in _CONTRASTS:
+            contrast = np.array(weights) / np.linalg.norm(weights)
+            ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
+            ridges = [(ridge / (np.sqrt(np.mean(np.nan_to_num(ridge) ** 2)) + 0.5), strip) for ridge, strip in ridges]
+            for amplitude in _AMPLITUDES:
+                likeness = self._likeness(ridges, amplitude)
+                if likeness is not None:
+                    found.append((likeness.max(), _FACTORS[int(np.argmax(likeness))], amplitude))
+        score, wavelength, amplitude = max(found, default=(0.0, 1.0, 1.0))
+        if score <= 0.0:
+            return ""
+        seen = []
+        for name, factor, least in (("wavelength", wavelength, 0.07), ("amplitude", amplitude, 0.0)):
+            if abs(factor - 1.0) > least:
+                given = getattr(tail, name) * 1e3
+                seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
+        return f" ({'; '.join(seen)})" if seen else ""
 
     def _likeness(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
         """How well waves of `_FACTORS` times the wavelength fit; None where too little of the tail is in view."""
