@@ -1,6 +1,6 @@
 """Measured against truth: degraded (or clean) films of the virtual camera, with random speeds, rates and places.
 
-    python benchmarks/measuring_virtual_trials.py 100 [--clean] [--keep FOLDER]
+    python benchmarks/measuring_virtual_trials.py 100 [--clean] [--keep FOLDER] [--duration 60] [--slow]
 
 Synthetic throughout. Prints errors and whether the 95 % intervals hold the truth, and how much faster than real time
 `measure` was. A hundred trials take an hour of one core, most of it for drawing the films.
@@ -17,7 +17,8 @@ import numpy as np
 import spirillum as sp
 
 QUANTITIES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
-DURATION = 20.0
+SLOW_SPEED, SLOW_BODY = 0.2, 0.02
+"""mm/s and Hz below which a trial is slow."""
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:
@@ -25,13 +26,24 @@ def between(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def rendered(folder: Path, number: int, preset: str) -> Path:
+def drawn(number: int) -> tuple[np.random.Generator, float, float, float]:
+    """The random numbers of a trial: for more of them, speed (mm/s), and rates of tail and body (Hz)."""
+    rng = np.random.default_rng(1000 + number)
+    return rng, between(rng, 0.1, 1.5), between(rng, 0.2, 5.0), between(rng, 0.01, 0.3)
+
+
+def is_slow(number: int) -> bool:
+    """Whether the robot of a trial swims or turns slowly."""
+    _, speed, _, body = drawn(number)
+    return speed < SLOW_SPEED or body < SLOW_BODY
+
+
+def rendered(folder: Path, number: int, preset: str, duration: float) -> Path:
     """A film with random truth, and its setup and truth beside it; one that is there is kept."""
     film = folder / f"{preset}-{number:03d}.mp4"
     if film.with_suffix(".truth.json").exists():
         return film
-    rng = np.random.default_rng(1000 + number)
-    speed, tail, body = between(rng, 0.1, 1.5), between(rng, 0.2, 5.0), between(rng, 0.01, 0.3)
+    rng, speed, tail, body = drawn(number)
     how = {
         "view": "side" if rng.random() < 0.2 else "top",
         "direction": "left" if rng.random() < 0.5 else "right",
@@ -46,7 +58,7 @@ def rendered(folder: Path, number: int, preset: str) -> Path:
         forward_velocity=f"{speed} mm/s",
         tail_rate=f"{tail} Hz",
         body_rate=f"{-body} Hz",
-        duration=DURATION,
+        duration=duration,
         degradation=preset,
         seed=number,
         **how,
@@ -60,15 +72,18 @@ def main() -> None:
     parser.add_argument("trials", type=int)
     parser.add_argument("--clean", action="store_true")
     parser.add_argument("--keep", type=Path, help="folder for the films")
+    parser.add_argument("--duration", type=float, default=20.0, help="of a film, s")
+    parser.add_argument("--slow", action="store_true", help="only trials of slow robots")
     asked = parser.parse_args()
+    numbers = [number for number in range(asked.trials) if is_slow(number) or not asked.slow]
     errors: dict[str, list[float]] = {name: [] for name in QUANTITIES}
     inside: dict[str, list[bool]] = {name: [] for name in QUANTITIES}
     spent = 0.0
     with TemporaryDirectory() as temporary:
         folder = asked.keep or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
-        for number in range(asked.trials):
-            film = rendered(folder, number, "clean" if asked.clean else "degraded")
+        for number in numbers:
+            film = rendered(folder, number, "clean" if asked.clean else "degraded", asked.duration)
             start = time.perf_counter()
             measured = sp.measure([film], film.with_suffix(".setup.toml"), annotated=False)
             spent += time.perf_counter() - start
@@ -86,12 +101,12 @@ def main() -> None:
             print(film.stem, ", ".join(words), flush=True)
     for name in QUANTITIES:
         size = np.abs(errors[name])
-        missing = asked.trials - len(inside[name])
+        missing = len(numbers) - len(inside[name])
         print(
             f"{name}: {sum(inside[name])} of {len(inside[name])} inside, {missing} not given; error "
             f"median {np.median(size):.3f} %, 90 % below {np.quantile(size, 0.9):.3f} %, largest {size.max():.3f} %"
         )
-    print(f"{asked.trials * DURATION / spent:.1f} times faster than real time")
+    print(f"{len(numbers) * asked.duration / spent:.1f} times faster than real time")
 
 
 if __name__ == "__main__":

@@ -135,6 +135,23 @@ def test_nothing_measured_is_an_error_with_the_first_sentence(
     assert not (tmp_path / "out").exists()
 
 
+def test_tables_of_others_stay_and_datasets_of_others_are_said(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    followed |= {"a.mp4": make_track(), "b.mp4": make_track(seed=2)}
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "observations.csv").write_text("my own")
+    with pytest.raises(InputError, match=r"observations\.csv is there and not from a measurement"):
+        measure("a.mp4", setup_file, folder, annotated=False, figures=False)
+    assert (folder / "observations.csv").read_text() == "my own"
+    (folder / "observations.csv").unlink()
+    measure("a.mp4", setup_file, folder, annotated=False, figures=False)
+    found = measure("b.mp4", setup_file, folder, annotated=False, figures=False)
+    assert found.left == ("a.movement.nc", "a.nc")
+    assert any("left in the folder from before: a.movement.nc, a.nc" in sentence for sentence in found.warnings)
+
+
 def test_an_interruption_keeps_what_was_finished(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:

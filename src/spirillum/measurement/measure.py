@@ -36,6 +36,7 @@ from spirillum.tracking.track import Flag, Track
 __all__ = ["Measurement", "measure"]
 
 Progress = Callable[[str, int, int], None]
+_TABLE = "observations.csv"
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class Measurement:
     """Files that were written."""
     interrupted: bool = False
     """Whether it was interrupted before the last video."""
+    left: tuple[str, ...] = ()
+    """Datasets of other measurements that lie in the same folder."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -69,6 +72,8 @@ class Measurement:
         ]
         if len(self.trials) == 1:
             found.append("one trial: the intervals are its own, and say nothing of how trials differ")
+        if self.left:
+            found.append(f"not of this measurement, and left in the folder from before: {', '.join(self.left)}")
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:
@@ -145,7 +150,7 @@ def measure(
     folder = None if output is None else Path(output)
     fresh = folder is not None and not folder.exists()
     if folder is not None:
-        output_folder(folder)
+        _check_folder(output_folder(folder))
     work = _Work(chosen, robot, str(setup), folder, annotated=annotated, figures=figures, progress=progress)
     for number, (path, name) in enumerate(zip(paths, names, strict=True)):
         try:
@@ -163,6 +168,13 @@ def measure(
         sentences = [sentence for _, sentence in work.failures]
         raise InputError(f"{sentences[0]}{more}", sentences)
     return work.finish(interrupted=False)
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse to replace a table of observations that no measurement has written."""
+    table = folder / _TABLE
+    if table.exists() and not any(folder.glob("*.nc")):
+        raise InputError(f"{table} is there and not from a measurement; allowed: another folder for the results")
 
 
 def _loaded(
@@ -327,8 +339,8 @@ class _Work:
         trials = compared(self.trials)
         rows = observation_rows(trials, self.robot, Path(self.setup_file).name)
         if self.folder is not None and rows is not None:
-            write_text(self.folder / "observations.csv", rows)
-            self.files.append("observations.csv")
+            write_text(self.folder / _TABLE, rows)
+            self.files.append(_TABLE)
         found = Measurement(
             tuple(trials),
             summary_of(trials),
@@ -337,6 +349,7 @@ class _Work:
             tuple(self.failures),
             tuple(self.files),
             interrupted,
+            self._left(),
         )
         if self.folder is None or not self.figures:
             return found
@@ -344,6 +357,11 @@ class _Work:
 
         more = write_measurement_report(found, self.folder, self.thumbnails, self.progress)
         return replace(found, files=(*found.files, *more))
+
+    def _left(self) -> tuple[str, ...]:
+        if self.folder is None:
+            return ()
+        return tuple(sorted(path.name for path in self.folder.glob("*.nc") if path.name not in self.files))
 
 
 def _in_pixels(marks: Marks | None) -> bool:
