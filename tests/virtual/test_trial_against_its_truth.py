@@ -233,6 +233,7 @@ def test_steady_ways_are_straight_and_wobbles_come_back() -> None:
         ({"exposure": "1 s"}, "exposure"),
         ({"gap": "12 mm"}, "allowed: 0 to 11 mm"),
         ({"lateral": "11 mm"}, "at most 10.5 mm"),
+        ({"wobble": "1 m"}, "0 to 11 mm, the room in the channel"),
         ({"start": "1 m"}, "never in the picture"),
         ({"duration": "0 s"}, "makes 1 frames"),
         ({"seed": -1}, "seed"),

@@ -98,6 +98,6 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) ->
     if lines is None:
         raise InputError(
             f"{video.name} shows no ruler: no equally spaced lines across the direction of swimming were found; "
-            "allowed: a ruler in view, or markers.length_per_pixel"
+            "allowed: a ruler and a channel along the rows of the picture, or markers.length_per_pixel"
         )
     return fitted_camera(setup, video.size, lines, lens)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,6 +130,7 @@ def motion_of(
         forward_velocity=forward_velocity,
         body_rate=body_rate,
     )
+    _check_wobble(loaded, placement["wobble"])
     turn = lab_to_camera(view, leftwards=leftwards)
     position = turn @ _resting(loaded, placement["gap"], placement["lateral"])
     position = position + np.array([0.0, 0.0, tube_height(loaded, view, side_axis)])
@@ -158,6 +160,13 @@ def _of_run(
     way = way.until(parse_option("duration", duration, KINDS["time"]))
     model = str(dataset.attrs.get("model", ""))[:60]
     return Motion(loaded, way, f"run, {model}" if model else "run")
+
+
+def _check_wobble(robot: Robot, wobble: float) -> None:
+    """Refuse a wobble that is wider than the channel."""
+    room = math.inf if robot.channel is None else 0.5 * (robot.channel.diameter - robot.body.diameter)
+    if wobble > room:
+        raise InputError(f"wobble = {1e3 * wobble:.4g} mm; allowed: 0 to {1e3 * room:.4g} mm, the room in the channel")
 
 
 def _resting(robot: Robot, gap: float, lateral: float) -> Samples:
