@@ -175,3 +175,10 @@ def test_grubbs_test_against_its_table() -> None:
     assert outlying_trial([*base, 8.0]) is None
     assert outlying_trial([1.0, 1.0, 9.0]) is None or outlying_trial([1.0, 1.0, 9.0]) == 2
     assert outlying_trial([1.0, 9.0]) is None
+
+
+def test_what_rests_is_steady() -> None:
+    time = np.arange(300) / 30.0
+    found = rate_of(time, np.full(300, 3.7e-3))
+    assert found.steady
+    assert abs(found.value) < 1e-12

@@ -34,6 +34,8 @@ _UNSTEADY_P = 1e-5
 _LARGEST_RATIO = 1e6
 """Variance of what returns over that of noise: beyond it nothing changes but rounding."""
 _UNSTEADY_SHARE = 0.1
+_ROUNDING = 1e-12
+"""Range of a series over its values that is rounding: what rests is steady."""
 
 
 @dataclass(frozen=True)
@@ -347,7 +349,7 @@ def _bend(blocks: _Blocks) -> bool:
     ratio of both at their best noise).
     """
     count = blocks.s.size
-    if count < 24:
+    if count < 24 or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False
     noises = _noises(blocks, _SHARES[1::2], np.geomspace(2.0 / count, 2.0, 5))
     straight, bent = ([_solved(blocks, columns, noise) for noise in noises] for columns in (2, 4))
