@@ -137,3 +137,21 @@ def test_largest_rates_are_half_a_period_a_frame() -> None:
     robot = load("biorob2012-wide")
     assert nyquist(setup, robot, 30.0) == pytest.approx((30.0 * np.pi, 15.0 * np.pi))
     assert np.isnan(nyquist(setup, load("biorob2012-wide", seal="none"), 30.0).body)
+
+
+@pytest.mark.parametrize(("leaps", "said"), [(0, False), (1, False), (2, True), (5, True)])
+def test_a_body_that_leaps_twice_has_other_stripes(leaps, said):
+    time = np.arange(240) / 30.0
+    true = -0.7 * time + 0.05 * np.sin(8.0 * time)
+    for place in np.linspace(30, 200, leaps):
+        true = np.where(time >= time[int(place)], true + np.radians(40.0), true)
+    _, found = unwrapped(time, true % np.pi, np.full(240, 0.01), np.pi)
+    assert ("stripes-do-not-fit" in [flag.name for flag in found]) == said
+    assert not said or found[-1].spoils == ("body_rotation_rate",)
+
+
+def test_stripes_read_on_few_frames_give_no_rate():
+    time = np.arange(240) / 30.0
+    angle = np.where(np.arange(240) % 12 == 0, -0.7 * time % np.pi, np.nan)
+    _, (flag,) = unwrapped(time, angle, np.full(240, 0.01), np.pi)
+    assert (flag.name, flag.spoils) == ("stripes-unreadable", ("body_rotation_rate",))
