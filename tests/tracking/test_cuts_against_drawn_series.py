@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.tracking.cuts import cuts_in
+from spirillum.tracking.cuts import cuts_in, jumps_of_time
 
 PIXEL = 2.5e-4
 
@@ -40,9 +40,23 @@ def test_whole_films_are_whole(seed):
     assert cuts_in(np.arange(x.size) / 30.0, x, body, tail, PIXEL) == ()
 
 
-def test_a_gap_with_true_times_is_honest():
-    true, x, body, tail = series(missing=[(4.0, 6.0)])
+@pytest.mark.parametrize("gap", [0.2, 0.5, 2.0, 5.0])
+def test_a_gap_with_true_times_is_honest(gap):
+    true, x, body, tail = series(missing=[(4.0, 4.0 + gap)])
     assert cuts_in(true, x, body, tail, PIXEL) == ()
+    assert jumps_of_time(true, x, body, tail, PIXEL, np.pi) == ()
+
+
+@pytest.mark.parametrize("jump", [0.5, 1.7, 4.7])
+def test_times_that_jump_alone_are_said(jump):
+    true, x, body, tail = series()
+    stamps = np.where(true > 4.0, true + jump, true)
+    tail = np.where(true > 4.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)  # as it is unwrapped by these times
+    body = np.where(true > 4.0, body - np.pi * np.round(0.24 * jump), body)
+    (flag,) = jumps_of_time(stamps, x, body, tail, PIXEL, np.pi)
+    assert flag.name == "times-do-not-fit"
+    assert f"jump by {jump + 1 / 30:.2f} s at {true[120]:.2f} s" in flag.sentence
+    assert "tail_rotation_rate" in flag.spoils
 
 
 def test_a_push_moves_the_robot_alone():
@@ -54,5 +68,7 @@ def test_short_and_unseen_series_say_nothing():
     true, x, body, tail = series(frames=20)
     assert cuts_in(true, x, body, tail, PIXEL) == ()
     assert cuts_in(true[:1], x[:1], body[:1], tail[:1], PIXEL) == ()
+    assert jumps_of_time(true[:1], x[:1], body[:1], tail[:1], PIXEL, np.pi) == ()
+    assert jumps_of_time(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3], PIXEL, np.pi) == ()
     true, x, body, tail = series()
     assert cuts_in(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan), PIXEL) == ()

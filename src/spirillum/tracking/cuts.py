@@ -1,7 +1,12 @@
-"""A film from which a piece is missing though its times go on evenly: place, body and tail jump on the same frame."""
+"""Films whose times do not fit what they show.
+
+Where a piece is missing though the times go on evenly, place, body and tail jump on the same frame. Where the times
+jump though nothing is missing, they go on as if no time had passed.
+"""
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.tracking.track import Flag
 from spirillum.tracking.warnings import EVERYTHING
 
-__all__ = ["cuts_in"]
+__all__ = ["cuts_in", "jumps_of_time"]
 
 _AROUND = 8
 """Frames before and after, through which the lines go that do not meet at a jump."""
@@ -21,6 +26,10 @@ _PLACE, _ANGLE = 2.0, 0.25
 """Least jump of the place, pixels, and of an angle, rad."""
 _GAP = 3.0
 """Times between frames over the usual one, from which on a gap is honest and no line goes across."""
+_LONG = 30
+"""Readings before and after a gap, through which the lines go that tell whether time has passed."""
+_TOGETHER = 0.5
+"""Share of the least jump below which lines meet."""
 _UNSEEN = 20
 """Frames without the robot over which lines go on, as it may be lost where it jumps."""
 
@@ -51,6 +60,61 @@ def cuts_in(
             )
             return (Flag("video-is-cut", sentence, EVERYTHING),)
     return ()
+
+
+def jumps_of_time(
+    time: Samples, x: Samples, body_angle: Samples, tail_phase: Samples, length_per_pixel: float, period: float
+) -> tuple[Flag, ...]:
+    """A jump of the time stamps over which place, body and tail go on as if no time had passed.
+
+    Args:
+        time: s, (n,).
+        x: place along the channel, m, (n,); NaN where it is not known, as below.
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        length_per_pixel: m.
+        period: of the stripes, rad.
+    """
+    if time.size < 2:
+        return ()
+    steps = np.diff(time)
+    usual, gap = float(np.median(steps)), int(np.argmax(steps))
+    if not steps[gap] > _GAP * usual:
+        return ()
+    closed = np.where(np.arange(time.size) > gap, time - (steps[gap] - usual), time)
+    series = (
+        (x, 0.5 * _PLACE * length_per_pixel, math.inf),
+        (body_angle, 0.5 * _ANGLE, period),
+        (tail_phase, 0.5 * _ANGLE, 2.0 * math.pi),
+    )
+    true, even = ([_miss(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
+    if sum(one > 1.0 for one in true) < 2 or not max(even) < _TOGETHER:
+        return ()
+    sentence = (
+        f"the times of the frames jump by {steps[gap]:.2f} s at {time[gap]:.2f} s, but body and tail go on as if no "
+        "time had passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
+    )
+    return (Flag("times-do-not-fit", sentence, EVERYTHING),)
+
+
+def _miss(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
+    """How far two lines miss each other in the middle of a gap after frame `gap`, over what says that they do.
+
+    That is `least` where they end half a frame before and after it, and more the farther they have to go; whole
+    periods are not known.
+    """
+    middle, far, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, []
+    for part in (slice(None, gap + 1), slice(gap + 1, None)):
+        known = np.flatnonzero(np.isfinite(values[part]))
+        known = known[-_LONG:] if part.start is None else known[:_LONG]
+        if known.size < _AROUND:
+            return 0.0
+        t, v = time[part][known], values[part][known]
+        spans = t - t.mean()
+        slope = float(spans @ v / (spans @ spans))
+        reached.append(float(v.mean()) + slope * (middle - float(t.mean())))
+        far += 0.5 * ((middle - float(t.mean())) / (0.5 * float(np.ptp(t)))) ** 2
+    return float(abs(math.remainder(reached[1] - reached[0], period)) / (least * max(1.0, math.sqrt(far))))
 
 
 def _jump(time: Samples, values: Samples, least: float, usual: float) -> float | None:

@@ -14,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
-from spirillum.tracking.cuts import cuts_in
+from spirillum.tracking.cuts import cuts_in, jumps_of_time
 from spirillum.tracking.frames import Video
 from spirillum.tracking.identity import Introduced, introduced
 from spirillum.tracking.optics import BodyPose, Optics, placed, places_seen_by
@@ -169,7 +169,8 @@ def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _R
     hand = known.wire.handedness()
     motion = time, body_angle, tail_phase, position[:, 0], body.robot
     odd = (*nothing_moves(*motion), *contradictions(*motion, hand))
-    cuts = cuts_in(time, position[:, 0], body_angle, tail_phase, optics.length_per_pixel)
+    series = time, position[:, 0], body_angle, tail_phase, optics.length_per_pixel
+    cuts = (*cuts_in(*series), *jumps_of_time(*series, known.stripes.period))
     frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
     return Track(
         time=time,

@@ -9,14 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from queue import Full, Queue
-from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.extras import required
+from spirillum.tracking.ahead import ahead
 from spirillum.tracking.track import Flag
 from spirillum.tracking.words import one_line, words_of_images
 
@@ -34,6 +33,8 @@ _AHEAD = 12
 _LARGEST = 50_000_000
 """Most pixels of a picture."""
 _SMALLEST = 32
+_SAME_RATE = 0.01
+"""Relative difference from which on two rates are not the same."""
 _FEW = 10
 """Images whose usual size is that of a folder's pictures."""
 _NEAR = 10.0
@@ -93,7 +94,7 @@ class Video:
         Raises:
             InputError: if there is none, or the first cannot be read.
         """
-        return _ahead(self._read(start, end))
+        return ahead(self._read(start, end), _AHEAD)
 
     def samples(self, times: Sequence[float]) -> list[Frame]:
         """The first frames at or after some rising times; fewer where the video has ended.
@@ -277,10 +278,22 @@ def _film(path: Path, frames_per_second: float | None) -> Video:
         elif container.duration is not None:
             duration = container.duration / av.time_base
         rate = frames_per_second or (float(stream.average_rate) if stream.average_rate else None)
+        flags = _replaced(frames_per_second, float(stream.average_rate or 0.0))
         if frames_per_second and stream.frames:
             duration = stream.frames / frames_per_second
         words = [str(container.metadata.get(key, "")) for key in ("title", "comment", "description")]
-    return Video(path, size, duration, rate, frames_per_second, words=one_line(" ".join(words)))
+    return Video(path, size, duration, rate, frames_per_second, words=one_line(" ".join(words)), flags=flags)
+
+
+def _replaced(given: float | None, own: float) -> list[Flag]:
+    """That a rate which the setup gives stands in place of another one, as of a camera for slow motion."""
+    if given is None or own == 0.0 or abs(given / own - 1.0) < _SAME_RATE:
+        return []
+    sentence = (
+        f"camera.frames_per_second = {given:g} stands in place of the {own:.4g} frames a second that the film states: "
+        "all speeds and rates follow it"
+    )
+    return [Flag("rate-replaced", sentence)]
 
 
 def _folder(path: Path, frames_per_second: float | None) -> Video:
@@ -313,39 +326,6 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
         counted,
         words_of_images(path, names[0]),
     )
-
-
-def _ahead(frames: Iterator[Frame]) -> Iterator[Frame]:
-    """The same frames, taken by a thread before they are asked for."""
-    queue: Queue[Frame | BaseException | None] = Queue(_AHEAD)
-    left = Event()
-
-    def put(item: Frame | BaseException | None) -> None:
-        while not left.is_set():
-            with suppress(Full):
-                queue.put(item, timeout=0.2)
-                return
-
-    def read() -> None:
-        try:
-            for frame in frames:
-                put(frame)
-                if left.is_set():
-                    return
-            put(None)
-        except BaseException as error:  # handed over to the thread that asked
-            put(error)
-
-    thread = Thread(target=read, name="decoding", daemon=True)
-    thread.start()
-    try:
-        while (item := queue.get()) is not None:
-            if isinstance(item, BaseException):
-                raise item
-            yield item
-    finally:
-        left.set()
-        thread.join()
 
 
 def _opened(path: Path) -> Any:
