@@ -182,3 +182,13 @@ def test_what_rests_is_steady() -> None:
     found = rate_of(time, np.full(300, 3.7e-3))
     assert found.steady
     assert abs(found.value) < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_start_half_way_keeps_the_mean_from_end_to_end_in_the_interval(seed: int) -> None:
+    time = np.arange(600) / 30.0
+    values = np.maximum(time - 10.0, 0.0) + 0.01 * np.random.default_rng(seed).normal(size=600)
+    found = rate_of(time, values)
+    assert not found.steady
+    assert found.low <= 9.9667 / 19.9667 <= found.high
+    assert found.high - found.low < 0.2

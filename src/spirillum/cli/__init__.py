@@ -14,6 +14,8 @@ __all__ = ["main"]
 
 _NAMING = ("measure", "setup", "virtual-experiment")
 """Commands whose arguments name files and folders."""
+_PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
+"""What is wrong with a name or place, not with the program."""
 _OBJECTS = 50_000
 """New objects between two looks for garbage: imports make many that stay. The last look, at the end, is left out."""
 
@@ -82,11 +84,20 @@ def _explained(error: BaseException) -> int | None:
         return _fail(str(error), 2)
     if isinstance(error, MemoryError):
         return _fail("the request does not fit into memory; allowed: a smaller one", 2)
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return _fail("no space is left for the output; allowed: a place with space", 2)
+    if isinstance(error, OSError) and (sentence := _of_place(error)):
+        return _fail(sentence, 2)
     if hasattr(error, "format_message"):  # a usage error of the command-line library
         return _fail(str(InputError(error.format_message())), 2)
     return None
+
+
+def _of_place(error: OSError) -> str:
+    """What is wrong with a file's name or place; empty if it is something else."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return "no space is left for the output; allowed: a place with space"
+    if error.errno in _PLACES:
+        return f"{str(error.filename)[:80]}: {error.strerror}; allowed: another name or place"
+    return ""
 
 
 def _fail(sentence: str, code: int) -> int:

@@ -68,9 +68,10 @@ def _table(answer: Answer, console: Console) -> None:
     from rich.markup import escape
 
     seen = ", ".join(f"{name} {count}" for name, count in answer["measured"].items())
+    counts = [(answer[name], name[: -1 if answer[name] == 1 else None]) for name in ("rows", "tails", "channels")]
+    rows, tails, channels = (f"{count} {name}" for count, name in counts)
     console.print(
-        f"{escape(answer['file'])}: valid, {answer['rows']} rows of {answer['tails']} tails in "
-        f"{answer['channels']} channels",
+        f"{escape(answer['file'])}: valid, {rows} of {tails} in {channels}",
         highlight=False,
         soft_wrap=True,
     )

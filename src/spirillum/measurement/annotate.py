@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Annotator", "Seen", "annotated_film"]
 
-_BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (255, 150, 20)
+_BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
 _SHIFT = 4
 """Lines are drawn at sixteenths of a pixel."""

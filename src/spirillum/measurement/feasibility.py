@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -194,17 +194,30 @@ def feasibility(
         view = _view(expected, robot, pixel * width, span, rate)
         checks.append(view)
         measured = min(span, view.value)
+    seen = found and math.isfinite(pixel) and measured * rate >= _FEWEST
+    intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
+    warnings = tuple(_warnings(checks, expected, pixel, shares))
+    return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, warnings)
+
+
+def _warnings(
+    checks: Sequence[Check], expected: Mapping[str, tuple[float, str]], pixel: float, shares: Mapping[str, float]
+) -> list[str]:
+    """What to be careful about, a sentence each."""
     warnings = [check.sentence for check in checks if not check.passed]
     if not math.isfinite(pixel):
         warnings.append(
             "nothing says how large a pixel is, so sizes in the picture and intervals are not given; allowed: "
             "--view-width, markers.length_per_pixel, or a VIDEO that shows the ruler"
         )
+    if expected["forward_velocity"][0] < 0:
+        warnings.append(
+            "with this sense of rotation the robot swims backwards; forward are positive rates of the tail of a "
+            "right-handed robot and negative ones of a left-handed one"
+        )
     if not shares:
         warnings.append("the setup gives no uncertainty of heights: 10 mm of depth can be 7 % of a length")
-    seen = found and math.isfinite(pixel) and measured * rate >= _FEWEST
-    intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
-    return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, tuple(warnings))
+    return warnings
 
 
 def _expected(

@@ -72,6 +72,8 @@ class Measurement:
         ]
         if len(self.trials) == 1:
             found.append("one trial: the intervals are its own, and say nothing of how trials differ")
+        if self.files and _TABLE not in self.files:
+            found.append(f"no trial gives a speed or a rate of a robot in a channel: {_TABLE} is not written")
         if self.left:
             found.append(f"not of this measurement, and left in the folder from before: {', '.join(self.left)}")
         return tuple(found)

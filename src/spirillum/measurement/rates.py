@@ -34,6 +34,8 @@ _UNSTEADY_P = 1e-5
 _LARGEST_RATIO = 1e6
 """Variance of what returns over that of noise: beyond it nothing changes but rounding."""
 _UNSTEADY_SHARE = 0.1
+_ENDS = 5
+"""Readings of which an end consists."""
 _ROUNDING = 1e-12
 """Range of a series over its values that is rounding: what rests is steady."""
 
@@ -87,6 +89,7 @@ def rate_of(
     level: float = 0.95,
     *,
     read: np.ndarray | None = None,
+    bent: bool = False,
 ) -> Rate:
     """Mean rate of a series and its interval.
 
@@ -98,6 +101,7 @@ def rate_of(
         level: confidence level.
         read: frames that were read by hand, truth values, (n,): they are left out only beyond six of their own errors,
             which also widen the interval of a few readings that agree by chance.
+        bent: whether it is known that the rate changes.
 
     Returns:
         The slope; where the rate is seen to change, the mean from end to end.
@@ -122,16 +126,20 @@ def rate_of(
         return Rate(*found, count, int(stray.sum()), steady=True, memory=0.0, residual=residual)
     angles = [(np.where(np.isfinite(c.angle), c.angle, 0.0)[used], c.amplitude) for c in cycles]
     blocks = _Blocks.of(s, y, weights, angles)
-    bend = _bend(blocks)
+    bend = bent or _bend(blocks)
     columns = 4 if bend else 2
     # From end to end, (p(1) - p(-1))/2: Legendre polynomials of odd degree count.
     fitted = _averaged(blocks, columns, level, np.array([0.0, 1.0, 0.0, 1.0])[:columns])
     line = np.polynomial.legendre.legval(s, fitted.line)
     residual = _residual(values, used, y - line)
+    low, high = fitted.low, fitted.high
+    if bend:  # what a cubic misses of a start or a stop
+        off = abs(_from_end_to_end(s, y) - fitted.value)
+        low, high = fitted.value - np.hypot(fitted.value - low, off), fitted.value + np.hypot(high - fitted.value, off)
     return Rate(
         fitted.value / half,
-        fitted.low / half,
-        fitted.high / half,
+        float(low) / half,
+        float(high) / half,
         count,
         int(stray.sum()),
         not bend,
@@ -171,6 +179,13 @@ def _weights(error: Samples | None, used: np.ndarray) -> Samples:
     usual = np.nanmedian(here) if np.isfinite(here).any() else 1.0
     ratio = np.where(np.isfinite(here), here / usual, 3.0)
     return np.asarray(1.0 / np.clip(ratio, 1.0 / 3.0, 3.0) ** 2)
+
+
+def _from_end_to_end(s: Samples, y: Samples) -> float:
+    """Slope from the first few readings to the last few."""
+    ends = slice(None, _ENDS), slice(-_ENDS, None)
+    first, last = (np.array([s[end].mean(), y[end].mean()]) for end in ends)
+    return float((last[1] - first[1]) / (last[0] - first[0]))
 
 
 def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | None) -> tuple[float, float, float]:

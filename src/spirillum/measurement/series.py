@@ -115,7 +115,7 @@ def movement_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
     confidence = np.where(np.isfinite(points).all(axis=2), 1.0, np.nan)[..., None]
     attributes: dict[str, Any] = {"source_software": "spirillum", "ds_type": "poses", "time_unit": "seconds"}
     if track.time.size > 1:
-        attributes["fps"] = float(1.0 / np.median(np.diff(track.time)))
+        attributes["fps"] = round(float(1.0 / np.median(np.diff(track.time))), 6)
     attributes |= {
         "source_file": trial.video,
         "synthetic": int(trial.synthetic),

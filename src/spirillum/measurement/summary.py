@@ -66,6 +66,8 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     reach = mean.half_width
     if name in _LENGTHS:
         reach = math.hypot(reach, _NORMAL * shared * mean.value)
+    if name in WOBBLES:  # what tracking adds to them is common to all trials
+        reach = max(reach, float(np.mean([item.high - item.value for item in measured])))
     low = mean.value - reach
     if name in WOBBLES:
         low = max(low, 0.0)  # an amplitude

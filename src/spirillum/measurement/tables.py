@@ -80,6 +80,8 @@ def read_table(path: str | Path, what: str, headers: int = 1) -> Table:
         raise InputError(f"{path} holds no readings; allowed: {what} with at least one row below its header")
     heads = tuple(tuple(cells) for _, cells in found[:headers])
     width = len(heads[0])
+    if width == 1 and (other := next((mark for mark in ";\t|" if mark in heads[0][0]), None)):
+        raise InputError(f"{path}: its columns are separated by {other!r}; allowed: commas")
     if width > _MOST_COLUMNS:
         raise InputError(f"{path} has {width} columns; allowed: at most {_MOST_COLUMNS}")
     rows = []

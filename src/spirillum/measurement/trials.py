@@ -165,7 +165,7 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _PLACE * pixel)
     quantities["heading"] = _mean(track, track.heading, "rad", _HEADING * _LONG * pixel / robot.body.length)
-    quantities |= _wobbles(track)
+    quantities |= _wobbles(track, robot)
     if not by_hand:
         quantities = {name: _with_interval(item) for name, item in quantities.items()}
     return Trial(track, _spoiled(quantities, flags), fits, flags, name)
@@ -199,11 +199,16 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
     ]
     difference = track.tail_phase - track.body_angle
     error = np.hypot(track.tail_phase_error, track.body_angle_error)
+    of_both = (
+        rate_of(time, track.body_angle, track.body_angle_error, of_body, read=read),
+        rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
+    )
+    bent = not all(rate.steady for rate in of_both)
     return {
         "forward_velocity": rate_of(time, x, track.position_error, of_x, read=read),
-        "body_rotation_rate": rate_of(time, track.body_angle, track.body_angle_error, of_body, read=read),
-        "tail_rotation_rate": rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
-        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read),
+        "body_rotation_rate": of_both[0],
+        "tail_rotation_rate": of_both[1],
+        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read, bent=bent),
     }
 
 
@@ -278,16 +283,19 @@ def _mean(track: Track, values: Samples, unit: str, lasting: float) -> Measured:
     return Measured(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach), unit)
 
 
-def _wobbles(track: Track) -> dict[str, Measured]:
+def _wobbles(track: Track, robot: Robot) -> dict[str, Measured]:
     """Least squares at the angle of tail or body itself, so that an unsteady rate does not smear the amplitude."""
     found = {}
+    pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
+    least = {"lateral": _PIXEL_ERROR * pixel, "heading": _PIXEL_ERROR * pixel / (0.5 * robot.body.length)}
     for series, values, unit in (("lateral", track.position[:, 1], "m"), ("heading", track.heading, "rad")):
         for part, angle in (("tail", track.tail_phase), ("body", track.body_angle)):
-            found[f"{series}_wobble_at_{part}_rate"] = _amplitude(track.time, values, angle, unit, part)
+            found[f"{series}_wobble_at_{part}_rate"] = _amplitude(track.time, values, angle, unit, part, least[series])
     return {name: found[name] for name in WOBBLES}
 
 
-def _amplitude(time: Samples, values: Samples, angle: Samples, unit: str, part: str) -> Measured:
+def _amplitude(time: Samples, values: Samples, angle: Samples, unit: str, part: str, least: float) -> Measured:
+    """Amplitude of what comes back with an angle; `least` is the standard error of what tracking adds to it."""
     known = np.isfinite(values) & np.isfinite(angle)
     if known.sum() < 12 or np.ptp(angle[known]) < 2 * np.pi * _FEW_TURNS:
         return Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
@@ -297,7 +305,7 @@ def _amplitude(time: Samples, values: Samples, angle: Samples, unit: str, part: 
     left = values[known] - design @ beta
     again = float(np.clip(left[1:] @ left[:-1] / max(left @ left, 1e-300), 0.0, 0.99))
     effective = max(known.sum() * (1 - again) / (1 + again) - 5, 1.0)
-    error = math.sqrt(2.0 * float(left.var()) / effective)
+    error = math.hypot(math.sqrt(2.0 * float(left.var()) / effective), least)
     size = float(np.hypot(beta[3], beta[4]))
     return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
 
@@ -315,6 +323,8 @@ def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dic
             for kind in ("lateral", "heading")
             if f"{part}_rotation_rate" in flag.spoils
         }
+        if names >= {*RATE_NAMES}:
+            names |= set(MEASURED)  # there is no confident number beside what cannot be believed at all
         for name in (names & set(found)) - spoiled:
             found[name] = Measured.missing(found[name].unit, flag.sentence)
         spoiled |= names

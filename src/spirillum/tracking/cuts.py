@@ -22,7 +22,7 @@ _AROUND = 8
 """Frames before and after, through which the lines go that do not meet at a jump."""
 _CLEAR = 8.0
 """Jump over the standard deviation of what is found elsewhere."""
-_PLACE, _ANGLE = 2.0, 0.25
+_PLACE, _ANGLE = 1.0, 0.12
 """Least jump of the place, pixels, and of an angle, rad."""
 _GAP = 3.0
 """Times between frames over the usual one, from which on a gap is honest and no line goes across."""
@@ -83,9 +83,9 @@ def jumps_of_time(
         return ()
     closed = np.where(np.arange(time.size) > gap, time - (steps[gap] - usual), time)
     series = (
-        (x, 0.5 * _PLACE * length_per_pixel, math.inf),
-        (body_angle, 0.5 * _ANGLE, period),
-        (tail_phase, 0.5 * _ANGLE, 2.0 * math.pi),
+        (x, _PLACE * length_per_pixel, math.inf),
+        (body_angle, _ANGLE, period),
+        (tail_phase, _ANGLE, 2.0 * math.pi),
     )
     true, even = ([_miss(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
     if sum(one > 1.0 for one in true) < 2 or not max(even) < _TOGETHER:

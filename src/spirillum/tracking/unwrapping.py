@@ -45,6 +45,8 @@ _LEAP, _FEW_LEAPS, _NEAR_STEPS = np.radians(25.0), 2, 9
 On rendered films with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and more."""
 _RARELY = 0.1
 """Share of the frames on which angles have to be read."""
+_FEW_FRAMES = 10
+"""Frames on which something has to rest to be taken for a part of the background."""
 _WALLS = 1.5
 """What walls may add to the largest advance of a helix in a turn."""
 
@@ -277,6 +279,8 @@ def nothing_moves(
         x: place along the channel, m, (n,).
         robot: the robot.
     """
+    if time.size < _FEW_FRAMES:
+        return ()
     moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
     if np.isfinite(tail_phase).any() or moved > _RESTS * robot.body.length or turned > _STILL:
         return ()
