@@ -38,10 +38,10 @@ def power_law(gaps: Any, sideways: float = 0.0) -> list[Film]:
 
 @lru_cache
 def settled(**options: Any) -> Any:
-    """The paper's robot at a coarse resolution."""
+    """The paper's robot with one turn of its tail, at a coarse resolution."""
     placement = {name: options.pop(name) for name in ("gap", "eccentricity") if name in options}
     overrides = {name: options.pop(name) for name in tuple(options) if "." in name}
-    robot = sp.load(WIDE, **overrides)
+    robot = sp.load(WIDE, **{"tail.length": "25 mm", **overrides})
     return sp.settle(robot, placement=placement or {"gap": "2 mm"}, **{**QUICK, "tail_rate": "1.2 Hz", **options})
 
 
