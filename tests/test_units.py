@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from spirillum.errors import InputError
-from spirillum.units import KINDS, parse_quantity, show, shown_in
+from spirillum.units import KINDS, USUAL, _factor, _registry, parse_quantity, show, shown_in
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,14 @@ from spirillum.units import KINDS, parse_quantity, show, shown_in
 def test_rates_count_turns(text: str, rad_per_s: float) -> None:
     """1 Hz of a rotating part is 2 pi rad/s."""
     assert parse_quantity(text, KINDS["rate"]) == pytest.approx(rad_per_s, rel=1e-15, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit"), [(name, unit) for name, kind in KINDS.items() for unit in (kind.unit, *USUAL.get(kind.unit, {}))]
+)
+def test_usual_units_are_those_of_pint(kind: str, unit: str) -> None:
+    found = _registry().Quantity(1.0, unit)
+    assert _factor(unit, KINDS[kind]) == found.to(KINDS[kind].unit).magnitude
 
 
 @pytest.mark.parametrize("unit", ["1/s", "/s", "s^-1", "s**-1", "s⁻¹", "1/min"])
@@ -147,7 +155,7 @@ def test_towers_of_powers_are_refused_at_once() -> None:
     """In a process of its own: 9**9**9**9 would never be done."""
     program = """
 from spirillum.errors import InputError
-from spirillum.units import KINDS, parse_quantity
+from spirillum.units import KINDS, USUAL, _factor, _registry, parse_quantity
 for text in ("1 m**9**9**9**9", "1 m^9^9^9^9", "1 m**9 **9 **9 **9", "1 m^-9^9^9^9", "1 m**9^9**9^9", "1 m²**9**9**9"):
     try:
         parse_quantity(text, KINDS["length"])

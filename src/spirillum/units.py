@@ -19,7 +19,7 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["KINDS", "Kind", "parse_option", "parse_quantity", "show", "shown_in"]
+__all__ = ["KINDS", "USUAL", "Kind", "parse_option", "parse_quantity", "show", "shown_in"]
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
@@ -66,6 +66,21 @@ _SHOWN: dict[str, float] = {
     "turn": 2 * math.pi,
     "%": 1e-2,
 }
+
+
+USUAL: dict[str, dict[str, float]] = {
+    "m": {"cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
+    "kg": {"g": 1e-3, "mg": 1e-6},
+    "kg/m**3": {"kg/m^3": 1.0},
+    "Pa s": {"mPa s": 1e-3},
+    "rad/s": {"Hz": Hz},
+    "rad": {"deg": math.pi / 180},
+    "m/s": {"mm/s": 1e-3, "um/s": 1e-6},
+    "V": {"mV": 1e-3},
+    "C": {"mA h": 3.6},
+    "T": {"mT": 1e-3},
+}
+"""SI values of the units that files mostly state: they are known without pint, which takes a while to load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +146,14 @@ def _factor(unit: str, kind: Kind) -> float:
     Raises:
         InputError: if `unit` is unknown or measures something else.
     """
+    if unit == kind.unit:
+        return 1.0
+    usual = USUAL.get(kind.unit, {}).get(unit)
+    return _factor_by_pint(unit, kind) if usual is None else usual
+
+
+def _factor_by_pint(unit: str, kind: Kind) -> float:
+    """The same for any unit."""
     unit = unit.translate(_OHM_SIGNS)
     hint = f'allowed: a unit of {kind.name}, as in "{kind.example}"'
     if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit) or _POWER_OF_A_POWER.search(unit):
