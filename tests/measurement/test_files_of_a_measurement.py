@@ -14,7 +14,7 @@ from spirillum.files import write_dataset
 from spirillum.measurement import read_observations
 from spirillum.measurement.measure import Measurement, measure
 from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_dataset, series_dataset
+from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import trial_of
 from spirillum.tracking.track import Flag, Track
 
@@ -39,7 +39,7 @@ def test_observations_are_read_back(tmp_path: Path, make_track: Make, robot: Any
 def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robot: Any) -> None:
     track = make_track()
     path = tmp_path / "a.nc"
-    write_dataset(series_dataset(trial_of(track, robot, "a"), robot), path)
+    series_of(trial_of(track, robot, "a"), robot).write(path)
     with xr.open_dataset(path, engine="h5netcdf") as found:
         assert dict(found.sizes) == {"time": 300, "space": 2}
         assert all("units" in variable.attrs for variable in found.data_vars.values())
@@ -54,11 +54,23 @@ def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robo
         assert json.loads(found.attrs["setup"])["robot"]["axis_height"] == 0.0115
 
 
+@pytest.mark.parametrize("layout", [series_of, movement_of])
+def test_files_are_those_that_xarray_writes(tmp_path: Path, make_track: Make, robot: Any, layout: Any) -> None:
+    arrays = layout(trial_of(make_track(), robot, "a"), robot)
+    arrays.write(tmp_path / "a.nc")
+    write_dataset(arrays.dataset(), tmp_path / "b.nc")
+    with xr.open_dataset(tmp_path / "a.nc") as ours, xr.open_dataset(tmp_path / "b.nc") as theirs:
+        xr.testing.assert_identical(ours, theirs)
+        assert [variable.dtype for variable in ours.variables.values()] == [
+            variable.dtype for variable in theirs.variables.values()
+        ]
+
+
 def test_layout_of_movement(tmp_path: Path, make_track: Make, robot: Any) -> None:
     """What its validator asks of poses: these dimensions and variables; and the attributes that its loaders set."""
     track = make_track()
     path = tmp_path / "a.movement.nc"
-    write_dataset(movement_dataset(trial_of(track, robot, "a"), robot), path)
+    movement_of(trial_of(track, robot, "a"), robot).write(path)
     with xr.open_dataset(path, engine="h5netcdf") as found:
         assert found["position"].dims == ("time", "space", "keypoints", "individuals")
         assert found["confidence"].dims == ("time", "keypoints", "individuals")

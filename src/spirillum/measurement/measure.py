@@ -10,10 +10,11 @@ from typing import Any
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
-from spirillum.files import output_folder, whole_file, write_dataset, write_text
+from spirillum.files import output_folder, whole_file, write_text
 from spirillum.measurement.annotate import annotated_film
 from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.imported import read_track
+from spirillum.measurement.labelled import Labelled
 from spirillum.measurement.marks import (
     Marks,
     check_pixels,
@@ -24,7 +25,7 @@ from spirillum.measurement.marks import (
     track_of_marks,
 )
 from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_dataset, series_dataset
+from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.sight import Sighted, sighted
 from spirillum.measurement.summary import Summary, compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
@@ -294,8 +295,8 @@ class _Work:
             track = corrected(track, marks, ruled)
         trial = trial_of(track, self.robot, name, read)
         if self.folder is not None:
-            self._write(self.folder / f"{name}.nc", series_dataset(trial, self.robot))
-            self._write(self.folder / f"{name}.movement.nc", movement_dataset(trial, self.robot))
+            self._write(self.folder / f"{name}.nc", series_of(trial, self.robot))
+            self._write(self.folder / f"{name}.movement.nc", movement_of(trial, self.robot))
         self.trials.append(trial)
 
     def _followed(self, path: Path, name: str, tell: Callable[[int, int | None], None]) -> Track:
@@ -332,8 +333,8 @@ class _Work:
         unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
         return replace(track, flags=(*track.flags, unseen))
 
-    def _write(self, path: Path, dataset: Any) -> None:
-        write_dataset(dataset, path)
+    def _write(self, path: Path, arrays: Labelled) -> None:
+        arrays.write(path)
         self.files.append(path.name)
 
     def finish(self, *, interrupted: bool) -> Measurement:

@@ -1,35 +1,31 @@
-"""The time series of a trial as labelled datasets: our own, and in the layout of the `movement` project."""
+"""The time series of a trial as labelled arrays: our own, and in the layout of the `movement` project."""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from spirillum.answer import versions
+from spirillum.measurement.labelled import Labelled, Variable
 from spirillum.measurement.trials import LEVEL, RATE_NAMES, Trial
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import pattern_period
 from spirillum.tracking.setup import stripes_of
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-__all__ = ["movement_dataset", "series_dataset"]
+__all__ = ["movement_of", "series_of"]
 
 _RESIDUAL_UNITS = ("m", "rad", "rad", "rad")
 
 
-def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
+def series_of(trial: Trial, robot: Robot) -> Labelled:
     """What was seen on every frame and how far it lies from the fitted lines; SI, rates in rad/s.
 
     Args:
         trial: the trial.
         robot: the robot, for the settings in the attributes.
     """
-    import xarray as xr
-
     track = trial.track
     stripes = stripes_of(track.setup, robot)
     series = {
@@ -50,7 +46,7 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
         if residual.size == track.time.size:
             words = f"distance from the line that gives the {name.replace('_', ' ')}; NaN where left out"
             series[f"{name}_residual"] = (residual, unit, words)
-    data: dict[str, Any] = {
+    data: dict[str, Variable] = {
         "position": (
             ("time", "space"), track.position,
             {
@@ -64,24 +60,23 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
         ),
     }  # fmt: skip
     data |= {
-        name: ("time", values, {"units": unit, "long_name": words}) for name, (values, unit, words) in series.items()
+        name: (("time",), values, {"units": unit, "long_name": words}) for name, (values, unit, words) in series.items()
     }
     for name, period in (("body_angle", pattern_period(stripes) if stripes else 2 * np.pi), ("tail_phase", 2 * np.pi)):
-        data[name][2].update(
-            known_modulo=period,
-            comment="all of it may be off by whole multiples of known_modulo (rad), after which everything looks alike",
-        )
+        dimensions, values, attributes = data[name]
+        comment = "all of it may be off by whole multiples of known_modulo (rad), after which everything looks alike"
+        data[name] = dimensions, values, {**attributes, "known_modulo": period, "comment": comment}
     for name, item in trial.quantities.items():
         more = {"low": item.low, "high": item.high, "level": LEVEL} if np.isfinite(item.low) else {}
         reason = {"reason": item.reason} if item.reason else {}
         data[name if name != "heading" else "mean_heading"] = ((), item.value, {"units": item.unit, **more, **reason})
-    return xr.Dataset(
+    return Labelled(
         data,
-        coords={
-            "time": ("time", track.time, {"units": "s", "long_name": "time in the video"}),
-            "space": ("space", ["x", "y"], {"long_name": "along the channel towards the nose, and across"}),
+        {
+            "time": (("time",), track.time, {"units": "s", "long_name": "time in the video"}),
+            "space": (("space",), ["x", "y"], {"long_name": "along the channel towards the nose, and across"}),
         },
-        attrs={
+        {
             "title": f"{trial.video}{' (synthetic)' if trial.synthetic else ''}: what was seen on every frame",
             "synthetic": int(trial.synthetic),
             "robot": robot.name,
@@ -98,7 +93,7 @@ def series_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
     )
 
 
-def movement_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
+def movement_of(trial: Trial, robot: Robot) -> Labelled:
     """The robot as an individual with two points, in pixels, as the `movement` project lays poses out.
 
     Dimensions time, space, keypoints, individuals; variables `position` and `confidence`; u is its x, v its y.
@@ -107,8 +102,6 @@ def movement_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
         trial: the trial.
         robot: the robot, for its name.
     """
-    import xarray as xr
-
     track = trial.track
     points = track.picture.reshape(-1, 2, 2)  # frame, point, coordinate
     position = np.swapaxes(points, 1, 2)[..., None]
@@ -121,16 +114,16 @@ def movement_dataset(trial: Trial, robot: Robot) -> xr.Dataset:
         "synthetic": int(trial.synthetic),
         "length_per_pixel": track.scale.length_per_pixel,
     }
-    return xr.Dataset(
+    return Labelled(
         {
             "position": (("time", "space", "keypoints", "individuals"), position, {"units": "pixel"}),
-            "confidence": (("time", "keypoints", "individuals"), confidence),
+            "confidence": (("time", "keypoints", "individuals"), confidence, {}),
         },
-        coords={
-            "time": ("time", track.time, {"units": "s"}),
-            "space": ["x", "y"],
-            "keypoints": ["centre", "nose"],
-            "individuals": [robot.name],
+        {
+            "time": (("time",), track.time, {"units": "s"}),
+            "space": (("space",), ["x", "y"], {}),
+            "keypoints": (("keypoints",), ["centre", "nose"], {}),
+            "individuals": (("individuals",), [robot.name], {}),
         },
-        attrs=attributes,
+        attributes,
     )
