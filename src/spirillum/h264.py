@@ -28,6 +28,7 @@ class H264Writer:
         """Take an open file; `h264_writer` makes it."""
         self._av, self._container, self._stream = av, container, stream
         self._next = 0
+        self._reformatter = av.video.reformatter.VideoReformatter()
 
     def add(self, image: np.ndarray, number: int | None = None) -> None:
         """Append a frame.
@@ -37,7 +38,7 @@ class H264Writer:
             number: its time in ticks, later than that of the frame before; None: the next tick.
         """
         frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
-        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709")
+        frame = self._reformatter.reformat(frame, format="yuv420p", dst_colorspace="ITU709")
         frame.pts = self._next if number is None else number
         frame.time_base = self._stream.codec_context.time_base
         self._next = frame.pts + 1

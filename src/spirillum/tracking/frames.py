@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -147,7 +147,7 @@ class Video:
 
     def _film(self) -> Iterator[tuple[int, float, Any]]:
         """Index, time and a function that gives the picture, of every frame that can be decoded."""
-        last, origin = None, None
+        last, origin, rgb = None, None, _converter()
         for index, frame in enumerate(self._decoded()):
             if (frame.width, frame.height)[:: _turn(frame)] != self.size:
                 self._note("unreadable-frames", "the film changes its size on the way: frames of another are left out")
@@ -161,7 +161,7 @@ class Video:
                 self._note("unordered-times", "time stamps that do not rise were found: such frames are left out")
                 continue
             last = time
-            yield index, time, partial(_rgb, frame)
+            yield index, time, partial(rgb, frame)
         if last is not None and self.duration and self.rate and not self.given_rate:
             missing = self.duration - last - 1.0 / self.rate
             if missing > max(0.5, 0.02 * self.duration):
@@ -198,7 +198,7 @@ class Video:
         with _opened(self.path) as container, suppress(av.error.FFmpegError, ValueError):  # what can be read has to do
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
-            decoded, now, origin = container.decode(stream), -1.0, None
+            decoded, now, origin, rgb = container.decode(stream), -1.0, None, _converter()
             for wanted in times:
                 if now >= wanted:
                     continue
@@ -209,7 +209,7 @@ class Video:
                     origin = frame.time if origin is None else origin
                     now = now if frame.time is None else frame.time - origin
                     if now >= wanted - 1e-9:
-                        found.append(Frame(-1, float(now), _rgb(frame)))
+                        found.append(Frame(-1, float(now), rgb(frame)))
                         break
         return self._some([frame for frame in found if frame.image.shape[1::-1] == self.size])
 
@@ -366,10 +366,17 @@ def _turn(frame: Any) -> int:
     return -1 if _quarters(frame) % 2 else 1
 
 
-def _rgb(frame: Any) -> np.ndarray:
-    picture: np.ndarray = frame.to_ndarray(format="rgb24")
-    quarters = _quarters(frame)
-    return np.ascontiguousarray(np.rot90(picture, quarters)) if quarters else picture
+def _converter() -> Callable[[Any], np.ndarray]:
+    """A function that gives a decoded frame's picture, for one thread: what converts is set up once, not every time."""
+    av = required("av", _PURPOSE, "video")
+    reformatter = av.video.reformatter.VideoReformatter()
+
+    def rgb(frame: Any) -> np.ndarray:
+        picture: np.ndarray = reformatter.reformat(frame, format="rgb24").to_ndarray()
+        quarters = _quarters(frame)
+        return np.ascontiguousarray(np.rot90(picture, quarters)) if quarters else picture
+
+    return rgb
 
 
 def _between(start: float, end: float | None) -> str:
