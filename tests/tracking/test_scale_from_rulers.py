@@ -5,7 +5,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.tracking.optics import Optics, optics_of
-from spirillum.tracking.ruler import lines_in
+from spirillum.tracking.ruler import lines_in, still_picture
 from spirillum.tracking.scale import fitted_camera, given_camera
 from spirillum.tracking.setup import Setup
 
@@ -152,3 +152,11 @@ def test_a_given_scale_is_that_of_the_axis():
     sight = given_camera(given, SIZE)
     assert sight.optics.length_per_pixel == pytest.approx(2.5e-4, rel=1e-9)
     assert sight.scale.markers == 0
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 24])
+def test_what_stands_still_is_the_mean_of_the_middle_half(count: int) -> None:
+    images = list(np.random.default_rng(count).integers(0, 256, (count, 37, 5, 3), dtype=np.uint8))
+    ordered = np.sort(np.stack(images), axis=0)
+    middle = ordered[count // 4 : count - count // 4]
+    assert np.array_equal(still_picture(images), middle.mean(axis=0))

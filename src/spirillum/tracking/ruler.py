@@ -25,6 +25,10 @@ _STRONG = 0.6
 """Least strength of that wave over that in the middle of the strips: at their ends slanted lines look shifted."""
 _CLEAR = 8.0
 """Least height of the ruler's peak in the spectrum over what is usual beside it."""
+_CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+"""Weights of red, green and blue with which a ruler is looked for: brightness, then single colours."""
+_BAND = 16
+"""Rows of pictures that are sorted at once."""
 
 
 class Lines(NamedTuple):
@@ -48,10 +52,31 @@ class Lines(NamedTuple):
 
 def still_picture(images: list[np.ndarray]) -> Samples:
     """What stands still in pictures: the mean of the middle half of each pixel's values, 8-bit scale, (h, w, 3)."""
-    stack = np.sort(np.stack(images), axis=0)
-    quarter = len(images) // 4
-    middle: Samples = stack[quarter : len(images) - quarter].mean(axis=0)
-    return middle
+    pairs, quarter, still = _sorting(len(images)), len(images) // 4, np.empty(images[0].shape)
+    for low in range(0, len(still), _BAND):  # what is sorted at once stays near the processor
+        band = [image[low : low + _BAND] for image in images]
+        for a, b in pairs:
+            band[a], band[b] = np.minimum(band[a], band[b]), np.maximum(band[a], band[b])
+        middle = band[quarter : len(band) - quarter]
+        still[low : low + _BAND] = sum(middle, np.zeros(1, dtype=np.uint32)) / len(middle)
+    return still
+
+
+def _sorting(count: int) -> list[tuple[int, int]]:
+    """Pairs of places that, put in order one after the other, sort so many values: Batcher's odd-even merge sort.
+
+    K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
+    """
+    pairs, run = [], 1
+    while run < count:
+        step = run
+        while step:
+            for first in range(step % run, count - step, 2 * step):
+                lower = range(first, first + min(step, count - step - first))
+                pairs += [(a, a + step) for a in lower if a // (2 * run) == (a + step) // (2 * run)]
+            step //= 2
+        run *= 2
+    return pairs
 
 
 def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | None:
@@ -64,33 +89,32 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | Non
         picture: 8-bit scale, (h, w, 3).
         bounds: first and last-but-one column and row to look at: left, top, right, bottom.
     """
-    channels = [picture @ np.array([0.299, 0.587, 0.114]), *np.moveaxis(picture, 2, 0)]
-    for grey in channels:
-        found = _lines_of(np.ascontiguousarray(grey), bounds)
+    left, top, right, bottom = bounds
+    colours = picture[top:bottom, left:right].astype(np.float32)
+    for weights in _CHANNELS:
+        found = _lines_of(np.ascontiguousarray(colours @ np.array(weights, dtype=np.float32)), left, top)
         if found is not None:
             return found
     return None
 
 
-def _lines_of(grey: Samples, bounds: tuple[int, int, int, int]) -> Lines | None:
+def _lines_of(part: Samples, left: int, top: int) -> Lines | None:
+    """The ruler's places in a part of a picture that begins at some column and row, (h, w)."""
     cv2 = required("cv2", "measuring a video", "video")
-    left, top, right, bottom = bounds
-    part = np.ascontiguousarray(grey[top:bottom, left:right])
     flat = part / np.maximum(cv2.GaussianBlur(part, (0, 0), 15.0), 1.0) - 1.0
     flat = np.clip(flat, -0.6, 0.6)
     frequency = _frequency(flat)
     if frequency is None:
         return None
     distance = 1.0 / frequency
-    columns = np.arange(part.shape[1])
-    wave = flat * np.exp(-2j * np.pi * frequency * columns)
+    turn = 2.0 * np.pi * frequency * np.arange(part.shape[1])
     sigma = _WINDOW * distance
 
     def smooth(values: Samples) -> Samples:
         out: Samples = cv2.GaussianBlur(np.ascontiguousarray(values), (0, 0), sigmaX=sigma, sigmaY=_ROWS)
         return out
 
-    phase = smooth(wave.real) + 1j * smooth(wave.imag)
+    phase = smooth(flat * np.cos(turn).astype(np.float32)) - 1j * smooth(flat * np.sin(turn).astype(np.float32))
     size = np.abs(phase)
     coherence = size / np.sqrt(np.maximum(smooth(flat**2), 1e-12))
     good = coherence > _COHERENT
@@ -124,7 +148,8 @@ def _frequency(flat: Samples) -> float | None:
     """Lines per pixel of the clearest wave along the rows that goes through a good part of them."""
     width = flat.shape[1]
     length = 4 * 1 << int(np.ceil(np.log2(width)))
-    power = np.abs(np.fft.rfft(flat * np.hanning(width), length, axis=1)) ** 2
+    spectrum = np.fft.rfft(flat[::2] * np.hanning(width).astype(flat.dtype), length, axis=1)
+    power = spectrum.real**2 + spectrum.imag**2
     frequency = np.fft.rfftfreq(length)
     # a ruler's wave runs through the whole width: its peak is as narrow as the width allows, and stands out of a row
     share = power / np.maximum(power[:, frequency > 1.0 / width].sum(axis=1, keepdims=True), 1e-9)
