@@ -14,43 +14,33 @@ __all__ = ["edge_places", "edge_points"]
 
 
 @compiled
-def _sum(factors: Samples, basis: Samples) -> float:
-    """Value of a polynomial."""
-    total = 0.0
-    for i in range(basis.shape[0]):
-        for j in range(basis.shape[1]):
-            total += factors[i, j] * basis[i, j]
-    return total
-
-
-@compiled
 def edge_points(pose: Samples, factors: Samples, normals: Samples, reach: Samples, out: Samples) -> None:
     """Edge points (n, 2) on the plane through the axis, in the body's frame, m.
 
     Args:
         pose: x, y, heading.
-        factors: Chebyshev coefficients of the points, and of those of a flat end's lower rim, (2, n, 2, a, b); the
-            outer one of both counts.
+        factors: Chebyshev coefficients, of each term those of the points' x and y, and those of a flat end's lower rim,
+            (a, b, 4, n); the outer one of both counts.
         normals: outward directions, (n, 2).
         reach: largest distances of the lens along and across, (2,).
         out: the points, (n, 2).
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     place = (-(cos * pose[0] + sin * pose[1]), -(-sin * pose[0] + cos * pose[1]))
-    orders = factors.shape[3], factors.shape[4]
-    basis = np.empty((orders[0], orders[1]))
     a = min(max(place[0] / reach[0], -1.0), 1.0)
     b = min(max(place[1] / reach[1], -1.0), 1.0)
     turn_a, turn_b = math.acos(a), math.acos(b)
-    for i in range(orders[0]):
-        for j in range(orders[1]):
-            basis[i, j] = math.cos(i * turn_a) * math.cos(j * turn_b)
-    for n in range(out.shape[0]):
-        out[n, 0], out[n, 1] = _sum(factors[0, n, 0], basis), _sum(factors[0, n, 1], basis)
-        if factors[0, n, 0, 0, 0] != factors[1, n, 0, 0, 0] or factors[0, n, 0, 1, 0] != factors[1, n, 0, 1, 0]:
-            other = _sum(factors[1, n, 0], basis)
-            if (other - out[n, 0]) * normals[n, 0] > 0.0:
-                out[n, 0], out[n, 1] = other, _sum(factors[1, n, 1], basis)
+    count = out.shape[0]
+    both = np.zeros((4, count))
+    for i in range(factors.shape[0]):
+        for j in range(factors.shape[1]):
+            basis = math.cos(i * turn_a) * math.cos(j * turn_b)
+            for k in range(4):
+                for n in range(count):
+                    both[k, n] += basis * factors[i, j, k, n]
+    for n in range(count):
+        rim = 2 if (both[2, n] - both[0, n]) * normals[n, 0] > 0.0 else 0
+        out[n, 0], out[n, 1] = both[rim, n], both[rim + 1, n]
 
 
 @compiled

@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
+from spirillum.kernels.pictures import Whole
 
 __all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
 
@@ -118,21 +119,21 @@ def shifts_of_profiles(
 
 
 @compiled
-def _score(sums: Samples, seen: Samples, all_of: Samples) -> float:
-    """Geometric mean of the first four groups' means, and a share of the fifth's."""
-    score, used = 1.0, 0.0
-    for g in range(min(sums.size, 4)):
+def _score(sums: Samples, seen: Samples, all_of: Samples, place: int) -> float:
+    """Geometric mean of the first four groups' means at a place, and a share of the fifth's."""
+    score, used, groups = 1.0, 0.0, all_of.size
+    for g in range(min(groups, 4)):
         if all_of[g] == 0.0:
             continue
-        if 2.0 * seen[g] < all_of[g]:
+        if 2.0 * seen[g, place] < all_of[g]:
             return 0.0
-        score *= sums[g] / seen[g]
+        score *= sums[g, place] / seen[g, place]
         used += 1.0
     if score <= 0.0 or used == 0.0:
         return 0.0
     score = score ** (1.0 / used)
-    if sums.size > 4 and seen[4] > 0.0:
-        score += 0.3 * min(sums[4] / seen[4], 2.0 * score)
+    if groups > 4 and seen[4, place] > 0.0:
+        score += 0.3 * min(sums[4, place] / seen[4, place], 2.0 * score)
     return float(score)
 
 
@@ -142,9 +143,9 @@ def edge_scores(
     slope_v: Samples,
     pixels: Samples,
     normals: Samples,
-    group: Samples,
+    group: Whole,
     groups: int,
-    places: Samples,
+    first: tuple[float, float],
     scores: Samples,
 ) -> None:
     """How clearly a shape's edges show in a picture, with the shape at different places.
@@ -153,36 +154,45 @@ def edge_scores(
     with its sign, which noise and clutter change, then without; of the groups the geometric mean of
     the first four (both ends, both sides), so that none can stand in for another, and a share of the fifth.
 
+    The innermost loops go down the columns of all places at once, so that the processor works on several.
+
     Args:
-        slope_u: brightness gradient along u, (h, w).
-        slope_v: the same along v, (h, w).
+        slope_u: brightness gradient along u, its columns one after the other, (w, h).
+        slope_v: the same along v, (w, h).
         pixels: edge points of the shape, (n, 2).
         normals: their unit normals, (n, 2).
         group: index of the group of each point, (n,).
         groups: number of groups.
-        places: shifts of the shape, pixels, (k, 2).
-        scores: the scores, (k,); 0 where more than half of a group is outside.
+        first: shift of the shape to the first place, pixels.
+        scores: the scores at that place and those a whole number of columns and rows further, (c, r); 0 where more
+            than half of a group is outside.
     """
-    height, width = slope_u.shape
-    sums, seen, all_of = np.zeros(groups), np.zeros(groups), np.zeros(groups)
+    width, height = slope_u.shape
+    columns, rows = scores.shape
+    sums, seen, all_of = np.empty((groups, rows)), np.empty((groups, rows)), np.zeros(groups)
+    together, length = np.zeros(rows), 0
     for i in range(group.size):
-        all_of[int(group[i])] += 1.0
-    for k in range(places.shape[0]):
-        sums[:] = 0.0
-        seen[:] = 0.0
-        together, length = 0.0, 0
-        for i in range(pixels.shape[0]):
-            col = int(pixels[i, 0] + places[k, 0] + 0.5)
-            row = int(pixels[i, 1] + places[k, 1] + 0.5)
-            g = int(group[i])
-            if 0 <= col < width and 0 <= row < height:
-                together += slope_u[row, col] * normals[i, 0] + slope_v[row, col] * normals[i, 1]
-                seen[g] += 1.0
+        all_of[group[i]] += 1.0
+    for c in range(columns):
+        sums[:], seen[:] = 0.0, 0.0
+        for i in range(group.size):
+            g = group[i]
+            col = c + math.floor(pixels[i, 0] + first[0] + 0.5)
+            row = math.floor(pixels[i, 1] + first[1] + 0.5)
+            low, high = max(0, -row), min(rows, height - row)
+            if 0 <= col < width and low < high:
+                n_u, n_v, start, there = normals[i, 0], normals[i, 1], np.uint64(low), np.uint64(row + low)
+                for r in range(np.uint64(high - low)):
+                    together[start + r] += slope_u[col, there + r] * n_u + slope_v[col, there + r] * n_v
+                    seen[g, start + r] += 1.0
             length += 1
-            if length == _RUN or i == pixels.shape[0] - 1 or int(group[i + 1]) != g:
-                sums[g] += abs(together)
-                together, length = 0.0, 0
-        scores[k] = _score(sums, seen, all_of)
+            if length == _RUN or i == group.size - 1 or group[i + 1] != g:
+                for r in range(rows):
+                    sums[g, r] += abs(together[r])
+                    together[r] = 0.0
+                length = 0
+        for r in range(rows):
+            scores[c, r] = _score(sums, seen, all_of, r)
 
 
 @compiled

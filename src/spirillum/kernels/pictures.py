@@ -9,9 +9,19 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["even_loss", "profile_of_rows", "sampled", "stripe_losses", "stripe_step", "stripes_at"]
+__all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
 
 _CHANNELS = 3
+_STEPS, _LAST = 8, 2e-5
+"""Gauss-Newton steps at most, and the change, rad, at which they end."""
+_AHEAD = 0.008
+"""Angle on both sides from which the change with the angle is taken, rad."""
+_SLANTED = 0.15
+"""Scale over the largest one below which the surface is too slanted to count."""
+_SEEN = 0.3
+"""Least share of the surface that has to be seen."""
+_ALIKE = 6
+"""Angles next to each other whose residuals are taken to be alike."""
 
 Whole = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 """Whole numbers, as classes of colours."""
@@ -140,43 +150,8 @@ def _reweighted(
 
 
 @compiled
-def stripe_losses(
-    profile: Samples,
-    base: Samples,
-    angles: Samples,
-    blur: Samples,
-    shade: Samples,
-    order: Whole,
-    palette: Samples,
-    settings: Samples,
-    losses: Samples,
-) -> None:
-    """How badly stripes fit when turned by evenly spaced angles of a period.
-
-    Args:
-        profile: colours along the angle, (n, 3).
-        base: weight of each angle, (n,).
-        angles: rad, (n,).
-        blur: standard deviation of the blur, rad, (n,).
-        shade: brightness of the same colour at each angle, and what shines there whatever the colour, (n, 6).
-        order: class of each stripe, (s,).
-        palette: colour of each class, (classes, 3).
-        settings: period, rad; strength that holds the channels together; residual at which a sample no longer counts.
-        losses: the answer, one for each angle, 0 to 1.
-    """
-    model, weight, gain = np.empty((len(angles), 3)), np.empty(len(angles)), np.empty(3)
-    for trial in range(len(losses)):
-        stripes_at(angles, blur, trial * settings[0] / len(losses), order, palette, model)
-        for n in range(len(base)):
-            weight[n] = base[n]
-        for _ in range(2):
-            _gains(profile, weight, shade, model, settings[1], gain)
-            losses[trial] = _reweighted(profile, base, shade, model, gain, settings[2], weight)
-
-
-@compiled
-def even_loss(profile: Samples, base: Samples, shade: Samples, palette: Samples, cut: float) -> float:
-    """How badly one even colour fits; arguments as in `stripe_losses`."""
+def _even_loss(profile: Samples, base: Samples, shade: Samples, palette: Samples, cut: float) -> float:
+    """How badly one even colour fits; arguments as in `stripe_fit`."""
     even, weight, gain, loss = np.zeros((len(base), 3)), np.empty(len(base)), np.empty(3), 1.0
     for n in range(len(base)):
         weight[n] = base[n]
@@ -190,47 +165,165 @@ def even_loss(profile: Samples, base: Samples, shade: Samples, palette: Samples,
 
 
 @compiled
-def stripe_step(
-    profile: Samples,
+def _error(base: Samples, weight: Samples, slope: Samples, rest: Samples, usual: float) -> float:
+    """Standard error of the angle: neighbours on the surface share pixels, so that their residuals are alike."""
+    count = len(base)
+    information, variance, total, most = 0.0, 0.0, 0.0, 0.0
+    scores = np.zeros(count)
+    for n in range(count):
+        total += weight[n]
+        most = max(most, base[n])
+        for c in range(_CHANNELS):
+            information += weight[n] * slope[n, c] ** 2
+            scores[n] += weight[n] * slope[n, c] * rest[n, c]
+            variance += weight[n] * rest[n, c] ** 2 / _CHANNELS
+    if information < 1e-6:
+        return math.nan  # nothing changes with the angle
+    variance = max(variance / (total + 1e-12), usual**2)
+    plain = _CHANNELS * variance * most / information
+    spread = 0.0
+    for n in range(count):
+        for m in range(max(0, n - _ALIKE), min(count, n + _ALIKE + 1)):
+            spread += scores[n] * scores[m] * (1.0 - abs(n - m) / (_ALIKE + 1.0))
+    return math.sqrt(max(plain, spread / information**2))
+
+
+@compiled
+def _counted(profile: Samples, scale: Samples, trust: Samples, clean: Samples, base: Samples) -> bool:
+    """Colours without what is not seen, and the weight of each angle; whether enough is seen."""
+    most, seen, all_of = scale.max(), 0.0, 0.0
+    for n in range(len(scale)):
+        good = scale[n] > _SLANTED * most
+        for c in range(_CHANNELS):
+            good = good and math.isfinite(profile[n, c])
+        for c in range(_CHANNELS):
+            clean[n, c] = profile[n, c] if good else 0.0
+        base[n] = trust[n] * scale[n] / most if good else 0.0
+        all_of += scale[n] / most
+        seen += scale[n] / most if good else 0.0
+    return seen >= _SEEN * all_of
+
+
+@compiled
+def _tried(
+    clean: Samples,
     base: Samples,
     angles: Samples,
     blur: Samples,
     shade: Samples,
     order: Whole,
     palette: Samples,
-    settings: Samples,
-    roll: float,
+    settings: tuple[float, float, float, float, float],
+    losses: Samples,
+) -> int:
+    """Losses at evenly spaced angles of a period, and which is the best of them; arguments as in `stripe_fit`.
+
+    Every other place along the angle is enough for that.
+    """
+    period, tint, cut, _, _ = settings
+    count = (len(angles) + 1) // 2
+    some_angles, some_blur, some_base = np.empty(count), np.empty(count), np.empty(count)
+    some_colours, some_shade = np.empty((count, 3)), np.empty((count, 6))
+    for n in range(count):
+        some_angles[n], some_blur[n], some_base[n] = angles[2 * n], blur[2 * n], base[2 * n]
+        for c in range(_CHANNELS):
+            some_colours[n, c] = clean[2 * n, c]
+            some_shade[n, c], some_shade[n, 3 + c] = shade[2 * n, c], shade[2 * n, 3 + c]
+    model, weight, gain = np.empty((count, 3)), np.empty(count), np.empty(3)
+    best = 0
+    for trial in range(len(losses)):
+        stripes_at(some_angles, some_blur, trial * period / len(losses), order, palette, model)
+        for n in range(count):
+            weight[n] = some_base[n]
+        for _ in range(2):
+            _gains(some_colours, weight, some_shade, model, tint, gain)
+            losses[trial] = _reweighted(some_colours, some_base, some_shade, model, gain, cut, weight)
+        best = trial if losses[trial] < losses[best] else best
+    return best
+
+
+@compiled
+def _slopes(
+    clean: Samples,
+    ahead: Samples,
+    behind: Samples,
+    model: Samples,
+    shade: Samples,
     weight: Samples,
     gain: Samples,
     slope: Samples,
     rest: Samples,
 ) -> float:
-    """What a Gauss-Newton step needs at an angle, and the loss; the first arguments are those of `stripe_losses`.
+    """Change of the colours with the angle and what is left of them, (n, 3); the Gauss-Newton step."""
+    top, bottom = 0.0, 1e-300
+    for n in range(len(weight)):
+        for c in range(_CHANNELS):
+            slope[n, c] = gain[c] * shade[n, c] * (ahead[n, c] - behind[n, c]) / (2.0 * _AHEAD)
+            rest[n, c] = clean[n, c] - gain[c] * (shade[n, c] * model[n, c] + shade[n, 3 + c])
+            top += weight[n] * slope[n, c] * rest[n, c]
+            bottom += weight[n] * slope[n, c] ** 2
+    return top / bottom
+
+
+@compiled
+def stripe_fit(
+    profile: Samples,
+    scale: Samples,
+    trust: Samples,
+    angles: Samples,
+    shade: Samples,
+    order: Whole,
+    palette: Samples,
+    settings: tuple[float, float, float, float, float],
+    losses: Samples,
+    answer: Samples,
+) -> None:
+    """The angle by which stripes are turned that explains colours along the angle best.
+
+    Evenly spaced angles of a period are tried, then Gauss-Newton steps are taken from the best one.
 
     Args:
-        profile: see there.
-        base: see there.
-        angles: see there.
-        blur: see there.
-        shade: see there.
-        order: see there.
-        palette: see there.
-        settings: see there.
-        roll: angle, rad.
-        weight: from the step before; new ones, (n,).
-        gain: brightness of the channels, an answer, (3,).
-        slope: change of the colours with the angle, an answer, (n, 3).
-        rest: what is left of the colours, an answer, (n, 3).
+        profile: colours along the angle, NaN where they are not seen, (n, 3).
+        scale: pixels of a radian at each angle, (n,).
+        trust: weight of each angle, beside that of its scale, (n,).
+        angles: rad, (n,).
+        shade: brightness of the same colour at each angle, and what shines there whatever the colour, (n, 6).
+        order: class of each stripe, (s,).
+        palette: colour of each class, (classes, 3).
+        settings: period, rad; strength that holds the channels together; residual at which a sample no longer counts;
+            residual that is the least to be expected; standard deviation of the blur, pixels.
+        losses: how badly each of the angles tried fits, an answer, 0 to 1.
+        answer: angle, its standard error, loss, least loss of an angle that is another one, loss of one even colour,
+            and the brightness of the channels; left alone where too little is seen, (8,).
     """
-    count, step = len(angles), 0.008
-    model, ahead, behind = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
-    stripes_at(angles, blur, roll, order, palette, model)
-    _gains(profile, weight, shade, model, settings[1], gain)
-    loss = _reweighted(profile, base, shade, model, gain, settings[2], weight)
-    stripes_at(angles, blur, roll + step, order, palette, ahead)
-    stripes_at(angles, blur, roll - step, order, palette, behind)
+    period, tint, cut, usual, blurred = settings
+    count, tries = len(angles), len(losses)
+    clean, base, blur = np.empty((count, 3)), np.empty(count), np.empty(count)
+    if not _counted(profile, scale, trust, clean, base):
+        return
     for n in range(count):
-        for c in range(_CHANNELS):
-            slope[n, c] = gain[c] * shade[n, c] * (ahead[n, c] - behind[n, c]) / (2.0 * step)
-            rest[n, c] = profile[n, c] - gain[c] * (shade[n, c] * model[n, c] + shade[n, 3 + c])
-    return loss
+        blur[n] = min(max(blurred / max(scale[n], 1e-9), 0.004), 0.5)
+    first = _tried(clean, base, angles, blur, shade, order, palette, settings, losses)
+    model, ahead, behind = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    slope, rest, weight, gain = np.empty((count, 3)), np.empty((count, 3)), base.copy(), np.empty(3)
+    roll, loss = first * period / tries, 1.0
+    for repeat in range(1 + _STEPS):
+        stripes_at(angles, blur, roll, order, palette, model)
+        _gains(clean, weight, shade, model, tint, gain)
+        loss = _reweighted(clean, base, shade, model, gain, cut, weight)
+        if repeat == 0:
+            continue  # that was to find the weights
+        stripes_at(angles, blur, roll + _AHEAD, order, palette, ahead)
+        stripes_at(angles, blur, roll - _AHEAD, order, palette, behind)
+        change = _slopes(clean, ahead, behind, model, shade, weight, gain, slope, rest)
+        roll += min(max(change, -0.1), 0.1)
+        if abs(change) < _LAST:
+            break
+    other, away = math.inf, max(1, int(tries * 0.35 * 2.0 * math.pi / len(order) / period))
+    for trial in range(tries):
+        if abs((trial - first + tries // 2) % tries - tries // 2) > away:
+            other = min(other, losses[trial])
+    answer[0], answer[1], answer[2], answer[3] = roll % period, _error(base, weight, slope, rest, usual), loss, other
+    answer[4] = _even_loss(clean, base, shade, palette, cut)
+    for c in range(_CHANNELS):
+        answer[5 + c] = gain[c]

@@ -10,6 +10,8 @@ from spirillum.kernels.compiled import compiled
 __all__ = ["pixels_of_points", "points_of_pixels", "surface_crossing"]
 
 _STEPS = 30
+_LAST = 1e-9
+"""Step over the distance after which Newton's method is exact to rounding: each squares the error."""
 
 
 @compiled
@@ -39,7 +41,7 @@ def surface_crossing(distance: float, above: float, below: float, index: float) 
             low = s
         step = value / (above * above / up**3 + index * below * below / down**3)
         s -= step
-        if abs(step) < 1e-14 * distance:
+        if abs(step) < _LAST * distance:
             break
         if s <= low or s >= high:
             s = 0.5 * (low + high)

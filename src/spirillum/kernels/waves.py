@@ -16,7 +16,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["ridge_of", "wave_scores", "wave_step"]
+__all__ = ["ridge_of", "wave_fit", "wave_scores"]
+
+_STEPS = 8
+"""Steps of least squares at most."""
 
 
 @compiled
@@ -44,15 +47,15 @@ def ridge_of(image: Samples, middle: Samples, across: Samples, contrast: Samples
             if not (0.0 <= u < width - 1.0 and 0.0 <= v < height - 1.0):
                 whole = False
                 break
-            p, q = int(v), int(u)
+            p, q = np.uint64(v), np.uint64(u)
+            r, s = p + np.uint64(1), q + np.uint64(1)
             a, b = v - p, u - q
             one, two = (1.0 - a) * (1.0 - b), (1.0 - a) * b
             three, four = a * (1.0 - b), a * b
             line[j] = (
-                c_r * (one * image[p, q, 0] + two * image[p, q + 1, 0] + three * image[p + 1, q, 0])
-                + c_g * (one * image[p, q, 1] + two * image[p, q + 1, 1] + three * image[p + 1, q, 1])
-                + c_b * (one * image[p, q, 2] + two * image[p, q + 1, 2] + three * image[p + 1, q, 2])
-                + four * (c_r * image[p + 1, q + 1, 0] + c_g * image[p + 1, q + 1, 1] + c_b * image[p + 1, q + 1, 2])
+                c_r * (one * image[p, q, 0] + two * image[p, s, 0] + three * image[r, q, 0] + four * image[r, s, 0])
+                + c_g * (one * image[p, q, 1] + two * image[p, s, 1] + three * image[r, q, 1] + four * image[r, s, 1])
+                + c_b * (one * image[p, q, 2] + two * image[p, s, 2] + three * image[r, q, 2] + four * image[r, s, 2])
             )
         if not whole:
             ridge[i, :] = math.nan
@@ -73,21 +76,34 @@ def ridge_of(image: Samples, middle: Samples, across: Samples, contrast: Samples
 
 
 @compiled
-def _place(
-    xi: float, phase: float, wave: Samples, decay: float, amplitude: float, e: float, f: float, g: float, hand: float
-) -> tuple[float, float]:
-    """Where the wire crosses a row, and r cos(a) there; `hand` -1 mirrors the heights."""
-    at = xi
-    y = z = 0.0
-    for _ in range(2):
-        s = max(at, 0.0)
-        r = amplitude * (1.0 - math.exp(-decay * s))
-        a = wave[0] * at + wave[1] + phase
-        y, z = r * math.cos(a), hand * r * math.sin(a)
-        if e == 0.0:
-            break
-        at = xi - e * z
-    return y + f * z + g * y * z, y
+def _radius(at: float, decay: float, amplitude: float) -> float:
+    """Distance of the wire from the axis."""
+    return amplitude * (1.0 - math.exp(-decay * max(at, 0.0)))
+
+
+@compiled
+def _crossing(
+    xi: float,
+    phase: float,
+    first: tuple[float, float],
+    wave: Samples,
+    decay: float,
+    tilt: tuple[float, float, float],
+    hand: float,
+) -> tuple[float, float, float]:
+    """Where the wire crosses a row, r cos(a) there, and the change of the place with the phase.
+
+    `first` are r cos(a) and r sin(a) at xi itself; `hand` -1 mirrors the heights.
+    """
+    e, f, g = tilt
+    at, at_turn = xi - e * hand * first[1], -e * hand * first[0]  # and their changes with the phase
+    a, a_turn = wave[0] * at + wave[1] + phase, 1.0 + wave[0] * at_turn
+    r = _radius(at, decay, wave[3])
+    r_turn = (wave[3] - r) * decay * at_turn if at > 0.0 else 0.0
+    cos, sin = math.cos(a), math.sin(a)
+    y, z = r * cos, hand * r * sin
+    y_turn, z_turn = r_turn * cos - r * sin * a_turn, hand * (r_turn * sin + r * cos * a_turn)
+    return y + f * z + g * y * z, y, y_turn + f * z_turn + g * (y_turn * z + y * z_turn)
 
 
 @compiled
@@ -106,27 +122,40 @@ def wave_scores(
         scores: the answer, one for each phase.
     """
     rows, columns = ridge.shape
-    half = 0.5 * (columns - 1)
+    half, count = 0.5 * (columns - 1), 0
     decay = wave[2] if wave[2] > 0.0 else 1e12
+    turns = np.empty((len(scores), 2))
     for n in range(len(scores)):
         phase = 2.0 * math.pi * n / len(scores)
-        total, count = 0.0, 0
-        for i in range(0, rows, every):
-            if math.isnan(ridge[i, 0]):
-                continue
-            y, _ = _place(xi[i], phase, wave, decay, wave[3], tilt[i, 0], tilt[i, 1], tilt[i, 2], 1.0)
+        turns[n, 0], turns[n, 1], scores[n] = math.cos(phase), math.sin(phase), 0.0
+    for i in range(0, rows, every):
+        if math.isnan(ridge[i, 0]):
+            continue
+        count += 1
+        r, a = _radius(xi[i], decay, wave[3]), wave[0] * xi[i] + wave[1]
+        cos, sin = r * math.cos(a), r * math.sin(a)
+        tilted = tilt[i, 0], tilt[i, 1], tilt[i, 2]
+        for n in range(len(scores)):
+            first = cos * turns[n, 0] - sin * turns[n, 1], sin * turns[n, 0] + cos * turns[n, 1]
+            y, _, _ = _crossing(xi[i], 2.0 * math.pi * n / len(scores), first, wave, decay, tilted, 1.0)
             place = y / step + half
             j = math.floor(place)
             if 0 <= j < columns - 1:
                 b = place - j
-                total += (1.0 - b) * ridge[i, j] + b * ridge[i, j + 1]
-            count += 1
-        scores[n] = total / count if 3 * count * every >= rows else math.nan
+                scores[n] += (1.0 - b) * ridge[i, j] + b * ridge[i, j + 1]
+    for n in range(len(scores)):
+        scores[n] = scores[n] / count if 3 * count * every >= rows else math.nan
 
 
 @compiled
-def wave_step(
-    ridge: Samples, xi: Samples, tilt: Samples, wave: Samples, settings: Samples, aside: Samples, fit: Samples
+def _beside(
+    ridge: Samples,
+    xi: Samples,
+    tilt: Samples,
+    wave: Samples,
+    settings: tuple[float, float, float, float],
+    aside: Samples,
+    fit: Samples,
 ) -> None:
     """Where the ridge lies in each row beside the curve.
 
@@ -145,18 +174,17 @@ def wave_step(
     rows, columns = ridge.shape
     half = 0.5 * (columns - 1)
     decay = wave[2] if wave[2] > 0.0 else 1e12
-    phase, step, window, usual = settings[0], settings[1], settings[2], settings[3]
-    turn = 1e-3
+    phase, step, window, usual = settings
     for i in range(rows):
         if math.isnan(ridge[i, 0]):
-            fit[i, :] = 0.0
+            for k in range(6):
+                fit[i, k] = 0.0
             fit[i, 1] = math.nan
             continue
-        e, f, g = tilt[i, 0], tilt[i, 1], tilt[i, 2]
-        base, fit[i, 3] = _place(xi[i], phase, wave, decay, wave[3], e, f, g, 1.0)
-        ahead, _ = _place(xi[i], phase + turn, wave, decay, wave[3], e, f, g, 1.0)
-        mirrored, _ = _place(xi[i], phase, wave, decay, wave[3], e, f, g, -1.0)
-        fit[i, 2] = (ahead - base) / turn
+        r, a = _radius(xi[i], decay, wave[3]), wave[0] * xi[i] + wave[1] + phase
+        first, tilted = (r * math.cos(a), r * math.sin(a)), (tilt[i, 0], tilt[i, 1], tilt[i, 2])
+        base, fit[i, 3], fit[i, 2] = _crossing(xi[i], phase, first, wave, decay, tilted, 1.0)
+        mirrored, _, _ = _crossing(xi[i], phase, first, wave, decay, tilted, -1.0)
         fit[i, 4] = 0.5 * (base - mirrored)
         curve = base + aside[i]
         low = max(0, math.ceil((curve - window) / step + half))
@@ -172,3 +200,156 @@ def wave_step(
         fit[i, 0] = top / bottom if bottom > 0.0 else 0.0
         strength = bottom / (high - low + 1.0) if high >= low else 0.0
         fit[i, 1] = min(1.0, strength / usual**2) if usual > 0.0 else min(1.0, strength)
+
+
+@compiled
+def _inverse(matrix: Samples, out: Samples) -> None:
+    """Inverse of a symmetric (3, 3) matrix by its cofactors."""
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        for d in range(3):
+            e, f = (d + 1) % 3, (d + 2) % 3
+            out[d, a] = matrix[b, e] * matrix[c, f] - matrix[b, f] * matrix[c, e]
+    determinant = matrix[0, 0] * out[0, 0] + matrix[0, 1] * out[1, 0] + matrix[0, 2] * out[2, 0]
+    for a in range(3):
+        for d in range(3):
+            out[a, d] /= determinant
+
+
+@compiled
+def _normal(basis: Samples, weight: Samples, wanted: Samples, normal: Samples, right: Samples) -> None:
+    """Normal equations of weighted least squares with three unknowns."""
+    normal[:], right[:] = 0.0, 0.0
+    for i in range(weight.size):
+        for a in range(3):
+            share = weight[i] * basis[i, a]
+            right[a] += share * wanted[i]
+            for b in range(3):
+                normal[a, b] += share * basis[i, b]
+
+
+@compiled
+def _weights(fit: Samples, scale: float, width: float, weight: Samples) -> tuple[float, float, int]:
+    """Weights that leave out what lies far from the curve; their sum, the typical distance, and the rows in view."""
+    total, spread, inside = 0.0, 0.0, 0
+    for i in range(weight.size):
+        if math.isnan(fit[i, 1]):
+            weight[i] = 0.0
+            continue
+        far = abs(fit[i, 0])
+        share = min(far / (3.0 * scale), 1.0)
+        weight[i] = fit[i, 1] * (1.0 - share * share) ** 2
+        total += weight[i]
+        spread += weight[i] * min(far, width)
+        inside += 1
+    return total, spread / max(total, 1e-300), inside
+
+
+@compiled
+def wave_fit(
+    ridge: Samples,
+    xi: Samples,
+    tilt: Samples,
+    wave: Samples,
+    settings: tuple[float, float, float, float, float, float],
+    answer: Samples,
+) -> None:
+    """Robust least squares of phase, sideways offset and lean of a wire, from a phase nearby.
+
+    Args:
+        ridge: the strip, (rows, columns).
+        xi: distance from the root of each row, m, (rows,).
+        tilt: e, f and g of each row, (rows, 3).
+        wave: K, a_0, c/L_t (0 or less: no taper), amplitude.
+        settings: phase, rad; width of a column, m; width of the wire, m; typical ridge on the wire; likely offset, m;
+            likely offset from end to end, m.
+        answer: phase, its standard error, share of the rows in which the wire is where it should be, offset, lean, top
+            and bottom of two quotients: the misfit against the other hand (0 for this hand, -2 for the other), and the
+            share of the amplitude that is missing; mean ridge. Left alone where too little is in view, (10,).
+    """
+    phase, step, width, usual, likely_offset, likely_lean = settings
+    rows, length = xi.size, xi[-1] - xi[0]
+    fit, aside, weight = np.zeros((rows, 6)), np.zeros(rows), np.zeros(rows)
+    basis, normal, inverse, right = np.ones((rows, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    middle = xi.mean()
+    for i in range(rows):
+        basis[i, 2] = (xi[i] - middle) / length
+    offset, lean, scale, total, inside = 0.0, 0.0, width, 0.0, 0
+    for repeat in range(_STEPS):
+        for i in range(rows):
+            aside[i] = offset + basis[i, 2] * lean
+        window = (2.0 if repeat < 2 else 1.25) * width
+        _beside(ridge, xi, tilt, wave, (phase, step, window, usual), aside, fit)
+        total, spread, inside = _weights(fit, scale, width, weight)
+        if total < 1e-6 or 3 * inside < rows:
+            return
+        scale = max(1.5 * spread, 0.15 * width)
+        noise = max(1.25 * spread, 0.03 * width) ** 2
+        for i in range(rows):
+            basis[i, 0] = fit[i, 2]
+        _normal(basis, weight, fit[:, 0], normal, right)
+        held_offset, held_lean = noise / likely_offset**2, noise / likely_lean**2  # both are small
+        normal[0, 0] += 1e-300
+        normal[1, 1] += held_offset
+        normal[2, 2] += held_lean
+        right[1] -= held_offset * offset
+        right[2] -= held_lean * lean
+        _inverse(normal, inverse)
+        change = inverse[0, 0] * right[0] + inverse[0, 1] * right[1] + inverse[0, 2] * right[2]
+        phase += 1.2 * min(max(change, -0.5), 0.5)
+        offset += inverse[1, 0] * right[0] + inverse[1, 1] * right[1] + inverse[1, 2] * right[2]
+        lean += inverse[2, 0] * right[0] + inverse[2, 1] * right[1] + inverse[2, 2] * right[2]
+        if repeat > 2 and abs(change) < 2e-4:
+            break
+    answer[0], answer[3], answer[4] = phase, offset, lean / length
+    _judge(xi, width, total, fit, weight, basis, normal, inverse, answer)
+
+
+@compiled
+def _judge(
+    xi: Samples,
+    width: float,
+    total: float,
+    fit: Samples,
+    weight: Samples,
+    basis: Samples,
+    normal: Samples,
+    inverse: Samples,
+    answer: Samples,
+) -> None:
+    """What else `wave_fit` answers, at the end of its steps."""
+    rows = xi.size
+    close, inside, square, mean = 0.0, 0.0, 0.0, 0.0
+    scores = np.empty(rows)
+    for i in range(rows):
+        scores[i] = weight[i] * fit[i, 0]
+        scores[i] *= basis[i, 0] * inverse[0, 0] + basis[i, 1] * inverse[0, 1] + basis[i, 2] * inverse[0, 2]
+        square += weight[i] * fit[i, 0] ** 2
+        if not math.isnan(fit[i, 1]):
+            inside += 1.0
+            close += weight[i] > 0.15 and abs(fit[i, 0]) < 0.5 * width
+            mean += fit[i, 5]
+    # Errors of rows near each other are alike: sum of scores with a triangular window.
+    reach = max(4, int(3.0 * width / (xi[1] - xi[0])))
+    sandwich = 0.0
+    for i in range(rows):
+        for j in range(max(0, i - reach), min(rows, i + reach + 1)):
+            sandwich += scores[i] * scores[j] * (1.0 - abs(i - j) / (reach + 1.0))
+    plain = square / total * inverse[0, 0] * max(1.0, 0.5 * reach)
+    answer[1], answer[2], answer[9] = math.sqrt(max(plain, sandwich)), close / inside, mean / inside
+    # What the other hand would change beyond what phase, offset and lean explain already.
+    gram, right, other = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    _normal(basis, weight, fit[:, 4], gram, right)
+    for a in range(3):
+        gram[a, a] += 1e-12 * normal[a, a]
+    _inverse(gram, other)
+    for k in range(5, 9):
+        answer[k] = 0.0
+    for i in range(rows):
+        rest = fit[i, 4]
+        for a in range(3):
+            rest -= basis[i, a] * (other[a, 0] * right[0] + other[a, 1] * right[1] + other[a, 2] * right[2])
+        answer[5] += weight[i] * rest * fit[i, 0]
+        answer[6] += weight[i] * rest * rest
+        answer[7] += weight[i] * fit[i, 3] * fit[i, 0]
+        answer[8] += weight[i] * fit[i, 3] ** 2

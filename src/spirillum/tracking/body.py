@@ -77,6 +77,9 @@ class BodyFinder:
         self._offset = np.zeros(len(self.contour.group))
         self._trust = self.contour.floor.copy()
         self.margin = int(_HALF + 4 * _BLUR + 4)
+        middle = self.contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
+        spacing = float(np.median(np.hypot(*np.diff(middle, axis=0).T)))
+        self._together = max(1.0, _TOGETHER / max(spacing, 0.1))
 
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
         """Learn the edges' looks from frames with about known places; the places again, better.
@@ -208,7 +211,7 @@ class BodyFinder:
         pose = np.array(guess)
         lost = Placed(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
         for step in range(_STEPS):
-            pixels, normals, size, slopes = self.contour.places(BodyPose(*pose), self.optics)
+            pixels, normals, _, slopes = self.contour.places(BodyPose(*pose), self.optics)
             shifts, known, variance = self._shifts(part, pixels, normals)
             inside = np.isfinite(shifts)
             if known.sum() < 12:
@@ -217,15 +220,17 @@ class BodyFinder:
             pose = pose + change
             if step > 0 and float(np.abs(slopes @ change).max()) < 0.01:
                 break
-        normal = slopes.T @ (used[:, None] * slopes)
-        spacing = float(np.median(np.hypot(*np.diff(pixels, axis=0).T)))
-        scatter = np.linalg.pinv(normal) * max(level, 0.5) ** 2 * max(1.0, _TOGETHER / max(spacing, 0.1))
-        errors = np.sqrt(np.maximum(np.diagonal(scatter), 0.0))
-        fitting = float(np.sum(used > 0.0) / max(1, inside.sum()))
-        share = float(inside.mean())
-        if fitting < _FEWEST or not errors[0] * float(np.median(size)) < _WORST or share < 0.2:
-            return Placed(BodyPose(*pose), lost.error, fitting, share)
-        return Placed(BodyPose(*(float(v) for v in pose)), BodyPose(*(float(v) for v in errors)), fitting, share)
+        fitting = np.count_nonzero(used) / max(1, int(np.count_nonzero(inside)))
+        share = np.count_nonzero(inside) / count
+        found = BodyPose(*pose.tolist())
+        try:
+            scatter = np.linalg.inv(slopes.T @ (used[:, None] * slopes)) * max(level, 0.5) ** 2 * self._together
+        except np.linalg.LinAlgError:  # edges of one direction only
+            return Placed(found, lost.error, fitting, share)
+        errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(scatter), 0.0)).tolist())
+        if fitting < _FEWEST or not errors.x < _WORST * self.optics.length_per_pixel or share < 0.2:
+            return Placed(found, lost.error, fitting, share)
+        return Placed(found, errors, fitting, share)
 
 
 def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:

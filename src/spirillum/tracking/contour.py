@@ -34,9 +34,9 @@ _TRUSTED = {
     "bare rear": 0.5,
 }
 """What places of edges are never known better than, pixels."""
-_ORDERS = 9, 4
+_ORDERS = 7, 4
 """Orders of the polynomials along and across."""
-_NODES = 12, 6
+_NODES = 8, 5
 _AROUND, _PER_TURN = 128, 144
 """Points around the axis, and along an arc that goes all the way round, from which a silhouette is made."""
 _WIDE = 0.9
@@ -56,7 +56,7 @@ class Contour:
     floor: Samples = field(repr=False)
     """What places of points are never known better than, pixels: looks change, most where stripes pass, (n,)."""
     _factors: Samples = field(repr=False)
-    """Polynomials of the points, and of those of a flat end's lower rim, (2, n, 2, a, b)."""
+    """Polynomials of the points, and of those of a flat end's lower rim, (a, b, 4, n)."""
     _reach: Samples = field(repr=False)
 
     def points(self, pose: BodyPose) -> Samples:
@@ -146,14 +146,15 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     basis = np.einsum(
         "ia,jb->ijab", chebyshev.chebvander(nodes[0], _ORDERS[0]), chebyshev.chebvander(nodes[1], _ORDERS[1])
     ).reshape(_NODES[0] * _NODES[1], -1)
-    factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0].T
-    factors = np.ascontiguousarray(factors).reshape(*found.shape[2:], *(order + 1 for order in _ORDERS))
+    found = np.moveaxis(found, -1, -2)
+    factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0]
+    factors = np.ascontiguousarray(factors).reshape(*(order + 1 for order in _ORDERS), 4, count)
     group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
     # The near and the far rim of a flat end without stripes look alike, and move otherwise.
     rear = "rear" if striped or _flat(outline, -1) is None else "bare rear"
     trusted = [_TRUSTED[name] for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
     floor = np.repeat(trusted, [size for _, size in kinds])
-    middle = found[_NODES[0] // 2, _NODES[1] // 2, 0]
+    middle = found[_NODES[0] // 2, _NODES[1] // 2, 0].T
     return Contour(group, _normals(middle, group), floor, factors, np.array(reach))
 
 

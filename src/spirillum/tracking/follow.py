@@ -15,7 +15,7 @@ from spirillum.robot.robot import Robot
 from spirillum.tracking.body import BodyFinder, Placed
 from spirillum.tracking.camera import bounds_of, opened, samples_of, scale_of, sight_of
 from spirillum.tracking.cuts import cuts_in, jumps_of_time
-from spirillum.tracking.frames import Video
+from spirillum.tracking.frames import Frame, Video
 from spirillum.tracking.identity import Introduced, introduced
 from spirillum.tracking.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.tracking.ruler import still_picture
@@ -99,8 +99,7 @@ def follow(
     aside.shutdown(wait=False)
     total = video.count
     for frame in video.frames(setup.start, setup.end):
-        guess = _guess(rows, frame.time, start)
-        found = _placed(body, frame.image, guess, start.expected(frame.time))
+        found = _placed(body, frame, _guess(rows, frame.time), start)
         if not found.known and len(rows.time) % _LOOK_AGAIN == 0:
             found = _searched(body, frame.image, still, start, found)
         read = (np.nan, np.nan), (np.nan, np.nan)
@@ -120,25 +119,26 @@ def follow(
     return _track(video, setup, sight, known, rows, every)
 
 
-def _guess(rows: _Row, time: float, start: Start) -> BodyPose:
-    """Where the body should be, from the frames before."""
+def _guess(rows: _Row, time: float) -> BodyPose | None:
+    """Where the body should be, from the frames before; None where it was not seen on the last one."""
     last = [(at, one.pose) for at, one in zip(rows.time[-_MEMORY:], rows.placed[-_MEMORY:], strict=True) if one.known]
     if len(last) < 2 or not rows.placed[-1].known:
-        return start.expected(time)
+        return None
     return on_the_way(last, time)
 
 
-def _placed(body: BodyFinder, image: np.ndarray, guess: BodyPose, expected: BodyPose) -> Placed:
+def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start) -> Placed:
     """The body near a guess, or else where it should be; not seen if it would have jumped."""
-    found = body.place(image, guess)
-    far = 4.0 * body.optics.length_per_pixel
-    if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) > far:
-        found = found._replace(error=BodyPose(np.nan, np.nan, np.nan))
-    if not found.known and guess is not expected:
-        again = body.place(image, expected)
-        if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
-            return again
-    return found
+    found, far = None, 4.0 * body.optics.length_per_pixel
+    if guess is not None:
+        found = body.place(frame.image, guess)
+        if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+            return found
+    expected = start.expected(frame.time)
+    again = body.place(frame.image, expected)
+    if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
+        return again
+    return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
 
 
 def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:

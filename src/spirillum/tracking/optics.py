@@ -139,8 +139,9 @@ def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
 def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
     """Points (k, 3) of the body's frame in the camera's frame, m."""
     cos, sin = np.cos(pose.heading), np.sin(pose.heading)
-    x, y, z = points[:, 0], points[:, 1], points[:, 2]
-    return np.stack([pose.x + cos * x - sin * y, pose.y + sin * x + cos * y, axis_height + z], axis=1)
+    turned: Samples = points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turned += np.array([pose.x, pose.y, axis_height])
+    return turned
 
 
 def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.pictures import even_loss, profile_of_rows, stripe_losses, stripe_step, stripes_at
+from spirillum.kernels.pictures import profile_of_rows, stripe_fit, stripes_at
 from spirillum.robot.robot import Robot
 from spirillum.tracking.colours import (
     colour_classes,
@@ -35,6 +35,8 @@ _TINT = 3.0
 """How strongly the three channels of the lamp are held together within a frame."""
 _BLURS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0)
 """Standard deviations of the picture's blur that are tried, pixels."""
+_BLURRED = 2
+"""Of how many frames one is asked for the blur."""
 _CUT, _EDGE = 4.7, 0.35
 """Residual at which a sample no longer counts: over the typical one, and at least this share of the step between two
 stripes, so that edges a part of a pixel away still pull."""
@@ -65,10 +67,6 @@ _WHITE = 228.0
 """Brightness of the darkest channel from which on no colour is left."""
 _WIDE, _HALO = 10, 8
 """Angles, `_STEP` each, from which on glare is wide, and those beside it that it makes paler than a lamp does."""
-_STEPS = 8
-"""Gauss-Newton steps at most."""
-_ALIKE = 6
-"""Angles next to each other whose residuals are taken to be alike."""
 _AMBIGUOUS = 1.15
 """Least ratio of the next best loss to the best one."""
 
@@ -222,55 +220,14 @@ class Stripes:
         return np.asarray(np.convolve(white, np.ones(2 * _HALO + 1), mode="same") > 0.5)
 
     def _fit(self, profile: Samples, scale: Samples, look: _Look) -> Samples:
-        good = np.isfinite(profile).all(axis=1) & (scale > 0.15 * scale.max())
-        base = np.where(good, scale / scale.max(), 0.0)
-        answer = np.full(8, np.nan)
-        if base.sum() < 0.3 * np.sum(scale / scale.max()):
-            return answer
-        base *= look.trust
-        blur = np.clip(look.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
-        edges = np.linalg.norm(np.diff(look.palette[np.append(self.order, self.order[0])], axis=0), axis=1)
-        cut = max(_CUT * 1.7 * look.residual, _EDGE * float(np.median(edges)))
-        tries = max(24, round(self.period / np.deg2rad(4.0)))
-        settings = np.array([self.period, _TINT, cut])
-        clean = np.nan_to_num(profile)
-        known = (clean, base, self.angles, blur, look.shade, self.order, look.palette, settings)
-        losses = np.empty(tries)
-        stripe_losses(*known, losses)
-        first = int(np.argmin(losses))
-        roll, loss = first * self.period / tries, 1.0
-        weight, gain = base.copy(), np.empty(3)
-        slope, rest = np.empty_like(clean), np.empty_like(clean)
-        stripe_step(*known, roll, weight, gain, slope, rest)
-        information = 1e-300
-        for _ in range(_STEPS):
-            loss = stripe_step(*known, roll, weight, gain, slope, rest)
-            information = float(np.einsum("n,nc,nc", weight, slope, slope)) + 1e-300
-            change = float(np.einsum("n,nc,nc", weight, slope, rest)) / information
-            roll += min(max(change, -0.1), 0.1)
-            if abs(change) < 2e-5:
-                break
-        apart = np.abs((np.arange(tries) - first + tries // 2) % tries - tries // 2)
-        away = max(1, int(tries * 0.35 * 2.0 * np.pi / self.order.size / self.period))
-        other = losses[apart > away].min(initial=np.inf)
-        error = self._error(base, weight, slope, rest, information, 0.3 * look.residual)
-        flat = even_loss(clean, base, look.shade, look.palette, cut)
-        answer[:] = [roll % self.period, error, loss, other, flat, *gain]
+        """The answer of `stripe_fit`; NaN where too little is in view."""
+        edges = np.diff(look.palette[np.append(self.order, self.order[0])], axis=0)
+        cut = max(_CUT * 1.7 * look.residual, _EDGE * float(np.median(np.linalg.norm(edges, axis=1))))
+        answer, losses = np.full(8, np.nan), np.empty(max(24, round(self.period / np.deg2rad(4.0))))
+        settings = self.period, _TINT, cut, 0.3 * look.residual, look.blur
+        known = profile, scale, look.trust, self.angles, look.shade, self.order, look.palette
+        stripe_fit(*known, settings, losses, answer)
         return answer
-
-    @staticmethod
-    def _error(
-        base: Samples, weight: Samples, slope: Samples, rest: Samples, information: float, usual: float
-    ) -> float:
-        """Standard error of the angle: neighbours on the surface share pixels, so that their residuals are alike."""
-        if information < 1e-6:
-            return np.nan  # nothing changes with the angle
-        variance = max(float(weight @ (rest**2).mean(axis=1)) / (weight.sum() + 1e-12), usual**2)
-        plain = 3.0 * variance * base.max() / information
-        scores = weight * np.sum(slope * rest, axis=1)
-        window = 1.0 - np.abs(np.arange(-_ALIKE, _ALIKE + 1)) / (_ALIKE + 1.0)
-        spread = float(scores @ np.convolve(scores, window, mode="same")) / information**2
-        return float(np.sqrt(max(plain, spread)))
 
     def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Look:
         """Colours, shading and blur with which the stripes fit best; what shines is learnt once the stripes are."""
@@ -281,7 +238,8 @@ class Stripes:
                 losses = []
                 for blur in _BLURS:
                     trial = _Look(look.palette, look.shade, blur, look.residual, look.trust)
-                    losses.append(np.nansum([self._fit(p, s, trial)[2] for p, s in zip(profiles, scales, strict=True)]))
+                    some = zip(profiles[::_BLURRED], scales[::_BLURRED], strict=True)
+                    losses.append(np.nansum([self._fit(p, s, trial)[2] for p, s in some]))
                 look.blur = _BLURS[int(np.argmin(losses))]
             look = self._relearned(clear if repeat < _WITHOUT_GLARE else profiles, scales, look)
         return look

@@ -22,7 +22,13 @@ _STILL = 0.8
 """How much of what stands still is taken off a picture; not all, or a robot that hardly moves would vanish too."""
 _EVERY = 2
 """Of how many edge points one is used."""
+_STEP = 6
+"""Columns of the smaller picture for which the outline is computed once."""
+_BEST = 3
+"""Places of each heading among them that are kept."""
 _KEPT = 5
+_REACH = 6
+"""How far a candidate is moved to place it better, pixels."""
 _ROOM = 24
 """Pixels around a candidate that are looked at to place it better."""
 
@@ -59,13 +65,12 @@ def candidates(
     width = float(np.ptp(middle[:, 1]))
     factor = max(1, int(width / _WIDTH))
     slope_u, slope_v, usual = _slopes(image, still, bounds, factor, 1.0)
-    height, length = slope_u.shape
+    length, height = slope_u.shape
     thin = np.arange(0, len(contour.group), _EVERY)
-    group = contour.group[thin].astype(float)
-    step = 6
-    reach = np.mgrid[0 : height + 1, -step // 2 : step - step // 2].reshape(2, -1).T.astype(float)
-    found: list[tuple[float, BodyPose, Samples]] = []
-    for column in range(step // 2, length + step // 2, step):
+    group, shift = contour.group[thin], np.array([-0.5 * _STEP, -0.5 * height])
+    scores = np.empty((_STEP, height + 1))
+    found: list[tuple[float, BodyPose]] = []
+    for column in range(_STEP // 2, length + _STEP // 2, _STEP):
         for heading in _HEADINGS:
             start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
             at = optics.points(start, optics.axis_height)[0]
@@ -74,26 +79,20 @@ def candidates(
             pose = BodyPose(float(at[0]), float(at[1]), float(heading) + turn)
             pixels, normals, _, _ = contour.places(pose, optics)
             small = (pixels[thin] - np.array([left, top])) / factor - 0.5 + 0.5 / factor
-            places = np.stack([reach[:, 1], reach[:, 0] - 0.5 * height], axis=1)
-            scores = np.empty(len(places))
-            edge_scores(slope_u, slope_v, small, normals[thin], group, len(GROUPS), places, scores)
-            for k in np.argsort(scores)[-3:]:
-                there = optics.points(start + factor * places[k], optics.axis_height)[0]
-                found.append(
-                    (
-                        float(scores[k]) / usual,
-                        BodyPose(float(there[0]), float(there[1]), float(heading) + turn),
-                        places[k],
-                    )
-                )
+            edge_scores(slope_u, slope_v, small, normals[thin], group, len(GROUPS), tuple(shift), scores)
+            best = np.argpartition(scores, -_BEST, axis=None)[-_BEST:]
+            places = start + factor * (shift + np.column_stack(np.unravel_index(best, scores.shape)))
+            for k, there in zip(best, optics.points(places, optics.axis_height), strict=True):
+                pose = BodyPose(float(there[0]), float(there[1]), float(heading) + turn)
+                found.append((float(scores.flat[k]) / usual, pose))
     return _apart(found, optics, width)
 
 
-def _apart(found: list[tuple[float, BodyPose, Samples]], optics: Optics, width: float) -> list[Candidate]:
+def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) -> list[Candidate]:
     """The best candidates that are not the same one twice."""
     far = width * optics.length_per_pixel
     kept: list[Candidate] = []
-    for score, pose, _ in sorted(found, key=lambda entry: -entry[0]):
+    for score, pose in sorted(found, key=lambda entry: -entry[0]):
         if score <= 0.0 or len(kept) == _KEPT:
             break
         if all(np.hypot(pose.x - other.pose.x, pose.y - other.pose.y) > far for other in kept):
@@ -152,21 +151,20 @@ def refined(
         return Candidate(start.pose, 0.0)
     part = int(low[0]), int(low[1]), int(high[0]), int(high[1])
     slope_u, slope_v, _ = _slopes(image, still, part, 1, 1.2, bounded=False)
-    reach = np.mgrid[-6:7, -6:7].reshape(2, -1).T[:, ::-1].astype(float)
     thin = np.arange(0, len(contour.group), _EVERY)
-    group, best = contour.group[thin].astype(float), Candidate(start.pose, 0.0)
-    scores = np.empty(len(reach))
+    group, best = contour.group[thin], Candidate(start.pose, 0.0)
+    scores, shift = np.empty((2 * _REACH + 1, 2 * _REACH + 1)), np.full(2, -float(_REACH))
     for _ in range(2):
         pose = best.pose
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
             heading = pose.heading + float(turn)
             pixels, normals, _, _ = contour.places(BodyPose(pose.x, pose.y, heading), optics)
-            edge_scores(slope_u, slope_v, pixels[thin] - low, normals[thin], group, len(GROUPS), reach, scores)
-            k = int(np.argmax(scores))
-            if scores[k] > best.score:
-                middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + reach[k]
+            edge_scores(slope_u, slope_v, pixels[thin] - low, normals[thin], group, len(GROUPS), tuple(shift), scores)
+            if scores.max() > best.score:
+                place = shift + np.unravel_index(np.argmax(scores), scores.shape)
+                middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + place
                 at = optics.points(middle, optics.axis_height)[0]
-                best = Candidate(BodyPose(float(at[0]), float(at[1]), heading), float(scores[k]))
+                best = Candidate(BodyPose(float(at[0]), float(at[1]), heading), float(scores.max()))
     return best
 
 
@@ -207,7 +205,10 @@ def _slopes(
     *,
     bounded: bool = True,
 ) -> tuple[Samples, Samples, float]:
-    """Brightness gradients of a part of a picture made smaller, cut off where they are rare, and their usual size."""
+    """Brightness gradients of a part of a picture made smaller, cut off where they are rare, and their usual size.
+
+    Of the gradients, (w, h), the columns lie one after the other.
+    """
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     part = image[top:bottom, left:right].astype(np.float32) - _STILL * still[top:bottom, left:right].astype(np.float32)
@@ -215,9 +216,9 @@ def _slopes(
     if factor > 1:
         size = max(1, part.shape[1] // factor), max(1, part.shape[0] // factor)
         part = cv2.resize(part[: size[1] * factor, : size[0] * factor], size, interpolation=cv2.INTER_AREA)
-    part = cv2.GaussianBlur(part, (0, 0), blur)
-    slope_u = 0.5 * cv2.Sobel(part, cv2.CV_64F, 1, 0, ksize=1)
-    slope_v = 0.5 * cv2.Sobel(part, cv2.CV_64F, 0, 1, ksize=1)
+    part = np.ascontiguousarray(cv2.GaussianBlur(part, (0, 0), blur).T)
+    slope_u = 0.5 * cv2.Sobel(part, cv2.CV_64F, 0, 1, ksize=1)
+    slope_v = 0.5 * cv2.Sobel(part, cv2.CV_64F, 1, 0, ksize=1)
     if not bounded:
         return slope_u, slope_v, 1.0
     size_of = np.hypot(slope_u, slope_v)

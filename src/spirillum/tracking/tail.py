@@ -9,7 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.pictures import sampled
-from spirillum.kernels.waves import ridge_of, wave_scores, wave_step
+from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
 from spirillum.tracking.optics import BodyPose, Optics, seen
 from spirillum.tracking.setup import Setup
@@ -28,8 +28,6 @@ _SHARE = 0.4
 """Least share of the wire that has to be where it should be."""
 _RIVAL = 0.85
 """Largest score of another phase over the best one."""
-_STEPS = 8
-"""Steps of least squares at most."""
 _OFFSET, _LEAN = 0.3, 0.02
 """Likely sideways offset of the tail, in widths of the wire, and tilt, rad."""
 _FLOOR = 0.004
@@ -100,7 +98,7 @@ class TailWave:
         x = np.broadcast_to((-root - coarse)[:, None], (_COARSE, len(corners)))
         y, z = (np.broadcast_to(corners[:, k], x.shape) for k in (0, 1))
         self._points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
-        self._spacing = float(coarse[1] - coarse[0])
+        self._slope = np.gradient(np.eye(_COARSE), coarse[1] - coarse[0], axis=0, edge_order=2)
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
         """Find out how the wire differs from what is around it, and whether it is the robot's.
@@ -196,7 +194,7 @@ class TailWave:
         y = (pixels[:, 1] - pixels[:, 2]) / (2.0 * b)
         z = (pixels[:, 3] - pixels[:, 4]) / (2.0 * b)
         yz = (pixels[:, 5] + pixels[:, 6] - pixels[:, 7] - pixels[:, 8]) / (4.0 * b * b)
-        along = np.gradient(axis, self._spacing, axis=0, edge_order=2)
+        along = self._slope @ axis
         det = along[:, 0] * y[:, 1] - along[:, 1] * y[:, 0]
         e = (z[:, 0] * y[:, 1] - z[:, 1] * y[:, 0]) / det
         f = (along[:, 0] * z[:, 1] - along[:, 1] * z[:, 0]) / det
@@ -225,12 +223,7 @@ class TailWave:
         return float((scores.max() - np.median(scores)) / (np.sqrt(np.nanmean(ridge**2)) + 0.5))
 
     def _fit(self, image: np.ndarray, strip: _Strip) -> tuple[Samples, float]:
-        """The fit's answer and the best score of another phase over the best one.
-
-        The answer: phase, its standard error, share of the rows in which the wire is where it should be, offset, tilt,
-        misfit against the other hand (top and bottom of a quotient: 0 for this hand, -2 for the other), share of the
-        amplitude that is missing (top and bottom), mean ridge.
-        """
+        """The answer of `wave_fit` and the best score of another phase over the best one."""
         answer = np.full(10, np.nan)
         answer[2] = 0.0
         if self.contrast is None:
@@ -241,55 +234,10 @@ class TailWave:
             return answer, np.inf
         best = int(np.argmax(scores))
         apart = np.abs((np.arange(_PHASES) - best + _PHASES // 2) % _PHASES - _PHASES // 2) > _PHASES / 6
-        self._steps(ridge, strip, 2.0 * np.pi * best / _PHASES, answer)
+        likely = _OFFSET * self.width, _LEAN * (self.xi[-1] - self.xi[0])
+        settings = (2.0 * np.pi * best / _PHASES, self.step, self.width, self.usual, *likely)
+        wave_fit(ridge, self.xi, strip.tilt, self.wave, settings, answer)
         return answer, float(scores[apart].max() / scores[best])
-
-    def _steps(self, ridge: Samples, strip: _Strip, phase: float, answer: Samples) -> None:
-        """Robust least squares of phase, sideways offset and tilt, from a phase nearby; see `_fit` for the answer."""
-        along = (self.xi - self.xi.mean()) / (self.xi[-1] - self.xi[0])
-        fit, aside = np.zeros((self.xi.size, 6)), np.zeros(2)
-        likely = np.array([_OFFSET * self.width, _LEAN * (self.xi[-1] - self.xi[0])])
-        scale, basis = self.width, np.ones((self.xi.size, 3))
-        basis[:, 2] = along
-        normal, noise = np.eye(3), 1.0
-        for repeat in range(_STEPS):
-            window = (2.0 if repeat < 2 else 1.25) * self.width
-            settings = np.array([phase, self.step, window, self.usual])
-            wave_step(ridge, self.xi, strip.tilt, self.wave, settings, basis[:, 1:] @ aside, fit)
-            rest, inside = fit[:, 0], np.isfinite(fit[:, 1])
-            weight = np.where(inside, fit[:, 1], 0.0)
-            weight *= (1.0 - np.minimum(np.abs(rest) / (3.0 * scale), 1.0) ** 2) ** 2
-            total = float(weight.sum())
-            if total < 1e-6 or 3 * int(inside.sum()) < inside.size:
-                return
-            spread = float(weight @ np.minimum(np.abs(rest), self.width)) / total
-            scale = max(1.5 * spread, 0.15 * self.width)
-            noise = max(1.25 * spread, 0.03 * self.width) ** 2
-            basis[:, 0] = fit[:, 2]
-            held = np.array([0.0, *(noise / likely**2)])  # offset and tilt are small
-            normal = (basis * weight[:, None]).T @ basis + np.diag(held + 1e-300)
-            right = basis.T @ (weight * rest) - held * np.array([0.0, *aside])
-            change = np.linalg.solve(normal, right)
-            phase += 1.2 * min(max(float(change[0]), -0.5), 0.5)
-            aside += change[1:]
-            if repeat > 2 and abs(change[0]) < 2e-4:
-                break
-        inverse = np.linalg.inv(normal)
-        # Errors of rows near each other are alike: sum of scores with a triangular window.
-        reach = max(4, int(3.0 * self.width / (self.xi[1] - self.xi[0])))
-        scores = weight * rest * (basis @ inverse[0])
-        triangle = 1.0 - np.abs(np.arange(-reach, reach + 1)) / (reach + 1.0)
-        sandwich = float(scores @ np.convolve(scores, triangle, mode="same"))
-        plain = float(weight @ rest**2) / total * float(inverse[0, 0]) * max(1.0, 0.5 * reach)
-        close = np.mean((weight[inside] > 0.15) & (np.abs(rest[inside]) < 0.5 * self.width))
-        # What the other hand would change beyond what phase, offset and tilt explain already.
-        gram = (basis * weight[:, None]).T @ basis + 1e-12 * np.diag(np.diag(normal))
-        other = fit[:, 4] - basis @ np.linalg.solve(gram, basis.T @ (weight * fit[:, 4]))
-        cosine = fit[:, 3]
-        answer[:5] = [phase, np.sqrt(max(plain, sandwich)), close, aside[0], aside[1] / (self.xi[-1] - self.xi[0])]
-        answer[5:7] = weight @ (other * rest), weight @ other**2
-        answer[7:9] = weight @ (cosine * rest), weight @ cosine**2
-        answer[9] = float(fit[inside, 5].mean())
 
     def _curve(self, strip: _Strip, answer: Samples) -> Samples:
         """Pixels of the fitted wire, (rows, 2), to first order in the height."""
