@@ -29,7 +29,7 @@ _INK = (255, 255, 255)
 _SHIFT = 4
 """Lines are drawn at sixteenths of a pixel."""
 _TICKS = 90_000
-_QUALITY = {"crf": "23", "preset": "superfast"}
+_QUALITY = {"crf": "23", "preset": "ultrafast"}
 _WAITING = 8
 
 
