@@ -325,7 +325,7 @@ class StudyFigures(SphinxDirective):
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.plots import study_figures
+        from spirillum.plots.study import study_figures
 
         pictures = study_figures(_studied())
         found: list[nodes.Node] = []
@@ -420,7 +420,7 @@ def _draw_pictures(app: Sphinx) -> None:
     import runpy
     import sys
 
-    from spirillum.plots import study_figures
+    from spirillum.plots.study import study_figures
 
     folder = Path(app.srcdir) / "_build" / "pictures"
     folder.mkdir(parents=True, exist_ok=True)

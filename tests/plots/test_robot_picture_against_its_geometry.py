@@ -7,10 +7,10 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import spirillum as sp
-from spirillum.plots import save
 from spirillum.plots.robot import robot_figure, robot_words
 from spirillum.plots.scene import PHASE
 from spirillum.plots.solids import body_profile, crests
+from spirillum.plots.style import save
 from spirillum.robot import RobotBatch
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.plots import study_figures
+from spirillum.plots.study import study_figures
 from spirillum.plots.style import look_of_model
 from spirillum.studies import places, run
 from spirillum.studies.claims import Evidence, evaluated

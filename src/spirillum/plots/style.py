@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
 from spirillum.arrays import Values
 from spirillum.files import whole_file
@@ -208,5 +209,7 @@ def save_as(figure: Figure, path: Path) -> None:
         path: the file; its suffix is `.png`, `.pdf` or `.svg`.
     """
     kind = path.suffix.removeprefix(".")
+    if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
+        figure.set_layout_engine(None)  # else everything is laid out once more before it is drawn
     with styled(), whole_file(path) as temporary:
         figure.savefig(temporary, format=kind, dpi=_DPI, metadata=_NO_DATE[kind])

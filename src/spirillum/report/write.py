@@ -16,7 +16,7 @@ from spirillum.report.content import content
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.plots import Picture
+    from spirillum.plots.picture import Picture
 
 __all__ = ["EmbeddedPicture", "write_report"]
 
@@ -65,7 +65,7 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
 
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     """The robot first, then the figures of the study."""
-    from spirillum.plots import study_figures
+    from spirillum.plots.study import study_figures
     from spirillum.report.robot import robot_picture
 
     robot = robot_picture(dataset)
@@ -73,7 +73,7 @@ def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
 
 
 def _drawn(name: str, picture: Picture, figures: Path) -> EmbeddedPicture:
-    from spirillum.plots import save
+    from spirillum.plots.style import save
 
     png, svg = save(picture.figure(), figures / name)
     vector = svg.stat().st_size <= _LARGEST_SVG
