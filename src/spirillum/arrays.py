@@ -5,14 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 
 if TYPE_CHECKING:
     _Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
     _Complexes = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
     _Truths = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    _Integers = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 else:
-    _Floats = _Complexes = _Truths = np.ndarray
+    _Floats = _Complexes = _Truths = _Integers = np.ndarray
 
 __all__ = [
     "Amplitudes",
@@ -27,12 +28,15 @@ __all__ = [
     "Tensors",
     "Values",
     "Vectors",
+    "Whole",
 ]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
 """Floats of any shape; all of them broadcast against each other."""
 Samples: TypeAlias = Float[_Floats, "..."]
 """Floats of any shape, unrelated to others."""
+Whole: TypeAlias = Int[_Integers, "..."]
+"""Whole numbers of any shape, such as indices."""
 Amplitudes: TypeAlias = Complex[_Complexes, "..."]
 """Complex amplitudes of Fourier modes."""
 Vectors: TypeAlias = Float[_Floats, "*#n 3"]

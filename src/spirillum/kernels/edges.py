@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from spirillum.arrays import Samples
+from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.pictures import Whole
 
 __all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from spirillum.arrays import Samples
+from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
 
 __all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
@@ -22,9 +22,6 @@ _SEEN = 0.3
 """Least share of the surface that has to be seen."""
 _ALIKE = 6
 """Angles next to each other whose residuals are taken to be alike."""
-
-Whole = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
-"""Whole numbers, as classes of colours."""
 
 
 @compiled

@@ -228,7 +228,7 @@ class BodyFinder:
         except np.linalg.LinAlgError:  # edges of one direction only
             return Placed(found, lost.error, fitting, share)
         errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(scatter), 0.0)).tolist())
-        if fitting < _FEWEST or not errors.x < _WORST * self.optics.length_per_pixel or share < 0.2:
+        if fitting < _FEWEST or not 0.0 < errors.x < _WORST * self.optics.length_per_pixel or share < 0.2:
             return Placed(found, lost.error, fitting, share)
         return Placed(found, errors, fitting, share)
 
