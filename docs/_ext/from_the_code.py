@@ -20,6 +20,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
 
 from spirillum.robot.fields import Section
+from spirillum.robot.meanings import meanings
 from spirillum.units import Kind, show
 
 Rows = Iterable[Sequence[str]]
@@ -144,6 +145,7 @@ def _default(info: FieldInfo, kind: Kind | None) -> str:
 
 def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str, str]]:
     """Field, unit, default, allowed and meaning of every field of a table, its own tables included."""
+    words = meanings(model)
     for name, info in model.model_fields.items():
         path = f"{prefix}{name}"
         below = _section(info)
@@ -152,7 +154,7 @@ def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, 
             continue
         kind = _kind(info)
         unit = kind.unit.replace("**", "^") if kind else "–"
-        yield f"`{path}`", unit, _default(info, kind), _allowed(info, kind), info.description or ""
+        yield f"`{path}`", unit, _default(info, kind), _allowed(info, kind), words.get(name, "")
 
 
 _HEADER = ("Field", "SI unit", "Default", "Allowed", "Meaning")
@@ -173,8 +175,9 @@ class RobotFields(SphinxDirective):
         if wanted == "root":
             plain = {name: info for name, info in Robot.model_fields.items() if _section(info) is None}
             documented |= set(plain)
+            words = meanings(Robot)
             rows = [
-                (f"`{name}`", "–", _default(info, None), "text", info.description or "") for name, info in plain.items()
+                (f"`{name}`", "–", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()
             ]
             extends = "Preset that the file starts from; its own fields are laid over it."
             rows.append(("`extends`", "–", "unset", "a preset's name", extends))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import BaseModel
@@ -18,6 +19,7 @@ def schema_of(name: str) -> dict[str, Any]:
         InputError: for an unknown name.
     """
     from spirillum.robot.calibration_file import CalibrationFile
+    from spirillum.robot.meanings import meanings
     from spirillum.robot.robot import Robot
     from spirillum.studies.spec import Study
     from spirillum.tracking.setup import Setup
@@ -31,7 +33,18 @@ def schema_of(name: str) -> dict[str, Any]:
     if name not in known:
         raise InputError(f"schema {name!r}{did_you_mean(name, known)}; allowed: {', '.join(known)}")
     schema = known[name].model_json_schema()
+    models = {model.__name__: model for model in _models(BaseModel)}
+    for title, table in ((known[name].__name__, schema), *schema.get("$defs", {}).items()):
+        for field, words in meanings(models[title]).items():
+            table["properties"][field].setdefault("description", words)
     if name == "robot":
         extends = {"type": "string", "description": "Preset that the file starts from.", "title": "Extends"}
         schema["properties"]["extends"] = extends
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    """All tables of files."""
+    for model in base.__subclasses__():
+        yield model
+        yield from _models(model)

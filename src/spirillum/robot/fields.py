@@ -46,7 +46,7 @@ __all__ = [
 class Section(BaseModel):
     """A table of the robot file: frozen, and closed to keys that it does not know."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 def _reader(kind: Kind) -> Callable[[Any], float]:
