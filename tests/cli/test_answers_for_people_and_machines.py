@@ -136,12 +136,15 @@ def test_robot_files_are_made_shown_and_checked(run: Callable[..., Any], tmp_pat
     assert any("did you mean length?" in problem for problem in problems)
 
 
-@pytest.mark.parametrize("name", ["robot", "study", "calibration"])
+@pytest.mark.parametrize("name", ["robot", "study", "calibration", "setup"])
 def test_schemas_describe_the_files(run: Callable[..., Any], name: str) -> None:
     schema = json.loads(run("schema", name).out)
     assert schema["$schema"].startswith("https://json-schema.org/")
     assert schema["additionalProperties"] is False
-    assert schema["properties"]
+    tables = [schema, *schema.get("$defs", {}).values()]
+    fields = {field: content for table in tables for field, content in table.get("properties", {}).items()}
+    assert fields
+    assert [field for field, content in fields.items() if not content.get("description")] == []
 
 
 def test_every_help_has_an_example_that_runs(run: Callable[..., Any], tmp_path: Path, monkeypatch) -> None:
