@@ -118,6 +118,22 @@ def test_what_a_video_says_of_itself_stays_with_its_numbers(
             assert series.attrs["synthetic"] == synthetic
 
 
+def test_no_trial_writes_over_another(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
+) -> None:
+    names = ["a.mp4", "a.movement.mp4", "A.avi"]
+    followed |= {name: make_track(seed=seed) for seed, name in enumerate(names)}
+    found = measure(names, setup_file, tmp_path / "out", annotated=False, figures=False)
+    series = [name for name in found.files if name.endswith(".nc")]
+    assert len({name.casefold() for name in series}) == 6
+    assert sorted(path.name for path in (tmp_path / "out").glob("*.nc")) == sorted(series)
+
+
+def test_a_name_that_is_no_text_is_refused_at_once(tmp_path: Path, setup_file: Path) -> None:
+    with pytest.raises(InputError, match=r"video = 'a\\udcff.mp4'; allowed: a name that is text"):
+        measure(["b.mp4", "a\udcff.mp4"], setup_file, tmp_path / "out")
+
+
 def test_one_bad_video_does_not_stop_the_others(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:

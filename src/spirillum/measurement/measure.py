@@ -202,14 +202,30 @@ def _names(paths: Sequence[Path]) -> list[str]:
     found: list[str] = []
     real = [path.resolve() for path in paths]
     for place, path in enumerate(paths):
+        if not _is_text(str(path)):
+            raise InputError(f"video = {str(path)!a}; allowed: a name that is text in UTF-8, as results carry it")
         if real[place] in real[:place]:
             raise InputError(f"{path} is given twice; allowed: each video once, as trials are independent")
         stem = path.resolve().name if path.is_dir() else path.stem
         name, number = stem or "trial", 2
-        while name in found:
+        while any(_clash(name, other) for other in found):
             name, number = f"{stem}-{number}", number + 1
         found.append(name)
     return found
+
+
+def _is_text(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _clash(one: str, other: str) -> bool:
+    """Whether two trials would write files of the same name, also where capitals do not count."""
+    one, other = one.casefold(), other.casefold()
+    return bool({one, f"{one}.movement"} & {other, f"{other}.movement"})
 
 
 def _readings(
