@@ -26,6 +26,8 @@ _MOST_BLOCKS = 100
 """Frames are averaged to so many blocks: the slope lives in the slow part, and the work grows with the third power."""
 _SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)
 _MEMORIES = 8
+_SIZES = (0.25, 1.0)
+"""Variances of errors that come back with an angle, over what is usual: the series says which of them is likely."""
 _WHITE = 3.0
 """Odds, before anything is seen, of errors without a memory against all others."""
 _FEWEST = 8
@@ -283,14 +285,19 @@ class _Noise(NamedTuple):
     """Its time, in half stretches."""
     alike: Samples
     """Correlation of that part, (m, m)."""
+    size: float
+    """Variance of what comes back with an angle over what is usual."""
 
 
-def _noises(blocks: _Blocks, shares: Sequence[float], memories: Samples) -> list[_Noise]:
-    """White noise first, then all shares and memories."""
+def _noises(
+    blocks: _Blocks, shares: Sequence[float], memories: Samples, sizes: Sequence[float] = (1.0,)
+) -> list[_Noise]:
+    """All shares and memories, and white noise, for all sizes of what comes back; one if nothing does."""
     apart = np.abs(blocks.s[:, None] - blocks.s[None, :])
     alike = [np.exp(-apart / memory) for memory in memories]
-    mixed = [_Noise(share, float(m), a) for share in shares for m, a in zip(memories, alike, strict=True)]
-    return [_Noise(0.0, 0.0, np.zeros_like(apart)), *mixed]
+    parts = [(share, float(m), a) for share in shares for m, a in zip(memories, alike, strict=True)]
+    parts.append((0.0, 0.0, np.zeros_like(apart)))
+    return [_Noise(*part, size) for size in (sizes if blocks.returning.any() else (1.0,)) for part in parts]
 
 
 class _Solved(NamedTuple):
@@ -310,7 +317,7 @@ def _solved(blocks: _Blocks, columns: int, noise: _Noise) -> _Solved:
     """Generalised least squares with one noise."""
     from scipy.linalg.lapack import dpotrf, dpotrs
 
-    covariance = noise.share * noise.alike + blocks.returning
+    covariance = noise.share * noise.alike + noise.size * blocks.returning
     covariance.flat[:: blocks.s.size + 1] += (1.0 - noise.share) * blocks.white + 1e-7
     factor, failed = dpotrf(covariance, lower=1, overwrite_a=1)
     if failed:  # by rounding, where the series has next to no noise
@@ -333,10 +340,10 @@ def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _F
     """A combination of the coefficients, averaged over all noises."""
     from scipy.optimize import brentq
 
-    noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _MEMORIES))
+    noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _MEMORIES), _SIZES)
     solved = [_solved(blocks, columns, noise) for noise in noises]
     likelihoods = np.array([item.likelihood for item in solved])
-    likelihoods[0] += np.log(_WHITE * (len(noises) - 1))
+    likelihoods[[noise.share == 0.0 for noise in noises]] += np.log(_WHITE * len(_SHARES) * _MEMORIES)
     weights = np.exp(likelihoods - likelihoods.max())
     weights /= weights.sum()
     centres = np.array([along @ item.beta for item in solved])
