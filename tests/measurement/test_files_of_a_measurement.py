@@ -1,5 +1,6 @@
 """What is written can be read: by `calibrate`, by xarray, and in the layout of the `movement` project."""
 
+import errno
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import xarray as xr
 from spirillum import InputError
 from spirillum.files import write_dataset
 from spirillum.measurement import read_observations
+from spirillum.measurement.labelled import Labelled
 from spirillum.measurement.measure import Measurement, measure
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_of, series_of
@@ -224,3 +226,21 @@ def test_bad_options_are_one_sentence(setup_file: Path, options: dict[str, Any],
     with pytest.raises(InputError) as caught:
         measure(["a.mp4", "b.mp4"], setup_file, **options)
     assert words in str(caught.value)
+
+
+def test_a_full_disk_loses_no_finished_trial(
+    tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    followed |= {"a.mp4": make_track(), "b.mp4": make_track(seed=1)}
+    write = Labelled.write
+
+    def full(self: Labelled, path: Path) -> None:
+        if path.name == "b.nc":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(self, path)
+
+    monkeypatch.setattr(Labelled, "write", full)
+    with pytest.raises(OSError, match="No space"):
+        measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
+    (first,) = read_observations(tmp_path / "out" / "observations.csv")
+    assert first.trial == "a"

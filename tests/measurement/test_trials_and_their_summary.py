@@ -80,7 +80,8 @@ def test_wobble_has_its_amplitude_at_the_rate_of_its_part_only(make_track: Make,
     tail, body = found["lateral_wobble_at_tail_rate"], found["lateral_wobble_at_body_rate"]
     assert tail.low <= 2e-4 <= tail.high
     pixel = make_track().scale.length_per_pixel
-    assert tail.high - tail.low == pytest.approx(2 * 1.959964 * 0.03 * pixel, rel=0.05)  # what tracking may add
+    errors = np.hypot(0.03 * pixel, 0.12 * 2e-4)  # what tracking may add, and what edges beside the body hold back
+    assert tail.high - tail.low == pytest.approx(2 * 1.959964 * errors, rel=0.05)
     assert body.low < 1e-5
     assert body.value < 1e-5
 
@@ -90,7 +91,7 @@ def test_a_body_that_hardly_turns_says_why_its_interval_is_wide(make_track: Make
     assert "short-turn" in [flag.name for flag in slow.flags]
     item, fast = slow.quantities["body_rotation_rate"], trial_of(make_track(), robot).quantities["body_rotation_rate"]
     assert item.low <= -0.02 <= item.high
-    assert item.high - item.low > 2.0 * (fast.high - fast.low)
+    assert item.high - item.low > fast.high - fast.low
 
 
 def test_two_frames_of_a_camera_are_not_a_measurement(make_track: Make, robot: Any) -> None:

@@ -93,7 +93,7 @@ def _explained(error: BaseException) -> int | None:
 
 def _of_place(error: OSError) -> str:
     """What is wrong with a file's name or place; empty if it is something else."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return "no space is left for the output; allowed: a place with space"
     if error.errno in _PLACES:
         return f"{str(error.filename)[:80]}: {error.strerror}; allowed: another name or place"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -38,11 +39,14 @@ class Labelled(NamedTuple):
         """Write NetCDF-4, compressed, whole or not at all; `xarray.open_dataset` gives `dataset` back."""
         import h5netcdf
 
-        with whole_file(path) as temporary, h5netcdf.File(temporary, "w") as file:
+        content = BytesIO()  # HDF5 takes the whole process down where it finds no space on a disk
+        with h5netcdf.File(content, "w") as file:
             file.dimensions = {name: len(values) for name, (_, values, _) in self.coordinates.items()}
             for name, variable in {**self.coordinates, **self.data}.items():
                 _write(file, name, variable)
             file.attrs.update(self.attributes)
+        with whole_file(path) as temporary:
+            temporary.write_bytes(content.getvalue())
 
 
 def _write(file: Any, name: str, variable: Variable) -> None:

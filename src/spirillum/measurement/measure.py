@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -140,6 +141,7 @@ def measure(
     Raises:
         InputError: if setup, robot or a table is wrong, or no video could be measured.
         KeyboardInterrupt: if it was interrupted; the trials that were finished are written.
+        OSError: if a file could not be written, for want of space, say; the same.
     """
     given = [videos] if isinstance(videos, (str, Path)) else list(videos)
     words = [*(("video", video) for video in given), ("output", output), ("marks", marks), ("track", track)]
@@ -158,9 +160,8 @@ def measure(
     for number, (path, name) in enumerate(zip(paths, names, strict=True)):
         try:
             work.add(path, name, number, len(paths), readings[number], track, tracking=tracking)
-        except KeyboardInterrupt:
-            if work.trials:
-                work.finish(interrupted=True)
+        except (KeyboardInterrupt, OSError):
+            work.keep()
             raise
         except InputError as error:
             work.failures.append((str(path), str(error)))
@@ -352,6 +353,12 @@ class _Work:
     def _write(self, path: Path, arrays: Labelled) -> None:
         arrays.write(path)
         self.files.append(path.name)
+
+    def keep(self) -> None:
+        """Write what belongs to the trials that are finished, as far as there is room for it."""
+        with suppress(OSError):
+            if self.trials:
+                self.finish(interrupted=True)
 
     def finish(self, *, interrupted: bool) -> Measurement:
         """Compare the trials and write what belongs to all of them."""

@@ -28,8 +28,9 @@ def series_of(trial: Trial, robot: Robot) -> Labelled:
     """
     track = trial.track
     stripes = stripes_of(track.setup, robot)
+    frame = np.round(track.frame).astype(np.int64) if np.isfinite(track.frame).all() else track.frame
     series = {
-        "frame": (track.frame, "1", "number of the frame in the video"),
+        "frame": (frame, "1", "number of the frame in the video"),
         "heading": (track.heading, "rad", "angle of the motor axis to the x axis in the plane of the picture"),
         "body_angle": (
             track.body_angle,
@@ -82,6 +83,7 @@ def series_of(trial: Trial, robot: Robot) -> Labelled:
             "robot": robot.name,
             "video": trial.video,
             "length_per_pixel": track.scale.length_per_pixel,
+            "length_per_pixel_units": "m",
             "scale_relative_uncertainty": track.scale.relative_uncertainty,
             "apparent_body_size": track.scale.apparent_size,
             "scale_sources": json.dumps(dict(track.scale.sources)),
@@ -113,6 +115,7 @@ def movement_of(trial: Trial, robot: Robot) -> Labelled:
         "source_file": trial.video,
         "synthetic": int(trial.synthetic),
         "length_per_pixel": track.scale.length_per_pixel,
+        "length_per_pixel_units": "m",
     }
     return Labelled(
         {

@@ -26,6 +26,8 @@ _PAIRS = 3
 """Kinds of neighbouring stripes that have to be seen before their order is judged."""
 _WHOLE = 4
 """Angles that a stripe and those beside it have at least, when its width is taken."""
+_EDGE = 0.3
+"""Width over that of a stripe below which a colour between two others is their blurred edge."""
 _GLARE = 240.0
 """Brightness of glare to begin with."""
 _PALE = 0.7
@@ -187,20 +189,28 @@ def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
     return by_name
 
 
-def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples]) -> float:
+def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float) -> float:
     """Usual width of stripes that are seen whole, rad; NaN where hardly any is.
 
     Args:
         profiles: colours along the angle, for some frames, (f, n, 3); NaN where none is seen.
         angles: these angles, rad, (n,).
         palettes: what `colour_classes` found.
+        stated: their width as it is stated, rad; what is far narrower is the blurred edge of two colours.
     """
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
+    least = max(_WHOLE, _EDGE * stated / step)
     for profile in profiles:
         runs = _runs(profile, palette, glare)
         for before, run, after in zip(runs, runs[1:], runs[2:], strict=False):
-            if before[0] >= 0 and run[0] >= 0 and after[0] >= 0 and min(len(before), len(run), len(after)) >= _WHOLE:
+            if (
+                before[0] >= 0
+                and run[0] >= 0
+                and after[0] >= 0
+                and min(len(before), len(after)) >= _WHOLE
+                and len(run) >= least
+            ):
                 widths.append(len(run) * step)
     return float(np.median(widths)) if len(widths) >= _PAIRS else float("nan")
 

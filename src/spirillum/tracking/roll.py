@@ -149,7 +149,8 @@ class Stripes:
             loss = self._typical_loss(profiles, scales, other)
             self.look, least = (other, loss) if loss < least else (self.look, least)
         rightly = named_rightly(self.look.palette, start)
-        wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:])) * len(self.stripes) / (2.0 * np.pi)
+        stated = 2.0 * np.pi / len(self.stripes)
+        wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:]), stated) / stated
         counted = not abs(np.log(wide)) > _WIDER
         if least < _FITS and rightly and counted:
             self.fits = True
