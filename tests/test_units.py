@@ -37,7 +37,7 @@ def test_rates_count_turns(text: str, rad_per_s: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "unit"), [(name, unit) for name, kind in KINDS.items() for unit in (kind.unit, *USUAL.get(kind.unit, {}))]
+    ("kind", "unit"), [(name, unit) for name, kind in KINDS.items() for unit in (kind.unit, *USUAL.get(kind.unit, ()))]
 )
 def test_usual_units_are_those_of_pint(kind: str, unit: str) -> None:
     found = _registry().Quantity(1.0, unit)

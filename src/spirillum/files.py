@@ -10,6 +10,7 @@ import threading
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +18,14 @@ from spirillum.answer import as_json
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
+    import h5netcdf
     import xarray as xr
 
 __all__ = [
     "PICTURES",
     "claim_folder",
     "csv_rows",
+    "netcdf_file",
     "netcdf_target",
     "new_file",
     "output_folder",
@@ -232,13 +235,30 @@ def new_file(path: Path, text: str, *, overwrite: bool = False) -> None:
     write_text(path, text)
 
 
+@contextmanager
+def netcdf_file(path: Path) -> Iterator[h5netcdf.File]:
+    """A new NetCDF-4 file, written whole or not at all when the block ends.
+
+    It is made in memory: HDF5 takes the whole process down where it finds no space on a disk.
+    """
+    import h5netcdf
+
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        yield file
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content.getbuffer())
+
+
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
     """Write NetCDF-4, compressed, whole or not at all."""
+    from xarray.backends import H5NetCDFStore
+
     encoding = {
         str(name): {"zlib": True, "complevel": 4} for name, variable in dataset.data_vars.items() if variable.ndim > 0
     }
-    with whole_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    with netcdf_file(path) as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
 
 
 def output_folder(path: Path) -> Path:

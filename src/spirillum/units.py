@@ -33,7 +33,7 @@ _OHM_SIGNS = {0x2126: " ohm", 0x03A9: " ohm"}
 Hz = 2 * math.pi
 """One turn per second in rad/s."""
 
-_SHOWN: dict[str, float] = {
+_SI: dict[str, float] = {
     "1": 1.0,
     "m": 1.0,
     "mm": 1e-3,
@@ -65,22 +65,30 @@ _SHOWN: dict[str, float] = {
     "min": 60.0,
     "turn": 2 * math.pi,
     "%": 1e-2,
+    "cm": 1e-2,
+    "nm": 1e-9,
+    "mg": 1e-6,
+    "kg/m^3": 1.0,
+    "mPa s": 1e-3,
+    "mV": 1e-3,
+    "mA h": 3.6,
 }
+"""SI values of the units that are shown, and of those that files mostly state."""
 
 
-USUAL: dict[str, dict[str, float]] = {
-    "m": {"cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
-    "kg": {"g": 1e-3, "mg": 1e-6},
-    "kg/m**3": {"kg/m^3": 1.0},
-    "Pa s": {"mPa s": 1e-3},
-    "rad/s": {"Hz": Hz},
-    "rad": {"deg": math.pi / 180},
-    "m/s": {"mm/s": 1e-3, "um/s": 1e-6},
-    "V": {"mV": 1e-3},
-    "C": {"mA h": 3.6},
-    "T": {"mT": 1e-3},
+USUAL = {
+    "m": ("mm", "cm", "um", "nm"),
+    "kg": ("g", "mg"),
+    "kg/m**3": ("kg/m^3",),
+    "Pa s": ("mPa s",),
+    "rad/s": ("Hz",),
+    "rad": ("deg",),
+    "m/s": ("mm/s", "um/s"),
+    "V": ("mV",),
+    "C": ("mA h",),
+    "T": ("mT",),
 }
-"""SI values of the units that files mostly state: they are known without pint, which takes a while to load."""
+"""Units of a kind's own unit that files mostly state: they are read without pint, which takes a while to load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +156,7 @@ def _factor(unit: str, kind: Kind) -> float:
     """
     if unit == kind.unit:
         return 1.0
-    usual = USUAL.get(kind.unit, {}).get(unit)
-    return _factor_by_pint(unit, kind) if usual is None else usual
+    return _SI[unit] if unit in USUAL.get(kind.unit, ()) else _factor_by_pint(unit, kind)
 
 
 def _factor_by_pint(unit: str, kind: Kind) -> float:
@@ -258,7 +265,7 @@ def _bound(text: str, kind: Kind) -> float:
 
 def shown_in(value: float, unit: str) -> float:
     """The SI `value` expressed in a display `unit` (``mm``, ``Hz``, ``mm/s``...)."""
-    return float(value) / _SHOWN[unit]
+    return float(value) / _SI[unit]
 
 
 def show(value: float, unit: str) -> str:

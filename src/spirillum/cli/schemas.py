@@ -19,6 +19,7 @@ def schema_of(name: str) -> dict[str, Any]:
         InputError: for an unknown name.
     """
     from spirillum.robot.calibration_file import CalibrationFile
+    from spirillum.robot.fields import Section
     from spirillum.robot.meanings import meanings
     from spirillum.robot.robot import Robot
     from spirillum.studies.spec import Study
@@ -33,7 +34,7 @@ def schema_of(name: str) -> dict[str, Any]:
     if name not in known:
         raise InputError(f"schema {name!r}{did_you_mean(name, known)}; allowed: {', '.join(known)}")
     schema = known[name].model_json_schema()
-    models = {model.__name__: model for model in _models(BaseModel)}
+    models = {model.__name__: model for model in _models(Section)}
     for title, table in ((known[name].__name__, schema), *schema.get("$defs", {}).items()):
         for field, words in meanings(models[title]).items():
             table["properties"][field].setdefault("description", words)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from spirillum.arrays import Samples, Whole
+from spirillum.kernels.alike import variance_of_sum
 from spirillum.kernels.compiled import compiled
 
 __all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
@@ -178,11 +179,7 @@ def _error(base: Samples, weight: Samples, slope: Samples, rest: Samples, usual:
         return math.nan  # nothing changes with the angle
     variance = max(variance / (total + 1e-12), usual**2)
     plain = _CHANNELS * variance * most / information
-    spread = 0.0
-    for n in range(count):
-        for m in range(max(0, n - _ALIKE), min(count, n + _ALIKE + 1)):
-            spread += scores[n] * scores[m] * (1.0 - abs(n - m) / (_ALIKE + 1.0))
-    return math.sqrt(max(plain, spread / information**2))
+    return math.sqrt(max(plain, variance_of_sum(scores, _ALIKE) / information**2))
 
 
 @compiled

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.kernels.alike import variance_of_sum
 from spirillum.kernels.compiled import compiled
 
 __all__ = ["ridge_of", "wave_fit", "wave_scores"]
@@ -217,6 +218,12 @@ def _inverse(matrix: Samples, out: Samples) -> None:
 
 
 @compiled
+def _row_times(matrix: Samples, row: int, vector: Samples) -> float:
+    """One number of the product of a (3, 3) matrix and a vector."""
+    return float(matrix[row, 0] * vector[0] + matrix[row, 1] * vector[1] + matrix[row, 2] * vector[2])
+
+
+@compiled
 def _normal(basis: Samples, weight: Samples, wanted: Samples, normal: Samples, right: Samples) -> None:
     """Normal equations of weighted least squares with three unknowns."""
     normal[:], right[:] = 0.0, 0.0
@@ -295,14 +302,14 @@ def wave_fit(
         right[1] -= held_offset * offset
         right[2] -= held_lean * lean
         _inverse(normal, inverse)
-        change = inverse[0, 0] * right[0] + inverse[0, 1] * right[1] + inverse[0, 2] * right[2]
+        change = _row_times(inverse, 0, right)
         phase += 1.2 * min(max(change, -0.5), 0.5)
-        offset += inverse[1, 0] * right[0] + inverse[1, 1] * right[1] + inverse[1, 2] * right[2]
-        lean += inverse[2, 0] * right[0] + inverse[2, 1] * right[1] + inverse[2, 2] * right[2]
+        offset += _row_times(inverse, 1, right)
+        lean += _row_times(inverse, 2, right)
         if repeat > 2 and abs(change) < 2e-4:
             break
     answer[0], answer[3], answer[4] = phase, offset, lean / length
-    _judge(xi, width, total, fit, weight, basis, normal, inverse, answer)
+    _judge(xi, width, total, inside, fit, weight, basis, normal, inverse, answer)
 
 
 @compiled
@@ -310,6 +317,7 @@ def _judge(
     xi: Samples,
     width: float,
     total: float,
+    inside: int,
     fit: Samples,
     weight: Samples,
     basis: Samples,
@@ -319,24 +327,20 @@ def _judge(
 ) -> None:
     """What else `wave_fit` answers, at the end of its steps."""
     rows = xi.size
-    close, inside, square, mean = 0.0, 0.0, 0.0, 0.0
+    close, square, mean = 0.0, 0.0, 0.0
     scores = np.empty(rows)
     for i in range(rows):
         scores[i] = weight[i] * fit[i, 0]
         scores[i] *= basis[i, 0] * inverse[0, 0] + basis[i, 1] * inverse[0, 1] + basis[i, 2] * inverse[0, 2]
         square += weight[i] * fit[i, 0] ** 2
         if not math.isnan(fit[i, 1]):
-            inside += 1.0
             close += weight[i] > 0.15 and abs(fit[i, 0]) < 0.5 * width
             mean += fit[i, 5]
-    # Errors of rows near each other are alike: sum of scores with a triangular window.
+    # Errors of rows near each other are alike.
     reach = max(4, int(3.0 * width / (xi[1] - xi[0])))
-    sandwich = 0.0
-    for i in range(rows):
-        for j in range(max(0, i - reach), min(rows, i + reach + 1)):
-            sandwich += scores[i] * scores[j] * (1.0 - abs(i - j) / (reach + 1.0))
     plain = square / total * inverse[0, 0] * max(1.0, 0.5 * reach)
-    answer[1], answer[2], answer[9] = math.sqrt(max(plain, sandwich)), close / inside, mean / inside
+    answer[1] = math.sqrt(max(plain, variance_of_sum(scores, reach)))
+    answer[2], answer[9] = close / inside, mean / inside
     # What the other hand would change beyond what phase, offset and lean explain already.
     gram, right, other = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _normal(basis, weight, fit[:, 4], gram, right)
@@ -348,7 +352,7 @@ def _judge(
     for i in range(rows):
         rest = fit[i, 4]
         for a in range(3):
-            rest -= basis[i, a] * (other[a, 0] * right[0] + other[a, 1] * right[1] + other[a, 2] * right[2])
+            rest -= basis[i, a] * _row_times(other, a, right)
         answer[5] += weight[i] * rest * fit[i, 0]
         answer[6] += weight[i] * rest * rest
         answer[7] += weight[i] * fit[i, 3] * fit[i, 0]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from spirillum.files import whole_file
+from spirillum.files import netcdf_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,16 +36,11 @@ class Labelled(NamedTuple):
 
     def write(self, path: Path) -> None:
         """Write NetCDF-4, compressed, whole or not at all; `xarray.open_dataset` gives `dataset` back."""
-        import h5netcdf
-
-        content = BytesIO()  # HDF5 takes the whole process down where it finds no space on a disk
-        with h5netcdf.File(content, "w") as file:
+        with netcdf_file(path) as file:
             file.dimensions = {name: len(values) for name, (_, values, _) in self.coordinates.items()}
             for name, variable in {**self.coordinates, **self.data}.items():
                 _write(file, name, variable)
             file.attrs.update(self.attributes)
-        with whole_file(path) as temporary:
-            temporary.write_bytes(content.getvalue())
 
 
 def _write(file: Any, name: str, variable: Variable) -> None:

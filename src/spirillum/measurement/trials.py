@@ -291,20 +291,21 @@ def _wobbles(track: Track, robot: Robot) -> dict[str, Measured]:
     """Least squares at the angle of tail or body itself, so that an unsteady rate does not smear the amplitude."""
     found = {}
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
+    half = 0.5 * robot.body.length
     for part, angle in (("tail", track.tail_phase), ("body", track.body_angle)):
         size, error = _amplitude(track.time, track.position[:, 1], angle)
-        least = math.hypot(_PIXEL_ERROR * pixel, _HELD * size if math.isfinite(size) else 0.0)
         turned, turned_error = _amplitude(track.time, track.heading, angle)
-        half = 0.5 * robot.body.length
-        for series, of, scatter, added, unit in (
-            ("lateral", size, error, least, "m"),
-            ("heading", turned, turned_error, least / half, "rad"),
-        ):
-            reach = _NORMAL * math.hypot(scatter, added)
-            missing = Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
-            given = Measured(of, max(of - reach, 0.0), of + reach, unit)
-            found[f"{series}_wobble_at_{part}_rate"] = given if math.isfinite(of) else missing
+        added = math.hypot(_PIXEL_ERROR * pixel, _HELD * size if math.isfinite(size) else 0.0)
+        found[f"lateral_wobble_at_{part}_rate"] = _wobble(size, math.hypot(error, added), "m", part)
+        found[f"heading_wobble_at_{part}_rate"] = _wobble(turned, math.hypot(turned_error, added / half), "rad", part)
     return {name: found[name] for name in WOBBLES}
+
+
+def _wobble(size: float, error: float, unit: str, part: str) -> Measured:
+    """An amplitude with its interval."""
+    if not math.isfinite(size):
+        return Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
+    return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
 
 
 def _amplitude(time: Samples, values: Samples, angle: Samples) -> tuple[float, float]:
