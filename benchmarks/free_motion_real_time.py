@@ -12,11 +12,11 @@ import time
 import numpy as np
 
 import spirillum as sp
-from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.dynamics.integration import TOLERANCE
+from spirillum.dynamics.start import start_state
+from spirillum.dynamics.two_links import two_links
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import two_links as kernel
-from spirillum.motion.start import start_state
-from spirillum.motion.trajectory import TOLERANCE
-from spirillum.motion.two_links import two_links
 from spirillum.robot.placement import Placement
 
 TURNS = 100.0

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.linalg.lapack import dgels
 
-from spirillum.hydrodynamics.perrin import spheroid_drag
+from spirillum.fluid.closed.perrin import spheroid_drag
 from spirillum.robot.geometry import centreline
 
 Array = NDArray[np.float64]

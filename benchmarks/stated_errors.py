@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 import spirillum as sp
-from spirillum.hydrodynamics.interaction import Resolution, solve
-from spirillum.hydrodynamics.slender import robot_solution, solids_of, tail_wire
-from spirillum.hydrodynamics.wire import Accuracy, Wire, wire_along
-from spirillum.robot import RobotBatch
+from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.slender import robot_solution, solids_of, tail_wire
+from spirillum.fluid.wire.stokeslets import Accuracy, Wire, wire_along
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline, cylinder_outline
 
 REFERENCE = json.loads((Path(__file__).parent / "resolved_reference.json").read_text(encoding="utf-8"))

@@ -14,10 +14,10 @@ import time
 import numpy as np
 
 import spirillum as sp
-from spirillum.hydrodynamics.coefficients import local_coefficients
-from spirillum.motion import transient
-from spirillum.motion.prediction import predict
-from spirillum.robot import RobotBatch
+from spirillum.dynamics import held as transient
+from spirillum.fluid.closed.coefficients import local_coefficients
+from spirillum.robot.batch import RobotBatch
+from spirillum.swimming.prediction import predict
 
 INTERVALS_PER_WAVELENGTH = 100
 

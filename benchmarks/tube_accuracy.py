@@ -24,18 +24,18 @@ import numpy as np
 from tube_reference import annulus_axial_drag, annulus_axial_drag_no_flux, annulus_rotation
 
 import spirillum as sp
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.confined import Held, held_in_tube
-from spirillum.hydrodynamics.interaction import one_thread
-from spirillum.hydrodynamics.tube import END_LOSS
-from spirillum.hydrodynamics.tube_solids import Fineness, Solids
-from spirillum.hydrodynamics.tube_wall import Seat
-from spirillum.hydrodynamics.wire import wire_along
-from spirillum.motion.swimming import swim
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.model import END_LOSS
+from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.wall import Seat
+from spirillum.fluid.wire.interaction import one_thread
+from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_phases, with_tolerance
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.placement import Placement
+from spirillum.swimming.steady import swim
 
 Row = dict[str, Any]
 
@@ -297,7 +297,7 @@ def main() -> None:
 
 def draw(rows: list[Row], target: Path) -> None:
     """Errors of the lying capsule against the tolerance of waves and modes, gaps of 0.5 and 0.2 mm."""
-    from spirillum.plots.style import COLOURS, new_figure, styled
+    from spirillum.view.figures.style import COLOURS, new_figure, styled
 
     shown = {"drag": ("black", "o"), "plug": ("blue", "s"), "torque": ("green", "^"), "normal": ("vermillion", "v")}
     with styled():

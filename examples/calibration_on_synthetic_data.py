@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import spirillum as sp
-from spirillum.robot import RobotBatch
+from spirillum.robot.batch import RobotBatch
 
 TRUE_DRAG, TRUE_ROTATION = 2.4, 0.8
 ROBOT = "biorob2012-wide"

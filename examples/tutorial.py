@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 import spirillum as sp
-from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.hydrodynamics.sbt import tail_axial
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.closed.sbt import tail_axial
 
 Hz = 2 * np.pi  # one turn per second in rad/s
 

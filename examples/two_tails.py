@@ -7,8 +7,8 @@ between them almost like a solid cylinder: the second nearly doubles the torque 
 
 import numpy as np
 
-from spirillum.hydrodynamics.interaction import Resolution, solve
-from spirillum.hydrodynamics.wire import wire_along
+from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.outline import body_outline
 
 BODY, ROTOR = 0, 1

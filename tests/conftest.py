@@ -11,8 +11,8 @@ from hypothesis import Phase, settings
 from jaxtyping import install_import_hook
 
 HOOKED = [
-    "spirillum.hydrodynamics",
-    "spirillum.motion",
+    "spirillum.fluid",
+    "spirillum.swimming",
     "spirillum.exports",
     "spirillum.robot.geometry",
     "spirillum.robot.links",
@@ -50,7 +50,8 @@ def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
 @pytest.fixture(scope="session")
 def batch_of() -> Callable[..., Any]:
     """One robot as a batch: a preset and overrides, dotted fields with dots or with double underscores."""
-    from spirillum.robot import RobotBatch, load
+    from spirillum.robot.batch import RobotBatch
+    from spirillum.robot.load import load
 
     def make(*, preset: str = "biorob2012-wide", **overrides: Any) -> RobotBatch:
         return RobotBatch.of(load(preset, **{name.replace("__", "."): value for name, value in overrides.items()}))
@@ -117,8 +118,8 @@ _PLUG = (0.2, 1e-5, 0.15, -2e-5)
 def walled(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A model with made-up walls and a made-up imposed flow, known by its name: its truth is linear algebra."""
     from spirillum.answer import quantity
-    from spirillum.hydrodynamics import MODELS, SWIMMER_MODELS
-    from spirillum.hydrodynamics.rft import Rft
+    from spirillum.fluid.closed.rft import Rft
+    from spirillum.fluid.registry import MODELS, SWIMMER_MODELS
     from spirillum.robot.limits import Limit
 
     class Walled(Rft):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.h264 import h264_writer
+from spirillum.formats.h264 import h264_writer
 
 SIZE = (64, 48)
 FINE = {"crf": "8", "preset": "veryfast"}

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.motion.flow import Flow
-from spirillum.vtk_image import write_vti
+from spirillum.fields.flow import Flow
+from spirillum.formats.vtk_image import write_vti
 
 _TYPES = {"Float64": np.float64, "UInt8": np.uint8}
 

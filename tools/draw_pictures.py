@@ -7,10 +7,10 @@ from typing import Any
 import av
 
 import spirillum as sp
-from spirillum.plots.flow import flow_figure
-from spirillum.plots.frenet import frenet_figure
-from spirillum.plots.magnetic import magnetic_figure
-from spirillum.plots.robot import robot_figure
+from spirillum.view.figures.flow import flow_figure
+from spirillum.view.figures.frenet import frenet_figure
+from spirillum.view.figures.magnetic import magnetic_figure
+from spirillum.view.figures.robot import robot_figure
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 

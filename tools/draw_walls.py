@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import spirillum as sp
-from spirillum.plots.style import COLOURS, new_figure, styled
+from spirillum.view.figures.style import COLOURS, new_figure, styled
 
 TARGET = Path(__file__).parent.parent / "docs" / "images" / "walls.png"
 TUBES = {"wide": (COLOURS["blue"], "o", 1.95), "narrow": (COLOURS["vermillion"], "s", 3.6)}

@@ -220,7 +220,7 @@ class Quantities(SphinxDirective):
     """`quantities`: the quantities of a prediction."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.motion.quantities import Swimming
+        from spirillum.swimming.answer import Swimming
 
         rows = [
             (f"`{f.name}`", f.metadata["unit"], f.metadata["meaning"], f.metadata["source"])
@@ -314,7 +314,7 @@ class Claims(SphinxDirective):
     """`claims`: the verdicts of the paper's study without observations."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.studies.claims import evaluated
+        from spirillum.papers.biorob2012.claims import evaluated
 
         rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in evaluated(_studied())]
         header = ("Statement", "Paper", "Computed", "Verdict", "Reason")
@@ -328,7 +328,7 @@ class StudyFigures(SphinxDirective):
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.plots.study import study_figures
+        from spirillum.view.figures.study import study_figures
 
         pictures = study_figures(_studied())
         found: list[nodes.Node] = []
@@ -349,7 +349,7 @@ class Models(SphinxDirective):
     """`models`: the hydrodynamic models with what they cost."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.hydrodynamics import MODELS
+        from spirillum.fluid.registry import MODELS
 
         rows = [
             (
@@ -423,7 +423,7 @@ def _draw_pictures(app: Sphinx) -> None:
     import runpy
     import sys
 
-    from spirillum.plots.study import study_figures
+    from spirillum.view.figures.study import study_figures
 
     folder = Path(app.srcdir) / "_build" / "pictures"
     folder.mkdir(parents=True, exist_ok=True)

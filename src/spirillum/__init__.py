@@ -13,23 +13,25 @@ if TYPE_CHECKING:
     from spirillum.calibration.ranking import Ranking, rank_models
     from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
-    from spirillum.drawing.film import Film, film
-    from spirillum.drawing.show import Picture3D, show
+    from spirillum.dynamics.magnetic_sweep import magnetic_sweep
+    from spirillum.dynamics.settling import Settling, settle
+    from spirillum.dynamics.simulation import simulate
     from spirillum.errors import InputError
     from spirillum.exports.write import Export, export
-    from spirillum.hydrodynamics.resistance import Resistance, resistance
+    from spirillum.fields.flow import Flow, flow
+    from spirillum.fluid.resistance import Resistance, resistance
     from spirillum.measurement.feasibility import Feasibility, feasibility
     from spirillum.measurement.measure import Measurement, measure
-    from spirillum.motion.comparison import ModelComparison, compare_models
-    from spirillum.motion.flow import Flow, flow
-    from spirillum.motion.magnetic_sweep import magnetic_sweep
-    from spirillum.motion.prediction import Prediction, predict
-    from spirillum.motion.quantities import Swimming
-    from spirillum.motion.settling import Settling, settle
-    from spirillum.motion.simulation import simulate
-    from spirillum.motion.swimming import swim
-    from spirillum.robot import Robot, RobotBatch, load
-    from spirillum.studies import study
+    from spirillum.robot.batch import RobotBatch
+    from spirillum.robot.load import load
+    from spirillum.robot.robot import Robot
+    from spirillum.studies.run import study
+    from spirillum.swimming.answer import Swimming
+    from spirillum.swimming.comparison import ModelComparison, compare_models
+    from spirillum.swimming.prediction import Prediction, predict
+    from spirillum.swimming.steady import swim
+    from spirillum.view.scene3d.film import Film, film
+    from spirillum.view.scene3d.show import Picture3D, show
     from spirillum.virtual.experiment import virtual_experiment
     from spirillum.virtual.trial import render
 
@@ -80,40 +82,40 @@ _HOME = {
     "Calibrated": "spirillum.calibration.fit",
     "Export": "spirillum.exports.write",
     "Feasibility": "spirillum.measurement.feasibility",
-    "Film": "spirillum.drawing.film",
-    "Flow": "spirillum.motion.flow",
+    "Film": "spirillum.view.scene3d.film",
+    "Flow": "spirillum.fields.flow",
     "InputError": "spirillum.errors",
     "Measurement": "spirillum.measurement.measure",
-    "ModelComparison": "spirillum.motion.comparison",
-    "Picture3D": "spirillum.drawing.show",
-    "Prediction": "spirillum.motion.prediction",
+    "ModelComparison": "spirillum.swimming.comparison",
+    "Picture3D": "spirillum.view.scene3d.show",
+    "Prediction": "spirillum.swimming.prediction",
     "Ranking": "spirillum.calibration.ranking",
-    "Resistance": "spirillum.hydrodynamics.resistance",
-    "Robot": "spirillum.robot",
-    "RobotBatch": "spirillum.robot",
-    "Settling": "spirillum.motion.settling",
+    "Resistance": "spirillum.fluid.resistance",
+    "Robot": "spirillum.robot.robot",
+    "RobotBatch": "spirillum.robot.batch",
+    "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",
-    "Swimming": "spirillum.motion.quantities",
+    "Swimming": "spirillum.swimming.answer",
     "calibrate": "spirillum.calibration.fit",
     "citation": "spirillum.citations",
-    "compare_models": "spirillum.motion.comparison",
+    "compare_models": "spirillum.swimming.comparison",
     "export": "spirillum.exports.write",
     "feasibility": "spirillum.measurement.feasibility",
-    "film": "spirillum.drawing.film",
-    "flow": "spirillum.motion.flow",
-    "load": "spirillum.robot",
-    "magnetic_sweep": "spirillum.motion.magnetic_sweep",
+    "film": "spirillum.view.scene3d.film",
+    "flow": "spirillum.fields.flow",
+    "load": "spirillum.robot.load",
+    "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.measurement.measure",
-    "predict": "spirillum.motion.prediction",
+    "predict": "spirillum.swimming.prediction",
     "rank_models": "spirillum.calibration.ranking",
     "render": "spirillum.virtual.trial",
-    "resistance": "spirillum.hydrodynamics.resistance",
-    "settle": "spirillum.motion.settling",
-    "show": "spirillum.drawing.show",
-    "simulate": "spirillum.motion.simulation",
-    "study": "spirillum.studies",
+    "resistance": "spirillum.fluid.resistance",
+    "settle": "spirillum.dynamics.settling",
+    "show": "spirillum.view.scene3d.show",
+    "simulate": "spirillum.dynamics.simulation",
+    "study": "spirillum.studies.run",
     "suggest": "spirillum.calibration.suggest",
-    "swim": "spirillum.motion.swimming",
+    "swim": "spirillum.swimming.steady",
     "virtual_experiment": "spirillum.virtual.experiment",
 }
 

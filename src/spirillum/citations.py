@@ -116,7 +116,7 @@ def _keys_of(result: object) -> Iterable[str]:
     if result is None:
         return ()
     if isinstance(result, str):
-        from spirillum.hydrodynamics import find_model
+        from spirillum.fluid.registry import find_model
 
         return find_model(result).references
     found = getattr(result, "references", None)

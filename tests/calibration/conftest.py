@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.robot import RobotBatch, load
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 HEADER = "robot,channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"

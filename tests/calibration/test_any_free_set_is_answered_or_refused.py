@@ -68,7 +68,7 @@ def test_an_interruption_while_sampling_prints_nothing(
 
 
 def test_figures_name_tails_and_say_synthetic(made: Callable[..., Path]) -> None:
-    from spirillum.plots.calibration import calibration_figures
+    from spirillum.view.figures.calibration import calibration_figures
 
     found = sp.calibrate(made(**SMALL), WIDE, model="rft", method="least-squares")
     figures = calibration_figures(found)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.motion.intervals import intervals_of
-from spirillum.motion.posterior_file import PosteriorFile
-from spirillum.motion.quantities import Swimming
-from spirillum.robot import Robot, load
-from spirillum.robot.calibration_file import CalibrationFile, calibrated_robot
+from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.intervals import intervals_of
 
 WIDE = "biorob2012-wide"
 NAMES = [f.name for f in fields(Swimming) if f.name != "valid"]

@@ -8,7 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.experiment import read_experiment
-from spirillum.robot import load
+from spirillum.robot.load import load
 
 WIDE = "biorob2012-wide"
 SMALL = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}

@@ -8,7 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.robot import RobotBatch
+from spirillum.robot.batch import RobotBatch
 
 WIDE = "biorob2012-wide"
 PRESETS = (WIDE, "biorob2012-narrow")

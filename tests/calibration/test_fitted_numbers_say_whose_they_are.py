@@ -9,8 +9,8 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
-from spirillum.motion.posterior_file import read_posterior
-from spirillum.robot import load
+from spirillum.fitted.posterior_file import read_posterior
+from spirillum.robot.load import load
 
 WIDE = "biorob2012-wide"
 FITTED = (8e-6, 1e-5, 1.6e-5)

@@ -10,8 +10,9 @@ import spirillum as sp
 from spirillum.calibration.experiment import read_experiment
 from spirillum.calibration.forward import Forward, tabulated
 from spirillum.calibration.problem import posed
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.robot import RobotBatch, load
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 
 VISCOSITY = np.array([3.5])
 PRESETS = ["biorob2012-wide", "biorob2012-narrow"]

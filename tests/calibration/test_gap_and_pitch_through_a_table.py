@@ -12,12 +12,13 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.hydrodynamics import MODELS, SWIMMER_MODELS
-from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.hydrodynamics.rft import Rft
-from spirillum.motion.band import TOLERANCE
-from spirillum.robot import RobotBatch, load
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.closed.rft import Rft
+from spirillum.fluid.registry import MODELS, SWIMMER_MODELS
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
+from spirillum.swimming.band import TOLERANCE
 
 WIDE = "biorob2012-wide"
 TAILS = [(15.0, 1.5), (20.0, 2.0), (25.0, 2.5)]

@@ -11,7 +11,8 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
-from spirillum.robot import RobotBatch, load
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 
 WIDE = "biorob2012-wide"
 SHORT = Sampling(ensembles=2, walkers=24, warm_up=300, steps=500, doublings=2)
@@ -50,9 +51,9 @@ def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> 
     """Without discrepancy, each draw is a robot with its own factors, predicted by itself."""
     from dataclasses import replace
 
-    from spirillum.hydrodynamics import find_swimmer_model
-    from spirillum.motion.intervals import intervals_of
-    from spirillum.motion.posterior_file import read_posterior
+    from spirillum.fitted.posterior_file import read_posterior
+    from spirillum.fluid.registry import find_swimmer_model
+    from spirillum.swimming.intervals import intervals_of
 
     posterior = read_posterior(fitted / "posterior.nc", "sbt")
     thin = {name: values[::50] for name, values in posterior.draws.items()}

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.robot import RobotBatch, load
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 
 PRESETS = ["biorob2012-wide", "biorob2012-narrow"]
 

@@ -93,7 +93,7 @@ def test_log_likelihood_is_that_of_a_multivariate_normal(made: Callable[..., Pat
     from spirillum.calibration.experiment import read_experiment
     from spirillum.calibration.likelihood import Density
     from spirillum.calibration.problem import posed
-    from spirillum.robot import load
+    from spirillum.robot.load import load
 
     problem = posed(read_experiment(made(), [load(WIDE), load("biorob2012-narrow")]), "sbt", ("body_drag",))
     density = Density(problem)

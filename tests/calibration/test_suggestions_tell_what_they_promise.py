@@ -40,7 +40,7 @@ def test_more_trials_tell_more_up_to_the_discrepancy(fitted: Path) -> None:
 
 
 def test_a_certain_posterior_learns_nothing(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from spirillum.motion import posterior_file
+    from spirillum.fitted import posterior_file
 
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     certain = replace(known, draws={name: np.full_like(values, 1.5) for name, values in known.draws.items()})
@@ -53,8 +53,9 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
     fitted: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Narrow normal draws: information and posterior covariance in closed form, with sensitivities of `swim`."""
-    from spirillum.motion import posterior_file
-    from spirillum.robot import RobotBatch, load
+    from spirillum.fitted import posterior_file
+    from spirillum.robot.batch import RobotBatch
+    from spirillum.robot.load import load
 
     rng = np.random.default_rng(4)
     spread, tau, sigma, trials = np.array([0.03, 0.02]), 0.01, 0.02, 5
@@ -146,7 +147,7 @@ def test_a_robot_without_channel_is_refused(fitted: Path, robot: str) -> None:
 
 
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from spirillum.motion import posterior_file
+    from spirillum.fitted import posterior_file
 
     assert len(sp.suggest(fitted / "posterior.nc").candidates) == 50
     known = posterior_file.read_posterior(fitted / "posterior.nc")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.robot import preset_names
+from spirillum.robot.load import preset_names
 
 KEYS = (
     "robot",

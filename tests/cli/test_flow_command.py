@@ -19,11 +19,11 @@ SMALL = ("--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2H
 @pytest.fixture(autouse=True)
 def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model in closed form for the motion, and a sphere for the flow."""
-    import spirillum.hydrodynamics.flow as core
-    import spirillum.hydrodynamics.tube_flow as tube
-    import spirillum.motion.flow as module
-    from spirillum.hydrodynamics.tube import Tube
-    from spirillum.motion.prediction import predict, prepared
+    import spirillum.fields.flow as module
+    import spirillum.fields.in_tube as tube
+    import spirillum.fields.unbounded as core
+    from spirillum.fluid.tube.model import Tube
+    from spirillum.swimming.prediction import predict, prepared
 
     def quick(robot: Any, **options: Any) -> Any:
         known = {"model": "sbt", "accuracy": None, "tolerance": None}
@@ -141,7 +141,7 @@ def test_bad_input_is_one_sentence_and_leaves_nothing(
 
 
 def test_grids_are_checked_before_anything_is_solved(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    import spirillum.motion.flow as module
+    import spirillum.fields.flow as module
 
     def solved(*_: object, **__: object) -> None:
         raise AssertionError

@@ -10,7 +10,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.drawing.run_file import open_run, robot_of
+from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.files import write_dataset
 
 
@@ -144,7 +144,7 @@ def test_window_without_a_display(
 def test_machine_that_cannot_draw_says_what_to_install(
     sentence: Callable[..., str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from spirillum.drawing import window
+    from spirillum.view.scene3d import window
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(window, "_can_draw", lambda _window: False)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.drawing.camera import VIEWS, Margins, checked_view, fitted
-from spirillum.drawing.overlay import scale_bar
+from spirillum.view.scene3d.camera import VIEWS, Margins, checked_view, fitted
+from spirillum.view.scene3d.overlay import scale_bar
 
 SIZE = (1600, 900)
 POINTS = np.random.default_rng(4).normal(size=(50, 3)) * [0.05, 0.01, 0.02] + [0.3, 0.1, -0.2]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.drawing.camera import fitted
-from spirillum.drawing.poses import poses_of
-from spirillum.drawing.scene import DrawnRobot
+from spirillum.dynamics.poses import poses_of
+from spirillum.view.scene3d.camera import fitted
+from spirillum.view.scene3d.scene import DrawnRobot
 
 SIZE = (320, 180)
 SMALL: dict[str, Any] = {"size": SIZE, "fps": 10, "view": "side"}

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.drawing.camera import VIEWS, Margins, checked_view, fitted
-from spirillum.drawing.poses import Pose
-from spirillum.drawing.scene import DrawnRobot, Scene, level_height, resting
-from spirillum.drawing.show import glass_around, shown_points
+from spirillum.dynamics.poses import Pose
+from spirillum.view.scene3d.camera import VIEWS, Margins, checked_view, fitted
+from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, resting
+from spirillum.view.scene3d.show import glass_around, shown_points
 
 SIZE = (400, 226)
 _TURN = np.array([0.96, 0.2, -0.12, 0.15])

@@ -261,8 +261,8 @@ def test_one_step_under_our_force_changes_momentum_by_it(described: Path) -> Non
 
 
 def test_sidecar_is_the_models_matrix_and_the_links(described: Path) -> None:
-    from spirillum.hydrodynamics import find_swimmer_model
-    from spirillum.robot import RobotBatch
+    from spirillum.fluid.registry import find_swimmer_model
+    from spirillum.robot.batch import RobotBatch
 
     beside = json.loads((described / "robot.resistance.json").read_text())
     assert beside["schema"] == "spirillum.links/1"
@@ -283,8 +283,8 @@ def test_sidecar_is_the_models_matrix_and_the_links(described: Path) -> None:
 def test_what_is_said_about_turning_the_matrix_is_true() -> None:
     """Q R Q' at the joint's angle is the model's own matrix there."""
     from spirillum.exports.sidecar import sidecar_of
-    from spirillum.hydrodynamics import find_swimmer_model
-    from spirillum.robot import RobotBatch
+    from spirillum.fluid.registry import find_swimmer_model
+    from spirillum.robot.batch import RobotBatch
 
     robot = sp.load(WIDE)
     for model in ("rft", "slender"):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from spirillum.hydrodynamics.algebra import (
+from spirillum.fluid.algebra import (
     about_point,
     axial_entries,
     axis_rotation,

@@ -9,10 +9,10 @@ import pytest
 
 import spirillum as sp
 from spirillum.errors import InputError
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.algebra import axis_rotation
-from spirillum.hydrodynamics.flow import FlowField, flow_field
-from spirillum.hydrodynamics.interaction import Resolution, solve
+from spirillum.fields.unbounded import FlowField, flow_field
+from spirillum.fluid.algebra import axis_rotation
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.wire.interaction import Resolution, solve
 from spirillum.robot.outline import Arc, Outline
 
 MU = 3.5

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.algebra import about_point, axial_entries, axis_rotation, joint_locked
-from spirillum.hydrodynamics.interaction import Resolution, solve
-from spirillum.hydrodynamics.slender import robot_solution
-from spirillum.hydrodynamics.wire import wire_along
+from spirillum.fluid.algebra import about_point, axial_entries, axis_rotation, joint_locked
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.slender import robot_solution
+from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.limits import all_hold, assembly_limits
 from spirillum.robot.outline import Arc, Outline
 
@@ -139,7 +139,7 @@ def test_phase_against_a_tail_that_is_built_turned(wide: Any) -> None:
     phase = 0.7
     solution = robot_solution(wide)
     turn = axis_rotation(np.array([phase]))[0]
-    from spirillum.hydrodynamics.slender import solids_of
+    from spirillum.fluid.wire.slender import solids_of
 
     wires = [(replace(w, points=w.points @ turn.T, tangents=w.tangents @ turn.T), 1) for w in solution.wires]
     solids = [(outline, part) for _, outline, part in solids_of(wide, 0)]
@@ -233,7 +233,7 @@ def test_sphere_and_wire_against_faxen() -> None:
 
 def test_more_modes_and_nodes_change_little(wide: Any) -> None:
     """The error that a resolution announces by its tolerance is the one that it makes."""
-    from spirillum.hydrodynamics.slender import solids_of, tail_wire
+    from spirillum.fluid.wire.slender import solids_of, tail_wire
 
     solids = [(outline, part) for _, outline, part in solids_of(wide, 0)]
     wires = [(tail_wire(wide, 0), 1)]

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
-from spirillum.hydrodynamics import find_model
-from spirillum.hydrodynamics.algebra import about_point
-from spirillum.hydrodynamics.perrin import body_axial, body_matrix, semi_axes, spheroid_drag
+from spirillum.fluid.algebra import about_point
+from spirillum.fluid.closed.perrin import body_axial, body_matrix, semi_axes, spheroid_drag
+from spirillum.fluid.registry import find_model
 
 MU = 3.5
 

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipe, ellipkm1
 
-from spirillum.hydrodynamics.algebra import about_point
-from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
-from spirillum.hydrodynamics.perrin import spheroid_drag
-from spirillum.hydrodynamics.revolution import panels_of
+from spirillum.fluid.algebra import about_point
+from spirillum.fluid.closed.perrin import spheroid_drag
+from spirillum.fluid.wire.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.revolution import panels_of
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline
 
 DIAGONAL = [0, 1, 3, 4]

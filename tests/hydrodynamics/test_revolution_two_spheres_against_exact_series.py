@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.interaction import Resolution, Solution, solve
 from spirillum.robot.outline import Arc, Outline
 
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.algebra import axial_entries
-from spirillum.hydrodynamics.coefficients import local_coefficients
-from spirillum.hydrodynamics.rft import Rft, tail_axial, tail_matrix
+from spirillum.fluid.algebra import axial_entries
+from spirillum.fluid.closed.coefficients import local_coefficients
+from spirillum.fluid.closed.rft import Rft, tail_axial, tail_matrix
 
 SETS = ["printed", "gray-hancock", "lighthill", "brennen-winet"]
 TAPERS = ["none", 0.1, 1.0, 3.7, 100.0, 1e4]

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.sbt import tail_axial
+from spirillum.fluid.closed.sbt import tail_axial
 
 WAVELENGTH, WIRE, VISCOSITY = 20e-3, 5e-6, 3.5  # a wire so thin that terms of order eps^2 are below 1e-6
 TURNS = (32, 64, 128)

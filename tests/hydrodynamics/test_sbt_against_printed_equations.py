@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.lighthill_integrals import lighthill_integrals
-from spirillum.hydrodynamics.sbt import helix_functions
-from spirillum.motion import swim
+from spirillum.fluid.closed.lighthill_integrals import lighthill_integrals
+from spirillum.fluid.closed.sbt import helix_functions
+from spirillum.swimming.steady import swim
 
 MU, BODY_DIAMETER, BODY_LENGTH, TAIL_LENGTH = 3.5, 18e-3, 35e-3, 60e-3  # Table I
 WIRE = 1e-3  # Table I
@@ -111,7 +111,7 @@ def test_relative_drag_coefficient_matters() -> None:
 @pytest.mark.parametrize("amplitude", [1.5e-3, 2.5e-3, 3.5e-3])
 def test_spin_of_the_wire_adds_to_the_rotation_alone(batch_of: Callable[..., Any], amplitude: float) -> None:
     """4 pi mu a^2 (dx/ds)^2 per arc length."""
-    from spirillum.hydrodynamics.sbt import tail_axial
+    from spirillum.fluid.closed.sbt import tail_axial
 
     without = tail_axial(robot(batch_of, 25e-3, amplitude))
     batch = robot(batch_of, 25e-3, amplitude, model__sbt__spin=True)
@@ -127,8 +127,8 @@ def test_spin_of_the_wire_adds_to_the_rotation_alone(batch_of: Callable[..., Any
 def test_block_is_symmetric_positive_definite_and_known_only_along_the_axis(
     batch_of: Callable[..., Any], hand: str
 ) -> None:
-    from spirillum.hydrodynamics import find_model
-    from spirillum.hydrodynamics.sbt import Sbt
+    from spirillum.fluid.closed.sbt import Sbt
+    from spirillum.fluid.registry import find_model
 
     batch = batch_of(tail__handedness=hand)
     axial = Sbt().axial(batch)[0]

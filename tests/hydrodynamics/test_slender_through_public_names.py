@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.hydrodynamics import MODELS, SWIMMER_MODELS, find_swimmer_model
-from spirillum.hydrodynamics.perrin import spheroid_drag
+from spirillum.fluid.closed.perrin import spheroid_drag
+from spirillum.fluid.registry import MODELS, SWIMMER_MODELS, find_swimmer_model
 
 PRESET = "biorob2012-wide"
 PARTS = ("body", "coupling", "tail", "rotor", "robot")

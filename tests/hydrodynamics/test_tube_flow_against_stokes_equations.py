@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.flow import flow_field
-from spirillum.hydrodynamics.tube import END_LOSS
-from spirillum.hydrodynamics.tube_flow import TubeFlowField, tube_flow_field
+from spirillum.fields.in_tube import TubeFlowField, tube_flow_field
+from spirillum.fields.unbounded import flow_field
+from spirillum.fluid.tube.model import END_LOSS
 from spirillum.robot.placement import Placement
 
 MU, R = 3.5, 0.02

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.confined import held_in_tube
-from spirillum.hydrodynamics.tube_solids import Fineness, Solids
-from spirillum.hydrodynamics.tube_wall import Seat
+from spirillum.fluid.tube.confined import held_in_tube
+from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.wall import Seat
 from spirillum.robot.outline import body_outline
 
 

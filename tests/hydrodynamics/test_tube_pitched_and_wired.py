@@ -6,11 +6,11 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.confined import Held, held_in_tube
-from spirillum.hydrodynamics.interaction import Resolution, solve
-from spirillum.hydrodynamics.tube_solids import Fineness, Solids
-from spirillum.hydrodynamics.tube_wall import Seat, point_reflection, waves_between
-from spirillum.hydrodynamics.wire import Wire, wire_along
+from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.wall import Seat, point_reflection, waves_between
+from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.kernels.blobs import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
 
@@ -293,7 +293,7 @@ def test_conjugate_gradients_against_a_direct_solve(monkeypatch: pytest.MonkeyPa
         return held_in_tube(Solids([(solid, 0)], Seat(1.0, 0.3), fineness, near(wire)), [(wire, 1)]).matrix
 
     found = solved()
-    monkeypatch.setattr("spirillum.hydrodynamics.confined._RESIDUAL", 1e-13)
+    monkeypatch.setattr("spirillum.fluid.tube.confined._RESIDUAL", 1e-13)
     wanted = solved()
     scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
     np.testing.assert_allclose(found / scale, wanted / scale, atol=1e-6)

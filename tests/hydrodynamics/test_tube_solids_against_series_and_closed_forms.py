@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.confined import Held, held_in_tube
-from spirillum.hydrodynamics.tube import END_LOSS
-from spirillum.hydrodynamics.tube_solids import Fineness, Solids
-from spirillum.hydrodynamics.tube_wall import Seat
+from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.model import END_LOSS
+from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.wall import Seat
 from spirillum.robot.outline import Outline, body_outline
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"

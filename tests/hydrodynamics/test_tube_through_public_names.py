@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.algebra import joint_locked
-from spirillum.hydrodynamics.tube import END_LOSS, held_robot
-from spirillum.hydrodynamics.tube_cache import cache_folder
+from spirillum.fluid.algebra import joint_locked
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.cache import cache_folder
+from spirillum.fluid.tube.model import END_LOSS, held_robot
 from spirillum.robot.placement import Placement
 
 MODEL: Any = find_swimmer_model("tube")
@@ -227,16 +227,16 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def _forget() -> None:
-    from spirillum.hydrodynamics import tube
+    from spirillum.fluid.tube import model as tube
 
     tube._answer.cache_clear()
 
 
 PRINT = """
 import sys, numpy as np, spirillum as sp
-import spirillum.hydrodynamics.confined as confined
+import spirillum.fluid.tube.confined as confined
 if sys.argv[1] == "kept":
-    import spirillum.hydrodynamics.tube as tube
+    import spirillum.fluid.tube.model as tube
     def refuse(*arguments):
         raise AssertionError("computed anew")
     tube.held_in_tube = refuse

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.algebra import about_point
-from spirillum.hydrodynamics.interaction import Resolution, solve
-from spirillum.hydrodynamics.wire import Wire, station_count, wire_along
+from spirillum.fluid.algebra import about_point
+from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.stokeslets import Wire, station_count, wire_along
 from spirillum.robot.outline import cylinder_outline
 
 both = pytest.mark.parametrize("accuracy", ["standard", "high"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import k0e, k1e
 
-from spirillum.hydrodynamics.tube_wall import point_reflection, waves_between
+from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.kernels.tube_field import add_waves, wave_amplitudes
 
 R = 0.02

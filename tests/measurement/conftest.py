@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.tracking.setup import Setup
-from spirillum.tracking.track import Flag, Scale, Track
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.track import Flag, Scale, Track
 
 SETUP = """\
 [camera]

@@ -9,7 +9,7 @@ from spirillum import InputError
 from spirillum.measurement.depth import apparent_distance, depth_shares
 from spirillum.measurement.feasibility import feasibility
 from spirillum.measurement.setup_template import new_setup_file, setup_answer
-from spirillum.tracking.setup import load_setup
+from spirillum.vision.setup import load_setup
 
 
 @pytest.fixture

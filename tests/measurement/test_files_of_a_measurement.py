@@ -12,13 +12,13 @@ import xarray as xr
 
 from spirillum import InputError
 from spirillum.files import write_dataset
-from spirillum.measurement import read_observations
-from spirillum.measurement.labelled import Labelled
+from spirillum.formats.labelled import Labelled
 from spirillum.measurement.measure import Measurement, measure
+from spirillum.measurement.observations import read_observations
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import trial_of
-from spirillum.tracking.track import Flag, Track
+from spirillum.vision.track.track import Flag, Track
 
 Make = Callable[..., Track]
 
@@ -94,7 +94,7 @@ def followed(monkeypatch: pytest.MonkeyPatch, make_track: Make) -> dict[str, Any
         assert isinstance(found, Track)
         return found
 
-    import spirillum.tracking.follow as module
+    import spirillum.vision.track.follow as module
 
     monkeypatch.setattr(module, "follow", follow)
     return tracks

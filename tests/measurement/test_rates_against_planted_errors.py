@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spirillum.measurement.outliers import outlying_trial, stray_frames
 from spirillum.measurement.rates import Cycle, mean_of, rate_of
-from spirillum.measurement.strays import outlying_trial, stray_frames
 
 FRAMES = 300
 TIME = np.arange(FRAMES) / 30.0

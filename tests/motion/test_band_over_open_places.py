@@ -10,13 +10,13 @@ import pytest
 import spirillum as sp
 from spirillum.answer import quantity
 from spirillum.cli import main
-from spirillum.hydrodynamics.pieces import Geometry, solids_of_geometry, wire_of_geometry
-from spirillum.hydrodynamics.tube_place import WIRE_FILM
-from spirillum.motion.band import TOLERANCE, at_place, band_places, left_open
-from spirillum.motion.quantities import Swimming
+from spirillum.fluid.tube.place import WIRE_FILM
+from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry, wire_of_geometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.seat import body_gap, offset_for_gap, tail_clearance
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.band import TOLERANCE, at_place, band_places, left_open
 
 WIDE = "biorob2012-wide"
 RADIUS = 20e-3
@@ -203,8 +203,8 @@ def test_command_line(leaning: Any, capsys: pytest.CaptureFixture[str]) -> None:
 def test_tube_itself_has_a_band(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     """One coarse level place: the band's answer is what a prediction there gives."""
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
-    monkeypatch.setattr("spirillum.motion.band.GAP_BAND", (1.0 / 9.0, 1.0 / 9.0))
-    monkeypatch.setattr("spirillum.motion.band.TOLERANCE", 0.05)
+    monkeypatch.setattr("spirillum.swimming.band.GAP_BAND", (1.0 / 9.0, 1.0 / 9.0))
+    monkeypatch.setattr("spirillum.swimming.band.TOLERANCE", 0.05)
     small = {"body.shape": "sphere", "body.diameter": "12 mm", "body.length": "12 mm", "coupling.length": "3 mm"}
     coarse = {
         "model.tube.tolerance": 0.05,

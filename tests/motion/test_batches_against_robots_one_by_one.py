@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.motion import swim
-from spirillum.motion.swimming import requirements
-from spirillum.robot import RobotBatch, batches, load
+from spirillum.robot.batch import RobotBatch, batches
+from spirillum.robot.load import load
+from spirillum.swimming.steady import requirements, swim
 
 BLOCK = 1 << 15
 WAVELENGTHS = np.array([10e-3, 15e-3, 20e-3, 25e-3])
@@ -143,7 +143,7 @@ _ATTRIBUTES = {
 
 
 def test_broken_requirement_names_field_value_limit_and_reason(wide: Any) -> None:
-    from spirillum.hydrodynamics import find_swimmer_model
+    from spirillum.fluid.registry import find_swimmer_model
     from spirillum.robot.limits import broken
 
     batch = wide.with_values({"tail.wire_diameter": [1e-3, 7e-3]})

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 import spirillum as sp
-from spirillum.motion import flow_grid
-from spirillum.motion.flow import Flow
+from spirillum.fields import grid as flow_grid
+from spirillum.fields.flow import Flow
 
 COMPONENTS = ("velocity_x", "velocity_y", "velocity_z")
 
@@ -159,7 +159,7 @@ def test_wrong_grids_are_named(around: Flow, arguments: dict[str, Any], words: s
 
 
 def test_the_largest_allowed_resolution_is_one_that_is_accepted(around: Flow) -> None:
-    from spirillum.motion.flow import box_around
+    from spirillum.fields.flow import box_around
 
     with pytest.raises(sp.InputError) as caught:
         box_around(around.robot, None, 1000)

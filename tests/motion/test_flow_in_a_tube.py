@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.motion.flow import box_around, plane_around, seat_in_tube
+from spirillum.fields.flow import box_around, plane_around, seat_in_tube
 
 WIDE, R = "biorob2012-wide", 0.02
 PLACE = {"gap": "5 mm", "pitch": "2 deg"}

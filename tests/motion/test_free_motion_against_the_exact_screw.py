@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.dynamics.integration import Reach, integrate
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import two_links as kernel
-from spirillum.motion.freedom import LINKS
-from spirillum.motion.remote import Switch
-from spirillum.motion.trajectory import Reach, integrate
-from spirillum.motion.two_links import TwoLinks, two_links
+from spirillum.swimming.freedom import LINKS
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 

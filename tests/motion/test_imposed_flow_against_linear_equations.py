@@ -12,10 +12,10 @@ import pytest
 from scipy.optimize import brentq
 
 from spirillum import InputError
-from spirillum.hydrodynamics import SwimmerModel
-from spirillum.motion import swim
-from spirillum.motion.motor import winding_resistance
+from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.placement import Placement
+from spirillum.swimming.motor import winding_resistance
+from spirillum.swimming.steady import swim
 from spirillum.units import Hz
 
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II
@@ -263,7 +263,7 @@ def test_uniform_stream_only_carries_the_robot(
 
 
 def test_plug_velocity(placed: Callable[..., Any], walled: SwimmerModel, batch_of: Callable[..., Any]) -> None:
-    from spirillum.robot import RobotBatch
+    from spirillum.robot.batch import RobotBatch
 
     for flow in (None, -1e-3):
         batch: RobotBatch = placed(flow)
@@ -287,7 +287,7 @@ def test_batch_against_one_by_one(placed: Callable[..., Any], walled: SwimmerMod
 
 def test_run_in_time_refuses_a_flow(walled: SwimmerModel) -> None:
     import spirillum as sp
-    from spirillum.motion.transient import axial_response
+    from spirillum.dynamics.held import axial_response
 
     prediction = sp.predict("biorob2012-wide", model="walled", placement={"flow": "1 mm/s"})
     with pytest.raises(InputError, match=r"placement\.flow = 1 mm/s: a run in time starts from rest; allowed: no flow"):

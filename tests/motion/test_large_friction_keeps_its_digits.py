@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from spirillum.motion.balance import TorqueBalance, coasting_rates, friction_torques, rates_per_torque
+from spirillum.swimming.balance import TorqueBalance, coasting_rates, friction_torques, rates_per_torque
 
 FLUID = {"bb": 1.01e-4, "br": -3.0e-7, "rb": -3.0e-7, "rr": 6.0e-6}
 ROTOR = 7e-7

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics.integration import Reach, integrate
+from spirillum.dynamics.magnetic_sweep import _settled
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.two_links import TwoLinks
 from spirillum.kernels import two_links as kernel
-from spirillum.motion.magnetic_sweep import _settled
-from spirillum.motion.remote import Switch
-from spirillum.motion.trajectory import Reach, integrate
-from spirillum.motion.two_links import TwoLinks
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 MOMENT, FIELD = 1.0, 2.0

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.hydrodynamics import SWIMMER_MODELS
-from spirillum.motion import comparison as module
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.swimming import comparison as module
 
 WIDE = "biorob2012-wide"
 THICK = {"tail.wire_diameter": "6 mm"}

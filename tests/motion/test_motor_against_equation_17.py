@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from spirillum.errors import InputError
-from spirillum.motion.motor import battery_voltage, run_time, steady_current, winding_resistance
+from spirillum.swimming.motor import battery_voltage, run_time, steady_current, winding_resistance
 
 
 def table_ii_resistance(current: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.motion.lying import (
+from spirillum.dynamics.resting_forces import (
     Film,
     contact_line,
     film_of,

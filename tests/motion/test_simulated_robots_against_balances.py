@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.motion.films import films_of
+from spirillum.dynamics.films import films_of
 
 QUIET = {"friction.effective": "1.1e-5 N m s/rad"}
 
@@ -117,7 +117,7 @@ def test_capsule_drains_as_a_line_does() -> None:
     assert gap[-1] < 0.5 * gap[0]
     links = 1.0 / np.sqrt(gap)
     slope = (links[-1] - links[len(links) // 2]) / float(run["time"][-1] - run["time"][len(links) // 2])
-    from spirillum.motion.two_links import _weight
+    from spirillum.dynamics.two_links import _weight
 
     length, across = 0.017, 0.009 * 0.02 / 0.011
     expected = _weight(robot)[:2].sum() / (2 * 3 * np.sqrt(2) * np.pi * 3.5 * across**1.5 * length)
@@ -292,7 +292,7 @@ def test_wrong_types_get_a_sentence_too(options: dict[str, Any], words: str) -> 
 
 def test_powers_are_what_their_definitions_say() -> None:
     found = sp.predict("biorob2012-wide", tail_rate="1.2 Hz", calibrated=False)
-    from spirillum.hydrodynamics.perrin import body_axial
+    from spirillum.fluid.closed.perrin import body_axial
 
     robot = sp.load("biorob2012-wide")
     drag = float(body_axial(sp.RobotBatch.of(robot))[0][0])

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.motion import swim
-from spirillum.motion.motor import battery_voltage, winding_resistance
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.swimming.motor import battery_voltage, winding_resistance
+from spirillum.swimming.steady import swim
 from spirillum.units import Hz
 
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II

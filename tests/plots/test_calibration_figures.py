@@ -36,14 +36,14 @@ def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any,
     written = {path.name for path in found.write(tmp_path)}
     names = ("observed-40mm", "residuals", "posterior", "profiles")
     assert written >= {f"{name}.png" for name in names} | {"calibration.toml", "predictions.csv", "posterior.nc"}
-    from spirillum.plots.calibration import observed_figure, residual_figure
+    from spirillum.view.figures.calibration import observed_figure, residual_figure
 
     for figure in (observed_figure(found, 0), residual_figure(found)):
         assert "synthetic, nothing is measured" in _texts(figure)
 
 
 def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
-    from spirillum.plots.calibration import observed_figure
+    from spirillum.view.figures.calibration import observed_figure
 
     figure = observed_figure(found, 0)
     first = figure.axes[0]
@@ -61,7 +61,7 @@ def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
 
 
 def test_residuals_are_observed_over_predicted(found: Any) -> None:
-    from spirillum.plots.calibration import residual_figure
+    from spirillum.view.figures.calibration import residual_figure
 
     axes = residual_figure(found).axes[0]
     drawn = np.sort(axes.containers[0].lines[0].get_ydata())

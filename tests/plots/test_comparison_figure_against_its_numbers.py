@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.motion.comparison import ModelComparison
-from spirillum.plots import comparison as module
-from spirillum.plots.comparison import comparison_figure
-from spirillum.plots.style import save_as
+from spirillum.swimming.comparison import ModelComparison
+from spirillum.view.figures import comparison as module
+from spirillum.view.figures.comparison import comparison_figure
+from spirillum.view.figures.style import save_as
 
 WIDE = "biorob2012-wide"
 

@@ -12,9 +12,9 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path as Path2D
 
 import spirillum as sp
-from spirillum.motion.flow import Flow
-from spirillum.plots.flow import flow_figure
-from spirillum.plots.style import save_as
+from spirillum.fields.flow import Flow
+from spirillum.view.figures.flow import flow_figure
+from spirillum.view.figures.style import save_as
 
 WIDE = "biorob2012-wide"
 
@@ -28,7 +28,7 @@ def around(sphere: Any) -> Flow:
 @pytest.fixture(scope="module")
 def in_tube(sphere: Any) -> Callable[..., Flow]:
     """A sphere's flow under the name of a robot that lies in a tube."""
-    from spirillum.hydrodynamics.tube import Tube
+    from spirillum.fluid.tube.model import Tube
     from spirillum.robot.placement import Placement
 
     def make(**placement: str) -> Flow:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.plots.magnetic import magnetic_figure
+from spirillum.view.figures.magnetic import magnetic_figure
 
 
 @pytest.fixture(scope="module")

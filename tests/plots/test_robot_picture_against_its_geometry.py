@@ -7,11 +7,11 @@ import pytest
 from matplotlib.collections import LineCollection
 
 import spirillum as sp
-from spirillum.plots.robot import robot_figure, robot_words
-from spirillum.plots.scene import PHASE
-from spirillum.plots.solids import body_profile, crests
-from spirillum.plots.style import save
-from spirillum.robot import RobotBatch
+from spirillum.robot.batch import RobotBatch
+from spirillum.view.figures.robot import robot_figure, robot_words
+from spirillum.view.figures.scene import PHASE
+from spirillum.view.figures.solids import body_profile, crests
+from spirillum.view.figures.style import save
 
 
 def test_body_outline_encloses_the_bodys_volume() -> None:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.motion.lying import Film, settling_path
-from spirillum.plots.settling import settling_figure
+from spirillum.dynamics.resting_forces import Film, settling_path
+from spirillum.view.figures.settling import settling_figure
 
 
 @pytest.fixture

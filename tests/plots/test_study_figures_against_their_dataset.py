@@ -10,8 +10,8 @@ import pytest
 from matplotlib import rcParams
 
 import spirillum as sp
-from spirillum.plots.study import study_figures
-from spirillum.plots.style import look_of_model, save
+from spirillum.view.figures.study import study_figures
+from spirillum.view.figures.style import look_of_model, save
 
 MM, HZ = 1e-3, 2 * np.pi
 

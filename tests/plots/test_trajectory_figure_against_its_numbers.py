@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.plots.trajectory import trajectory_figure
+from spirillum.view.figures.trajectory import trajectory_figure
 
 TIME = np.linspace(0.0, 2.0, 101)
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.report import write_report
-from spirillum.report.content import FRICTION_MEANINGS
+from spirillum.papers.biorob2012 import claims as claims_module
+from spirillum.papers.biorob2012.claims import Claim
+from spirillum.results.study_content import FRICTION_MEANINGS
+from spirillum.results.study_report import write_report
 from spirillum.robot.actuation import FrictionReading
-from spirillum.studies import claims as claims_module
-from spirillum.studies.claims import Claim
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 HOSTILE = "<script>alert(1)</script>"

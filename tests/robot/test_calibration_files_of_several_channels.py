@@ -6,8 +6,8 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.robot import load
-from spirillum.robot.calibration_file import with_calibration
+from spirillum.fitted.calibration_file import with_calibration
+from spirillum.robot.load import load
 
 TABLES = """
 [[calibration.sbt]]

@@ -8,7 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from spirillum.robot import geometry, load
+from spirillum.robot import geometry
+from spirillum.robot.load import load
 
 ENDS = ["hemisphere", "flat", "fillet"]
 DIAMETER, LENGTH, FILLET = 0.018, 0.035, 0.0037

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.robot import load
 from spirillum.robot.links import links_of, revolution_solid, robot_solids, wire_solid
+from spirillum.robot.load import load
 from spirillum.robot.outline import body_outline, cylinder_outline
 
 R, L = 0.009, 0.035

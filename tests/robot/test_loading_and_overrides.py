@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.robot import RobotBatch, load
-from spirillum.robot.load import parse_setting, preset_text
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, parse_setting, preset_text
 
 
 def test_dotted_and_nested_overrides_are_the_same() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from spirillum import InputError
-from spirillum.robot import load
 from spirillum.robot.links import robot_solids
+from spirillum.robot.load import load
 from spirillum.robot.mesh import STRIPE_COLOURS, RobotMesh, robot_mesh, tail_line
 from spirillum.robot.surface import mass_properties, rod, swept
 

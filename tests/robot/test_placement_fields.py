@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from spirillum import InputError
-from spirillum.robot import RobotBatch, batches, load
+from spirillum.robot.batch import RobotBatch, batches
+from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from spirillum.robot import Robot, RobotBatch, load, preset_names
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, preset_names
+from spirillum.robot.robot import Robot
 
 PRESETS = ["biorob2012-narrow", "biorob2012-wide"]
 

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spirillum.errors import InputError
-from spirillum.robot import load
-from spirillum.robot.load import raw_table
+from spirillum.robot.load import load, raw_table
 
 LENGTHS = 'for example "18 mm"'
 HUGE = 10**400

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.plots.study import study_figures
-from spirillum.plots.style import look_of_model
+from spirillum.papers.biorob2012.claims import Evidence, evaluated
 from spirillum.studies import places, run
-from spirillum.studies.claims import Evidence, evaluated
 from spirillum.studies.places import AT_PLACES
+from spirillum.view.figures.study import study_figures
+from spirillum.view.figures.style import look_of_model
 
 MODELS = ["sbt", "walled"]
 
@@ -31,7 +31,7 @@ def leaning(walled: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
         return (6e-3 + gap - g.amplitude) / g.tail_length
 
     monkeypatch.setattr(type(walled), "axial", axial)
-    monkeypatch.setattr("spirillum.motion.band._steepest", steepest)
+    monkeypatch.setattr("spirillum.swimming.band._steepest", steepest)
     return walled
 
 

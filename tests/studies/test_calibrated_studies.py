@@ -10,7 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
-from spirillum.robot import load
+from spirillum.robot.load import load
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 GRID = {
@@ -64,7 +64,7 @@ def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
             getattr(answer.intervals, end)["forward_velocity"], rel=1e-12
         )
         assert np.isnan(float(found.sel(model="rft")))
-    from spirillum.plots.evidence import Shown
+    from spirillum.view.figures.evidence import Shown
 
     shown = Shown.of(dataset).part(channel=1)
     assert shown.with_intervals == ("sbt",)

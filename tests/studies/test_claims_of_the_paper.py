@@ -5,7 +5,7 @@ from collections import Counter
 import pytest
 
 import spirillum as sp
-from spirillum.studies.claims import Claim, evaluated
+from spirillum.papers.biorob2012.claims import Claim, evaluated
 
 
 @pytest.fixture(scope="module")

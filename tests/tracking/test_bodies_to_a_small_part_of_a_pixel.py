@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.tracking.body import BodyFinder
-from spirillum.tracking.contour import GROUPS, contour_of
-from spirillum.tracking.optics import BodyPose, Optics
-from spirillum.tracking.search import candidates
-from spirillum.tracking.track import Flag
-from spirillum.tracking.warnings import gaps_of
+from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.contour import GROUPS, contour_of
+from spirillum.vision.track.search import candidates
+from spirillum.vision.track.track import Flag
+from spirillum.vision.track.warnings import gaps_of
 
 pytest.importorskip("cv2")
 

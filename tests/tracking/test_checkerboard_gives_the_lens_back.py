@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.tracking.checkerboard import lens_of
-from spirillum.tracking.setup import Checkerboard
+from spirillum.vision.camera.checkerboard import lens_of
+from spirillum.vision.setup import Checkerboard
 
 cv2 = pytest.importorskip("cv2")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.tracking.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 
 PIXEL = 2.5e-4
 

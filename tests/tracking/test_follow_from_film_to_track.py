@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.tracking.camera import scale_of
-from spirillum.tracking.follow import Seen, follow
-from spirillum.tracking.setup import load_setup
+from spirillum.vision.camera.camera import scale_of
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.follow import Seen, follow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

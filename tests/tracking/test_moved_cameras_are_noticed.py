@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from spirillum.tracking.follow import follow
-from spirillum.tracking.setup import load_setup
-from spirillum.tracking.steadiness import shift_between
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.follow import follow
+from spirillum.vision.track.steadiness import shift_between
 
 cv2 = pytest.importorskip("cv2")
 

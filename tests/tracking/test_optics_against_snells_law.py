@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from spirillum.tracking.optics import BodyPose, Optics, placed, seen
+from spirillum.vision.camera.optics import BodyPose, Optics, placed, seen
 
 UPRIGHT = Optics((640, 480), 740.0, 0.21, 0.0115, 0.06, 1.4)
 

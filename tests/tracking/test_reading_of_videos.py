@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.tracking.frames import open_video
+from spirillum.vision.video.frames import open_video
 
 av = pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.optics import BodyPose, Optics, optics_of
-from spirillum.tracking.roll import Stripes
-from spirillum.tracking.setup import load_setup
+from spirillum.vision.camera.optics import BodyPose, Optics, optics_of
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.stripes import Stripes
 
 PRESET = ("red", "yellow", "green", "blue") * 2
 
@@ -156,7 +156,7 @@ def test_periods_of_patterns() -> None:
 
 def test_a_robot_without_stripes_says_so(flat_pictures: ModuleType) -> None:
     from spirillum.robot.load import load
-    from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
+    from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup
 
     setup = Setup(
         camera=CameraSetup(height="200 mm"),

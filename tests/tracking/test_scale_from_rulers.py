@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from spirillum.errors import InputError
-from spirillum.tracking.optics import Optics, optics_of
-from spirillum.tracking.ruler import lines_in, still_picture
-from spirillum.tracking.scale import fitted_camera, given_camera
-from spirillum.tracking.setup import Setup
+from spirillum.vision.camera.optics import Optics, optics_of
+from spirillum.vision.camera.ruler import lines_in, still_picture
+from spirillum.vision.camera.scale import fitted_camera, given_camera
+from spirillum.vision.setup import Setup
 
 pytest.importorskip("cv2")
 

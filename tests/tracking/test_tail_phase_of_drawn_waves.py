@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
-from spirillum.tracking.optics import BodyPose, optics_of
-from spirillum.tracking.setup import load_setup
-from spirillum.tracking.tail import TailWave
+from spirillum.vision.camera.optics import BodyPose, optics_of
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.tail import TailWave
 
 
 def learnt(

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from spirillum.hydrodynamics.resistance import resistance
+from spirillum.fluid.resistance import resistance
 from spirillum.robot.load import load
-from spirillum.tracking.setup import CameraSetup, Markers, RobotSetup, Setup
-from spirillum.tracking.unwrapping import _largest_advance, contradictions, nyquist, unwrapped
+from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup
+from spirillum.vision.track.unwrapping import _largest_advance, contradictions, nyquist, unwrapped
 
 FPS = 30.0
 TURN = 2 * np.pi

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from spirillum.tracking.follow import follow
-from spirillum.tracking.setup import load_setup
+from spirillum.vision.setup import load_setup
+from spirillum.vision.track.follow import follow
 
 pytest.importorskip("av")
 pytest.importorskip("cv2")

@@ -11,7 +11,7 @@ import spirillum as sp
 from spirillum.robot.load import load
 from spirillum.virtual.degradation import PRESETS, Degradation, degradation_of
 from spirillum.virtual.disturbances import Disturbances, tilt_of
-from spirillum.virtual.optics import Lens
+from spirillum.virtual.lens import Lens
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trial import render

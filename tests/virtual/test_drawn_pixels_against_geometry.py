@@ -6,11 +6,11 @@ import pytest
 import spirillum as sp
 from spirillum.kernels.raster import draw
 from spirillum.robot.surface import mass_properties
-from spirillum.virtual.optics import Lens
+from spirillum.virtual.lens import Lens
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.solids import solids_of
 from spirillum.virtual.tank import backdrop, spots, tank_of
-from spirillum.virtual.way import steady_way
+from spirillum.virtual.trajectory import steady_way
 
 
 def coverage(corners: np.ndarray, faces: np.ndarray, heights: np.ndarray, size: tuple[int, int]) -> np.ndarray:

@@ -8,9 +8,9 @@ import pytest
 
 import spirillum as sp
 from spirillum.measurement.observations import read_observations
-from spirillum.tracking.setup import load_setup
 from spirillum.units import Hz
 from spirillum.virtual.experiment import virtual_experiment
+from spirillum.vision.setup import load_setup
 
 SMALL: dict[str, Any] = {"trials": 2, "duration": "0.1 s", "size": (96, 64), "tail_rate": "1.2 Hz"}
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from spirillum.kernels.sightlines import sightline
-from spirillum.virtual.optics import Lens
-from spirillum.virtual.way import lab_to_camera
+from spirillum.virtual.lens import Lens
+from spirillum.virtual.trajectory import lab_to_camera
 
 SIZE = (640, 480)
 

@@ -11,12 +11,12 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.robot.load import load, preset_names
-from spirillum.tracking.setup import load_setup
 from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.robot_file import is_preset, robot_text
+from spirillum.virtual.trajectory import lab_to_camera, run_way, steady_way
 from spirillum.virtual.trial import render
-from spirillum.virtual.way import lab_to_camera, run_way, steady_way
+from spirillum.vision.setup import load_setup
 
 ROBOT = "biorob2012-wide"
 SMALL: dict[str, Any] = {
@@ -139,7 +139,7 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize("view", ["top", "side"])
 @pytest.mark.parametrize("leftwards", [False, True])
 def test_the_way_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:
-    from spirillum.drawing.poses import rolled, rotation_matrix
+    from spirillum.dynamics.poses import rolled, rotation_matrix
 
     time = np.linspace(0.0, 3.0, 31)
     position = np.stack([1e-3 * time, 2e-4 * np.sin(time), -0.01 + 1e-4 * time], axis=-1)

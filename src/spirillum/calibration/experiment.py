@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.strays import stray_trials
+from spirillum.calibration.outliers import stray_trials
 from spirillum.errors import InputError
 from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
 from spirillum.measurement.statistics import student_t_quantile

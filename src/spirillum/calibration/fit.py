@@ -27,7 +27,7 @@ from spirillum.calibration.parameters import free_names
 from spirillum.calibration.posterior import Posterior, Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed
 from spirillum.errors import InputError, did_you_mean
-from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 
@@ -102,7 +102,7 @@ class Calibrated:
         Raises:
             InputError: if it cannot be written to.
         """
-        from spirillum.calibration.files import write_calibration
+        from spirillum.results.calibration import write_calibration
 
         return write_calibration(self, Path(folder), figures=figures, progress=progress)
 

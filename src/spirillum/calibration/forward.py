@@ -14,11 +14,11 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.model import SwimmerModel
-from spirillum.hydrodynamics.perrin import body_axial
-from spirillum.motion.balance import force_free, friction_torques, rates_per_torque
-from spirillum.motion.motor import steady_current
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.swimming.balance import force_free, friction_torques, rates_per_torque
+from spirillum.swimming.motor import steady_current
 
 __all__ = ["Draws", "Forward", "Predicted", "Table", "TableError", "axis_points", "kinematics", "tabulated"]
 

@@ -13,11 +13,11 @@ from spirillum.calibration.experiment import Experiment, Quantity, Ratio
 from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, tabulated
 from spirillum.calibration.parameters import PARAMETERS, Coordinate, LogNormal, LogUniform, Parameter, Uniform
 from spirillum.errors import InputError
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.hydrodynamics.model import SwimmerModel
-from spirillum.motion.swimming import requirements
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
+from spirillum.swimming.steady import requirements
 
 __all__ = ["Problem", "Progress", "posed"]
 

@@ -20,9 +20,9 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.fit import LEVEL, Calibrated, RobotSource, calibrate
 from spirillum.calibration.judgement import synthetic_warning
-from spirillum.calibration.netcdf import posterior_tree
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate
 from spirillum.calibration.posterior import Sampling
+from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
 from spirillum.robot.load import PAPER_ROBOTS

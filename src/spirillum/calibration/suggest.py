@@ -28,15 +28,15 @@ from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.calibration.judgement import synthetic_warning
 from spirillum.errors import InputError
 from spirillum.files import csv_rows, read_text
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.motion.intervals import drawn_kinematics
-from spirillum.motion.posterior_file import PosteriorFile, read_posterior
-from spirillum.motion.prediction import calibration_warnings
-from spirillum.motion.swimming import requirements
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.robot.robot import Robot
+from spirillum.swimming.intervals import drawn_kinematics
+from spirillum.swimming.prediction import calibration_warnings
+from spirillum.swimming.steady import requirements
 
 __all__ = ["Candidate", "Suggestion", "suggest"]
 

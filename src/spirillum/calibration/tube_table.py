@@ -17,10 +17,10 @@ import numpy as np
 
 from spirillum.calibration.forward import Forward, TableError, axis_points, tabulated
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.model import SwimmerModel
-from spirillum.motion.band import at_place, band_places
+from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
+from spirillum.swimming.band import at_place, band_places
 
 __all__ = ["Ranges", "place_ranges", "tube_forward"]
 

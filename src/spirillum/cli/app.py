@@ -109,7 +109,7 @@ def predict(
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --set tail.wavelength=20mm`
     """
     from spirillum.cli import text
-    from spirillum.motion.prediction import predict as answer
+    from spirillum.swimming.prediction import predict as answer
 
     with text.progress_bar(quiet=json) as progress:
         result = answer(
@@ -160,7 +160,7 @@ def compare_models(
     """
     from spirillum.cli import comparison_text, text
     from spirillum.files import PICTURES, output_target
-    from spirillum.motion.comparison import compare_models as answer
+    from spirillum.swimming.comparison import compare_models as answer
 
     target = None if output is None else output_target(output, PICTURES, "models.png")
     loaded = loaded_robot(robot, settings)
@@ -179,8 +179,8 @@ def compare_models(
             progress=progress,
         )
     if target is not None:
-        from spirillum.plots.comparison import comparison_figure
-        from spirillum.plots.style import save_as
+        from spirillum.view.figures.comparison import comparison_figure
+        from spirillum.view.figures.style import save_as
 
         save_as(comparison_figure(result), target)
     text.show(comparison_text.comparison_answer(result, output), comparison_text.model_comparison, json=json)
@@ -216,7 +216,7 @@ def resistance(
     Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
     """
     from spirillum.cli import text
-    from spirillum.hydrodynamics.resistance import resistance as answer
+    from spirillum.fluid.resistance import resistance as answer
 
     with text.patience(model, quiet=json):
         result = answer(

@@ -53,10 +53,10 @@ def calibrate(
 
     Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
     """
-    from spirillum.calibration.files import check_folder, earlier_results
     from spirillum.calibration.fit import calibrate as answer
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import calibration_text, text
+    from spirillum.results.calibration import check_folder, earlier_results
 
     if not output.strip():
         raise InputError("output = ''; allowed: a folder for the results (-o DIR)")

@@ -11,7 +11,7 @@ from rich.markup import escape
 from spirillum.cli.text import Answer, friendly_unit, grid, in_unit
 
 if TYPE_CHECKING:
-    from spirillum.motion.comparison import ModelComparison
+    from spirillum.swimming.comparison import ModelComparison
 
 __all__ = ["comparison_answer", "model_comparison"]
 

@@ -90,8 +90,8 @@ def flow(
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
     from spirillum.cli import flow_text, text
-    from spirillum.motion.flow import box_around, plane_around, seat_in_tube
-    from spirillum.motion.flow import flow as answer
+    from spirillum.fields.flow import box_around, plane_around, seat_in_tube
+    from spirillum.fields.flow import flow as answer
 
     flow_text.check_targets(output, volume)
     loaded = loaded_robot(robot, settings)

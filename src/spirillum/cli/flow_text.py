@@ -16,7 +16,7 @@ from spirillum.files import PICTURES, output_target, write_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-    from spirillum.motion.flow import Flow
+    from spirillum.fields.flow import Flow
 
 __all__ = ["check_targets", "flow_answer", "flow_table", "write"]
 
@@ -45,12 +45,12 @@ def write(flow: Flow, dataset: xr.Dataset, path: Path) -> None:
     if path.suffix == ".nc":
         write_dataset(dataset, path)
     elif path.suffix == ".vti":
-        from spirillum.vtk_image import write_vti
+        from spirillum.formats.vtk_image import write_vti
 
         write_vti(dataset, path)
     else:
-        from spirillum.plots.flow import flow_figure
-        from spirillum.plots.style import save_as
+        from spirillum.view.figures.flow import flow_figure
+        from spirillum.view.figures.style import save_as
 
         save_as(flow_figure(flow, dataset), path)
 

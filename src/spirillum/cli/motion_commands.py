@@ -81,8 +81,8 @@ def simulate(
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
     from spirillum.cli import simulation_text, text
+    from spirillum.dynamics.simulation import simulate as answer
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
-    from spirillum.motion.simulation import simulate as answer
 
     target = netcdf_target(output)
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
@@ -115,9 +115,9 @@ def simulate(
 
 def _check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
-    from spirillum.drawing.encode import FILMS
     from spirillum.extras import required
     from spirillum.files import output_target
+    from spirillum.view.scene3d.encode import FILMS
 
     output_target(movie, FILMS, "run.mp4")
     for package in ("pyvista", "av"):
@@ -128,14 +128,14 @@ def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progre
     """Draw and film a run; the files by what they are, and the film's warnings."""
     files: dict[str, Any] = {}
     if picture is not None:
-        from spirillum.plots.style import save_as
-        from spirillum.plots.trajectory import trajectory_figure
+        from spirillum.view.figures.style import save_as
+        from spirillum.view.figures.trajectory import trajectory_figure
 
         save_as(trajectory_figure(dataset), picture)
         files["plot"] = str(picture)
     if movie is not None:
-        from spirillum.drawing.film import film
         from spirillum.errors import InputError
+        from spirillum.view.scene3d.film import film
 
         try:
             files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)
@@ -166,8 +166,8 @@ def magnetic_sweep(
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
     """
     from spirillum.cli import simulation_text, text
+    from spirillum.dynamics.magnetic_sweep import magnetic_sweep as answer
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
-    from spirillum.motion.magnetic_sweep import magnetic_sweep as answer
 
     target = netcdf_target(output)
     picture = None if plot is None else output_target(plot, PICTURES, "sweep.png")
@@ -176,8 +176,8 @@ def magnetic_sweep(
         dataset = answer(loaded, rate, model=model, turns=turns, accuracy=accuracy, progress=progress)
     write_dataset(dataset, target)
     if picture is not None:
-        from spirillum.plots.magnetic import magnetic_figure
-        from spirillum.plots.style import save_as
+        from spirillum.view.figures.magnetic import magnetic_figure
+        from spirillum.view.figures.style import save_as
 
         save_as(magnetic_figure(dataset), picture)
     text.show(simulation_text.sweep_answer(dataset, output, plot), simulation_text.sweep, json=json)

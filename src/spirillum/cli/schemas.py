@@ -18,12 +18,12 @@ def schema_of(name: str) -> dict[str, Any]:
     Raises:
         InputError: for an unknown name.
     """
-    from spirillum.robot.calibration_file import CalibrationFile
+    from spirillum.fitted.calibration_file import CalibrationFile
     from spirillum.robot.fields import Section
     from spirillum.robot.meanings import meanings
     from spirillum.robot.robot import Robot
     from spirillum.studies.spec import Study
-    from spirillum.tracking.setup import Setup
+    from spirillum.vision.setup import Setup
 
     known: dict[str, type[BaseModel]] = {
         "robot": Robot,

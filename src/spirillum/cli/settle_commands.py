@@ -51,8 +51,8 @@ def settle(
     Example: `spirillum settle biorob2012-wide --tail-rate 1.2Hz --gap 0.5mm`
     """
     from spirillum.cli import settle_text, text
+    from spirillum.dynamics.settling import settle as answer
     from spirillum.files import PICTURES, output_target
-    from spirillum.motion.settling import settle as answer
 
     target = None if output is None else output_target(output, PICTURES, "settling.png")
     loaded = loaded_robot(robot, settings)
@@ -70,8 +70,8 @@ def settle(
             progress=progress,
         )
     if target is not None:
-        from spirillum.plots.settling import settling_figure
-        from spirillum.plots.style import save_as
+        from spirillum.view.figures.settling import settling_figure
+        from spirillum.view.figures.style import save_as
 
         save_as(settling_figure(found), target)
     text.show(settle_text.settling_answer(found, output), settle_text.settling, json=json)

@@ -12,7 +12,7 @@ from spirillum.cli.text import Answer, add_quantities, grid, in_unit
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
-    from spirillum.motion.settling import Settling
+    from spirillum.dynamics.settling import Settling
 
 __all__ = ["gap_range", "settling", "settling_answer"]
 

@@ -52,7 +52,7 @@ def show(
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
     from spirillum.cli import text
-    from spirillum.drawing.show import show as answer
+    from spirillum.view.scene3d.show import show as answer
 
     target = output if output is not None or window else Path("robot.png")
     found = answer(
@@ -96,10 +96,10 @@ def film(
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """
     from spirillum.cli import text
-    from spirillum.drawing.encode import FILMS
-    from spirillum.drawing.film import film as answer
-    from spirillum.drawing.run_file import open_run
+    from spirillum.dynamics.run_file import open_run
     from spirillum.files import output_target
+    from spirillum.view.scene3d.encode import FILMS
+    from spirillum.view.scene3d.film import film as answer
 
     output_target(output, FILMS, "run.mp4")
     dataset = open_run(run)

@@ -257,7 +257,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     """Answer of `study`."""
     import numpy as np
 
-    from spirillum.studies.claims import evaluated
+    from spirillum.papers.biorob2012.claims import evaluated
 
     claims = evaluated(dataset)
     verdicts = {
@@ -312,7 +312,7 @@ def time_window(text: str) -> tuple[float, float]:
 @contextmanager
 def patience(model: str, *, quiet: bool) -> Iterator[None]:
     """A sign of life on standard error while a model solves; its first run on a machine compiles for some seconds."""
-    from spirillum.hydrodynamics import MODELS
+    from spirillum.fluid.registry import MODELS
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal or model not in MODELS or MODELS[model].closed_form:

@@ -1,5 +1,1 @@
 """The robot for other programs: files of its shape, masses, joint and resistance. `spirillum.export` writes them."""
-
-from spirillum.exports.write import Export, export
-
-__all__ = ["Export", "export"]

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.formats.vtk_image import add_comment
 from spirillum.robot.mesh import RobotMesh
-from spirillum.vtk_image import add_comment
 
 __all__ = ["vtp_bytes"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.hydrodynamics.models import find_swimmer_model
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.links import Link, links_of

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from spirillum.arrays import Samples, Whole
-from spirillum.kernels.alike import variance_of_sum
 from spirillum.kernels.compiled import compiled
+from spirillum.kernels.newey_west import variance_of_sum
 
 __all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
 

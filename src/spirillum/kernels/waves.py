@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.alike import variance_of_sum
 from spirillum.kernels.compiled import compiled
+from spirillum.kernels.newey_west import variance_of_sum
 
 __all__ = ["ridge_of", "wave_fit", "wave_scores"]
 

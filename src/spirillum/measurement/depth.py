@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spirillum.tracking.setup import Setup
+from spirillum.vision.setup import Setup
 
 __all__ = ["apparent_distance", "depth_shares"]
 

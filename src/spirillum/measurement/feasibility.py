@@ -13,10 +13,10 @@ from spirillum.errors import InputError
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.setup import Setup, load_setup, stripes_of
-from spirillum.tracking.unwrapping import LARGEST_STEP
 from spirillum.units import KINDS, Hz, parse_option
+from spirillum.vision.setup import Setup, load_setup, stripes_of
+from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.unwrapping import LARGEST_STEP
 
 __all__ = ["Check", "Feasibility", "feasibility"]
 
@@ -230,7 +230,7 @@ def _expected(
     }
     found = {name: (value, "given") for name, value in given.items() if value is not None}
     if len(found) < len(given):
-        from spirillum.motion.prediction import predict
+        from spirillum.swimming.prediction import predict
 
         try:
             answer = predict(robot, model="sbt", tail_rate=given["tail_rotation_rate"])
@@ -250,7 +250,7 @@ def _pixel(
     if view_width is not None:
         return parse_option("view-width", view_width, KINDS["length"]) / width, "view width", width
     if video is not None:
-        from spirillum.tracking.follow import scale_of
+        from spirillum.vision.track.follow import scale_of
 
         found, film = scale_of(video, setup, folder=folder)
         return found.scale.length_per_pixel, "ruler in the video", film.size[0]

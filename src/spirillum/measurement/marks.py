@@ -13,8 +13,8 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.tables import Row, Table, read_table
-from spirillum.tracking.setup import Setup
-from spirillum.tracking.track import Flag, Scale, Track
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.track import Flag, Scale, Track
 
 __all__ = [
     "EDGE",

@@ -12,10 +12,9 @@ from typing import Any
 from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import output_folder, whole_file, write_text
-from spirillum.measurement.annotate import annotated_film
+from spirillum.formats.labelled import Labelled
 from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.imported import read_track
-from spirillum.measurement.labelled import Labelled
 from spirillum.measurement.marks import (
     Marks,
     check_pixels,
@@ -32,8 +31,9 @@ from spirillum.measurement.summary import Summary, compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.tracking.setup import Setup, load_setup
-from spirillum.tracking.track import Flag, Track
+from spirillum.view.annotate import annotated_film
+from spirillum.vision.setup import Setup, load_setup
+from spirillum.vision.track.track import Flag, Track
 
 __all__ = ["Measurement", "measure"]
 
@@ -317,8 +317,8 @@ class _Work:
         self.trials.append(trial)
 
     def _followed(self, path: Path, name: str, tell: Callable[[int, int | None], None]) -> Track:
-        from spirillum.tracking.follow import follow
-        from spirillum.tracking.frames import open_video
+        from spirillum.vision.track.follow import follow
+        from spirillum.vision.video.frames import open_video
 
         if not self.annotated or self.folder is None:
             return follow(path, self.setup, self.robot, folder=self.beside, progress=tell)
@@ -379,7 +379,7 @@ class _Work:
         )
         if self.folder is None or not self.figures:
             return found
-        from spirillum.report.measurement import write_measurement_report
+        from spirillum.results.measurement_report import write_measurement_report
 
         more = write_measurement_report(found, self.folder, self.thumbnails, self.progress)
         return replace(found, files=(*found.files, *more))

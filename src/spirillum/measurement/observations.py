@@ -10,7 +10,7 @@ from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import csv_rows, read_text
-from spirillum.measurement.parquet import parquet_table
+from spirillum.formats.parquet import parquet_table
 from spirillum.measurement.statistics import Mean, mean_with_interval
 from spirillum.units import Hz
 

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.measurement.outliers import stray_frames
 from spirillum.measurement.statistics import student_t, student_t_quantile
-from spirillum.measurement.strays import stray_frames
 
 __all__ = ["Cycle", "Rate", "mean_of", "rate_of"]
 

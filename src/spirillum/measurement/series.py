@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from spirillum.answer import versions
-from spirillum.measurement.labelled import Labelled, Variable
+from spirillum.formats.labelled import Labelled, Variable
 from spirillum.measurement.trials import LEVEL, RATE_NAMES, Trial
 from spirillum.robot.robot import Robot
-from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.setup import stripes_of
+from spirillum.vision.setup import stripes_of
+from spirillum.vision.track.colours import pattern_period
 
 __all__ = ["movement_of", "series_of"]
 

@@ -9,7 +9,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.files import new_file, output_target
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.fields import field_values
-from spirillum.tracking.setup import load_setup
+from spirillum.vision.setup import load_setup
 
 __all__ = ["new_setup_file", "setup_answer"]
 

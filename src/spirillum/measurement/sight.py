@@ -11,8 +11,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.measurement.marks import Ruled
-from spirillum.tracking.frames import Video, open_video
-from spirillum.tracking.setup import Setup
+from spirillum.vision.setup import Setup
+from spirillum.vision.video.frames import Video, open_video
 
 __all__ = ["Sighted", "sighted"]
 
@@ -45,7 +45,7 @@ def sighted(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> S
     Raises:
         InputError: if the video cannot be read or shows no ruler, and that is needed.
     """
-    from spirillum.tracking.follow import scale_of
+    from spirillum.vision.track.follow import scale_of
 
     rate = setup.camera.frames_per_second
     try:

@@ -12,12 +12,12 @@ import numpy as np
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
+from spirillum.measurement.outliers import stray_frames
 from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
-from spirillum.measurement.strays import stray_frames
 from spirillum.robot.robot import Robot
-from spirillum.tracking.colours import pattern_period
-from spirillum.tracking.setup import stripes_of
-from spirillum.tracking.track import Flag, Track
+from spirillum.vision.setup import stripes_of
+from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.track import Flag, Track
 
 __all__ = [
     "LEVEL",

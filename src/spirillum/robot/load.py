@@ -13,7 +13,7 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
-from spirillum.robot.calibration_file import with_calibration
+from spirillum.fitted.calibration_file import with_calibration
 from spirillum.robot.fields import Section
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot

@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.answer import versions
 from spirillum.arrays import Values
-from spirillum.hydrodynamics import find_swimmer_model
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.places import PlaceTask, placed_at, with_band
 from spirillum.studies.spec import LoadedStudy

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
-from spirillum.hydrodynamics.tube_place import GAP_SHARE
-from spirillum.motion.band import at_place, band_places, joined
-from spirillum.motion.swimming import requirements, swim
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.place import GAP_SHARE
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Part, Places, groups
+from spirillum.swimming.band import at_place, band_places, joined
+from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
 
 __all__ = ["AT_PLACES", "PlaceTask", "left_out", "place_tasks", "placed_at", "reference_place", "with_band"]

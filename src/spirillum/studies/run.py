@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.files import claim_folder, output_folder, write_dataset
-from spirillum.hydrodynamics import find_swimmer_model
-from spirillum.motion.comparison import uneven_models
-from spirillum.motion.prediction import calibration_warnings
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.dataset import assembled, read_dataset
 from spirillum.studies.observed import ObservedArrays, observed_arrays
 from spirillum.studies.places import PlaceTask, left_out, place_tasks
 from spirillum.studies.spec import LoadedStudy, load_study
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
+from spirillum.swimming.comparison import uneven_models
+from spirillum.swimming.prediction import calibration_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -143,6 +143,6 @@ def _answered(task: Task | PlaceTask, loaded: LoadedStudy, observed: ObservedArr
 
 
 def _write_report(dataset: xr.Dataset, folder: Path, tell: Progress) -> None:
-    from spirillum.report import write_report
+    from spirillum.results.study_report import write_report
 
     write_report(dataset, folder, tell)

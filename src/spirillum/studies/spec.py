@@ -15,22 +15,22 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
 from spirillum.files import parse_toml, read_toml
-from spirillum.hydrodynamics import SWIMMER_MODELS, check_placement
-from spirillum.motion.band import left_open
-from spirillum.motion.fitted_warnings import Fitted, fitted_of
-from spirillum.motion.posterior_file import PosteriorFile, read_posterior
-from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.calibration_file import (
+from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
     calibrated_robot,
     read_calibration,
 )
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.warnings import Fitted, fitted_of
+from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
+from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.fields import Length, Rate, Section, Text
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
+from spirillum.swimming.band import left_open
 from spirillum.units import Hz
 
 __all__ = ["Grid", "LoadedStudy", "Study", "load_study"]

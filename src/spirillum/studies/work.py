@@ -12,17 +12,18 @@ import numpy as np
 
 from spirillum.arrays import PerRobot, Values
 from spirillum.files import whole_file
-from spirillum.hydrodynamics import SwimmerModel, find_swimmer_model
-from spirillum.motion.intervals import intervals_of
-from spirillum.motion.posterior_file import PosteriorFile
-from spirillum.motion.prediction import accuracy_limits
-from spirillum.motion.quantities import Swimming
-from spirillum.motion.swimming import requirements, speed_difference, swim
+from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch, batches
-from spirillum.robot.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.intervals import intervals_of
+from spirillum.swimming.prediction import accuracy_limits
+from spirillum.swimming.steady import requirements, speed_difference, swim
 
 __all__ = [
     "AT_RATES",

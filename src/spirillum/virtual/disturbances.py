@@ -6,7 +6,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.virtual.degradation import Degradation
-from spirillum.virtual.optics import Lens
+from spirillum.virtual.lens import Lens
 
 __all__ = ["Disturbances", "tilt_of"]
 

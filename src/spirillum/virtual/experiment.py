@@ -20,12 +20,12 @@ from spirillum.files import claim_folder, output_folder, write_text
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
-from spirillum.virtual.beside import SYNTHETIC, rate_quantities
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.options import DIRECTIONS, VIEWS, checked_fps, checked_seed, checked_size, one_of, whole_number
 from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render, room
+from spirillum.virtual.truth import SYNTHETIC, rate_quantities
 
 __all__ = ["Planned", "VirtualExperiment", "virtual_experiment"]
 

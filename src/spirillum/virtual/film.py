@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.h264 import h264_writer
+from spirillum.formats.h264 import h264_writer
 
 __all__ = ["FrameWriter", "mp4_writer", "png_writer"]
 

@@ -7,9 +7,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.raster import develop
 from spirillum.virtual.disturbances import Disturbances
+from spirillum.virtual.label import stamp
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.way import Way
-from spirillum.virtual.words import stamp
+from spirillum.virtual.trajectory import Way
 
 __all__ = ["Frames"]
 

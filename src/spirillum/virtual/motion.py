@@ -16,7 +16,7 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 from spirillum.virtual.tank import tube_height
-from spirillum.virtual.way import Way, lab_to_camera, run_way, steady_way
+from spirillum.virtual.trajectory import Way, lab_to_camera, run_way, steady_way
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ def steady_rates(
     fixed = {name: value for name, value in given.items() if value is not None}
     if len(fixed) == len(given):
         return fixed, "prescribed", ()
-    from spirillum.motion.prediction import predict
+    from spirillum.swimming.prediction import predict
 
     steady = predict(robot, model=model, tail_rate=given["tail_rotation_rate"], friction=friction, band=False)
     found = {name: float(getattr(steady, name)) for name in given} | fixed
@@ -149,7 +149,7 @@ def motion_of(
 def _of_run(
     loaded: Robot, run: xr.Dataset | str | Path, view: str, *, leftwards: bool, duration: str | float, side_axis: float
 ) -> Motion:
-    from spirillum.drawing.run_file import open_run, robot_of
+    from spirillum.dynamics.run_file import open_run, robot_of
 
     dataset = open_run(run) if isinstance(run, str | Path) else run
     own = robot_of(dataset)

@@ -7,10 +7,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.raster import blend, draw
 from spirillum.robot.robot import Robot
-from spirillum.virtual.optics import Lens
+from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import Solid, solids_of
 from spirillum.virtual.tank import Tank, backdrop, spots, tint
-from spirillum.virtual.way import Moment, Way
+from spirillum.virtual.trajectory import Moment, Way
 
 __all__ = ["Painter"]
 

@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.sightlines import still_picture
 from spirillum.robot.robot import Robot
-from spirillum.virtual.optics import Lens
+from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import linear
 
 __all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]

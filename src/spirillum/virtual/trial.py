@@ -18,13 +18,12 @@ from spirillum.errors import InputError
 from spirillum.files import whole_file, write_dataset
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
-from spirillum.virtual.beside import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.film import FrameWriter, mp4_writer, png_writer
 from spirillum.virtual.frames import Frames
+from spirillum.virtual.lens import Lens
 from spirillum.virtual.motion import Motion, motion_of, reach_of
-from spirillum.virtual.optics import Lens
 from spirillum.virtual.options import (
     DIRECTIONS,
     VIEWS,
@@ -41,7 +40,8 @@ from spirillum.virtual.options import (
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import Tank, tank_of
-from spirillum.virtual.way import Way
+from spirillum.virtual.trajectory import Way
+from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,0 +1,269 @@
+"""A one-piece swimmer in a rotating field, frequency by frequency: speed, phase lag, wobble, step-out.
+
+Held to the axis about which the field turns, the answer is a closed form (see `spirillum.swimming.drives`). A free
+robot finds its own attitude: at low rates it may turn about a short axis or wobble, at higher ones its axis comes
+near that of the field and it swims as a corkscrew, until the field turns faster than it can follow (K. I. Morozov and
+A. M. Leshansky, Nanoscale 6:1580, 2014; Y. Man and E. Lauga, Phys. Fluids 25:071904, 2013). Here every rate is a run
+in time that goes on from the attitude of the one before, as when the field is slowly sped up.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from spirillum.answer import versions
+from spirillum.arrays import Samples
+from spirillum.dynamics.integration import INTEGRATOR, Reach, integrate
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels import two_links as kernel
+from spirillum.robot.robot import Robot
+from spirillum.swimming.freedom import check_full
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady import swim
+from spirillum.units import KINDS, parse_option, show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["magnetic_sweep"]
+
+_TILT = 0.1
+"""Angle by which the robot is pushed before every rate, rad: else it could stay in an unstable balance."""
+_SAMPLES = 64
+_OPEN = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
+_SETTLED = 1e-3
+"""Largest relative change of the velocity from one stretch to the next."""
+_STILL = 1e-4
+"""Largest change of the wobble from one stretch to the next, rad."""
+_MOST_STRETCHES = 25
+_MOST_RATES = 2000
+
+
+class _Mean(NamedTuple):
+    """Averages over one stretch of a run at one rate."""
+
+    velocity: float
+    rate: float
+    wobble: float
+    least_wobble: float
+    most_wobble: float
+    lag: float
+    """NaN where the robot slips."""
+    state: Samples
+    """At the end."""
+
+    @property
+    def follows(self) -> bool:
+        """Whether the robot follows the field."""
+        return bool(np.isfinite(self.lag))
+
+    def agrees(self, other: _Mean) -> bool:
+        """Whether nothing has changed any more."""
+        same = abs(self.velocity - other.velocity) <= _SETTLED * max(abs(self.velocity), abs(other.velocity))
+        return same and abs(self.wobble - other.wobble) <= _STILL and self.follows == other.follows
+
+
+def magnetic_sweep(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    rates: Sequence[str | float] | Samples | None = None,
+    *,
+    model: str = "rft",
+    turns: float = 30.0,
+    accuracy: str | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> xr.Dataset:
+    """Speed, phase lag and wobble of a free one-piece swimmer against the rate of the field, in unbounded fluid.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.
+        rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
+            None: 40 rates up to one and a half times the step-out rate of the held robot.
+        model: `rft` or `slender`.
+        turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
+            at most 25, and the last is averaged, over whole slips where the robot slips.
+        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        progress: told what is being computed, how many rates are done, and of how many.
+
+    Returns:
+        Dataset over `field_rate` (rad/s): `forward_velocity` along the field's axis, `tail_rotation_rate` about it,
+        `wobble_angle` with its least and largest, `phase_lag` (NaN where the robot slips), `settled` (0 where they
+        still change), and the same of the held robot in closed form; `step_out_rate` of the held robot as a scalar.
+
+    Raises:
+        InputError: for another drive, wrong rates, or a model without all entries.
+    """
+    check_full(find_swimmer_model(model))
+    held = predict(robot, model=model, accuracy=accuracy, calibrated=False)
+    if held.batch.drive != "magnetic":
+        raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
+    if not 4 <= turns <= 1e4:
+        raise InputError(f"turns = {turns}; allowed: 4 to 10000")
+    asked = _rates(rates, held)
+    links = two_links(
+        held.robot,
+        held.batch,
+        held.model,
+        friction="none",
+        effective=0.0,
+        calibrated=False,
+        weight=False,
+        roughness=None,
+    )
+    level: Samples = np.array([1.0, 0.0, 0.0, 0.0])
+    attitude: Samples = level
+    found, settled = [], []
+    for done, rate in enumerate(asked):
+        if progress is not None:
+            progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, asked.size)
+        mean, still = _settled(links, float(rate), _pushed(attitude), turns)
+        attitude = mean.state[kernel.ATTITUDE : kernel.ATTITUDE + 4] if mean.follows else level
+        found.append(mean)
+        settled.append(still)
+    return _dataset(held, asked, found, np.array(settled, dtype=float), turns)
+
+
+def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> Samples:
+    if rates is None:
+        angle = float(held.batch.moment_angle[0])
+        if np.sin(angle) < 1e-6:
+            raise InputError(
+                f"magnetic.moment_angle = {show(angle, 'deg')}: a moment along the motor axis has no step-out rate; "
+                "allowed: a moment across it, or rates (--rate)"
+            )
+        return float(np.sign(held.batch.field_rate[0]) or 1.0) * np.linspace(0.0, 1.5, 41)[1:] * held.step_out_rate
+    given: Any = [rates] if isinstance(rates, str) else rates
+    if not isinstance(given, (Sequence, np.ndarray)) or np.ndim(given) != 1:
+        raise InputError(f"rates = {str(rates)[:40]}; allowed: a list of rates")
+    asked = np.array(
+        [parse_option("rates", float(r) if isinstance(r, np.floating) else r, KINDS["rate"]) for r in given]
+    )
+    if not 1 <= asked.size <= _MOST_RATES:
+        raise InputError(f"rates has {asked.size} values; allowed: 1 to {_MOST_RATES}")
+    growing = bool(np.all(np.diff(np.abs(asked)) > 0)) and bool(np.all(asked * asked[0] > 0))
+    if not growing:
+        raise InputError(
+            "rates do not increase in size from above 0 in one sense; allowed: increasing rates, all > 0 or < 0"
+        )
+    return asked
+
+
+def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
+    """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
+    drive = links.drive.copy()
+    drive[7] = rate
+    here = replace(links, drive=drive)
+    start: Samples = np.zeros(kernel.STATES)
+    start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = attitude
+    whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up
+    time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
+    before = None
+    for _ in range(_MOST_STRETCHES):
+        run = integrate(here, start, time, [Switch(0.0, 1.0)], _OPEN)
+        mean = _averaged(here, rate, run.time, run.states)
+        if before is not None and mean.agrees(before):
+            return mean, True
+        before, start = mean, mean.state
+    return mean, False
+
+
+def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
+    from scipy.spatial.transform import Rotation
+
+    attitudes = Rotation.from_quat(states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4], scalar_first=True)
+    rotation = np.asarray(attitudes.as_matrix())
+    moment = rotation @ links.drive[3:6]
+    behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
+    slipped = behind - behind[0]
+    follows = abs(float(slipped[-1])) < 0.5 * np.pi
+    slips = int(slipped[-1] // (2.0 * np.pi))
+    last = time.size - 1 if slips < 1 else int(np.searchsorted(slipped, 2.0 * np.pi * slips))
+    wobble = np.arccos(np.clip(np.abs(rotation[: last + 1, 0, 0]), 0.0, 1.0))
+    span = float(time[last])
+    return _Mean(
+        velocity=float(states[last, 0] - states[0, 0]) / span,
+        rate=rate - float(np.sign(rate) * slipped[last]) / span,
+        wobble=float(np.mean(wobble)),
+        least_wobble=float(np.min(wobble)),
+        most_wobble=float(np.max(wobble)),
+        lag=float(np.angle(np.mean(np.exp(1j * behind)))) if follows else np.nan,
+        state=states[-1],
+    )
+
+
+def _pushed(attitude: Samples) -> Samples:
+    """The attitude with the robot's axis pushed aside a little."""
+    from scipy.spatial.transform import Rotation
+
+    push = Rotation.from_rotvec([0.0, 0.0, _TILT])
+    return np.asarray((push * Rotation.from_quat(attitude, scalar_first=True)).as_quat(scalar_first=True))
+
+
+def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[str]:
+    """A sentence on the rates at which the motion still changes."""
+    if np.all(settled):
+        return []
+    open_ = np.abs(rates[settled == 0])
+    return [
+        f"at {open_.size} of {rates.size} rates, {show(float(open_.min()), 'Hz')} to {show(float(open_.max()), 'Hz')}, "
+        f"speed or wobble still change after {_MOST_STRETCHES} stretches of {turns:g} turns: those numbers depend on "
+        "how long the field is given"
+    ]
+
+
+def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: Samples, turns: float) -> xr.Dataset:
+    import xarray as xr
+
+    table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
+    batch = held.batch.with_values({"magnetic.rotation_rate": rates})
+    closed = swim(batch, held.model, calibrated=False)
+    series = {
+        "forward_velocity": (table["velocity"], "m/s", "mean velocity along the axis of the field"),
+        "tail_rotation_rate": (table["rate"], "rad/s", "mean rate at which the moment turns about it"),
+        "wobble_angle": (table["wobble"], "rad", "mean angle between the motor axis and the axis of the field"),
+        "least_wobble_angle": (table["least_wobble"], "rad", "smallest such angle"),
+        "largest_wobble_angle": (table["most_wobble"], "rad", "largest such angle"),
+        "phase_lag": (table["lag"], "rad", "mean angle of the moment behind the field; NaN where it slips"),
+        "settled": (settled, "1", "1 where speed and wobble no longer change, 0 where they still do"),
+        "held_forward_velocity": (closed.forward_velocity, "m/s", "velocity of the held robot, closed form"),
+        "held_tail_rotation_rate": (closed.tail_rotation_rate, "rad/s", "rate of the held robot, closed form"),
+        "held_phase_lag": (closed.phase_lag, "rad", "phase lag of the held robot, closed form"),
+    }
+    source = {"held": "m B sin(lag) = load rate", "free": "two rigid links, one piece, m x B"}
+    data: dict[str, Any] = {
+        name: (
+            "field_rate",
+            np.broadcast_to(values, rates.shape),
+            {"units": unit, "long_name": meaning, "source": source["held" if name.startswith("held") else "free"]},
+        )
+        for name, (values, unit, meaning) in series.items()
+    }
+    data["step_out_rate"] = (
+        (),
+        held.step_out_rate,
+        {"units": "rad/s", "long_name": "step-out rate of the held robot", "source": "m B over resistance"},
+    )
+    return xr.Dataset(
+        data,
+        coords={"field_rate": ("field_rate", rates, {"units": "rad/s", "long_name": "rotation rate of the field"})},
+        attrs={
+            "title": f"{held.robot.name} in a rotating field",
+            "robot": held.robot.name,
+            "model": held.model.name,
+            "turns": float(turns),
+            "settings": json.dumps(held.robot.model_dump(), sort_keys=True),
+            "known_error": held.model.stated_error(held.robot.model),
+            "integrator": INTEGRATOR,
+            "references": " ".join(held.references),
+            "warnings": "\n".join([*held.robot.warnings, *_unsettled(rates, settled, turns)]),
+            "versions": versions(),
+        },
+    )

@@ -1,0 +1,212 @@
+"""Swimming in time: six degrees of freedom of the body, the tail's angle and the motor's current; or two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.held import swim_in_time
+from spirillum.dynamics.integration import integrate
+from spirillum.dynamics.record import dataset_of
+from spirillum.dynamics.remote import schedule, windows_of
+from spirillum.dynamics.sampling import duration_of, sample_times
+from spirillum.dynamics.start import reach_of, start_state
+from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels.two_links import thinnest_film
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.freedom import check_full, motion_of
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.units import KINDS, parse_option, show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["simulate"]
+
+
+def simulate(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = "rft",
+    motion: str = "free",
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    turns: float = 3.0,
+    duration: str | float | None = None,
+    on: Sequence[tuple[str | float, str | float]] | None = None,
+    duty: str | Path | None = None,
+    samples_per_turn: int = 100,
+    accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    weight: bool = True,
+    roughness: str | float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> xr.Dataset:
+    """Simulate swimming from rest.
+
+    A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
+    model (without walls); films of fluid keep it off the wall of its channel. This is a first form of motion in a tube.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
+        model: `rft` or `slender`; with `motion="held"` also `sbt` or `tube`.
+        motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive.
+        friction: reading of the friction; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+        turns: length of the run in turns of the tail at its steady rate (the paper's three periods), or of the field.
+        duration: length of the run instead, with its unit (``"2 s"``) or a float in s.
+        on: times (start, stop) between which the remote switches the drive on, each with its unit (``"2 s"``) or a
+            float in s; None: on throughout.
+        duty: duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next.
+        samples_per_turn: samples of the output per steady turn of the tail.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
+            starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
+        weight: let weight and buoyancy act on the free robot, if its masses are known.
+        roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Returns:
+        Dataset over `time`: position, attitude, angles, rates, current, torques, powers, energies; averages over the
+        last two thirds of the run as scalars; settings and events in the attributes.
+
+    Raises:
+        InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
+    """
+    placed = Placement.of(placement)
+    if motion_of(motion) == "held":
+        _check_held(placed, roughness, weight=weight)
+        return swim_in_time(
+            robot,
+            model=model,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            turns=turns,
+            duration=duration,
+            on=on,
+            duty=duty,
+            samples_per_turn=samples_per_turn,
+            accuracy=accuracy,
+        )
+    check_full(find_swimmer_model(model))
+    steady = predict(
+        robot,
+        model=model,
+        friction=friction,
+        calibrated=calibrated,
+        calibration=calibration,
+        accuracy=accuracy,
+        progress=progress,
+    )
+    turn = 2.0 * np.pi / _turning(steady)
+    end = duration_of(turns, turn, duration)
+    time = sample_times(end, turn, samples_per_turn)
+    own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
+    switches = schedule(windows_of(on), duty, own, end)
+    links = _links(steady, roughness, weight=weight)
+    start = start_state(steady.robot, placed, lying=float(links.weight[:2].sum()) > 0)
+    _check_clear(links, start, placed)
+    reach = reach_of(steady.robot)
+    run = integrate(links, start, time, switches, reach, progress)
+    title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
+    said = [*steady.warnings, *_first_form(steady, links, weight=weight)]
+    if all(switch.duty == 0 for switch in switches):
+        said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
+    return dataset_of(steady, links, run, reach, title, tuple(said))
+
+
+def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
+    """Refuse a start at which body or tail touch the wall.
+
+    Raises:
+        InputError: if they do, naming what puts them there.
+    """
+    if not links.spots.size:
+        return
+    film, rough = thinnest_film(start, links.wall, links.spots), float(links.wall[1])
+    if film > 0:
+        return
+    gap = film + rough
+    if gap > 0:
+        raise InputError(
+            f"roughness = {show(rough, 'um')} with a gap of {show(gap, 'um')} at the start; allowed: a roughness below "
+            "the gap, or a larger placement.gap"
+        )
+    if placement.pitch:
+        raise InputError(
+            f"placement.pitch = {show(placement.pitch, 'deg')}: body or tail would cut into the wall; allowed: a "
+            "smaller pitch, or a larger placement.gap"
+        )
+    raise InputError(
+        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[0], 'mm')}; allowed: a larger "
+        "placement.gap or a smaller placement.eccentricity"
+    )
+
+
+def _check_held(placement: Placement, roughness: str | float | None, *, weight: bool) -> None:
+    """Refuse what only a free run knows.
+
+    Raises:
+        InputError: if there is something.
+    """
+    given = [
+        *(["a placement is given"] if placement.is_given else []),
+        *([f"roughness = {roughness}"] if roughness is not None else []),
+        *([] if weight else ["weight = False"]),
+    ]
+    if given:
+        raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
+
+
+def _turning(steady: Prediction) -> float:
+    """Steady rate of the tail, or of the field, rad/s, positive.
+
+    Raises:
+        InputError: if nothing turns.
+    """
+    rate = steady.tail_rotation_rate
+    if steady.robot.magnetic is not None:
+        rate = steady.robot.magnetic.rotation_rate
+    if rate == 0:
+        kind = "duty" if steady.batch.drive == "dc-motor" else steady.batch.drive
+        field = "magnetic.rotation_rate" if kind == "magnetic" else f"drive.{kind}"
+        raise InputError(f"{field} = 0: the tail does not turn; allowed: any other, and `on` for switching off")
+    return abs(rate)
+
+
+def _links(steady: Prediction, roughness: str | float | None, *, weight: bool) -> TwoLinks:
+    effective = steady.effective_friction
+    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+    return two_links(
+        steady.robot,
+        steady.batch,
+        steady.model,
+        friction=steady.friction,
+        effective=0.0 if np.isnan(effective) else effective,
+        calibrated=steady.calibrated,
+        weight=weight,
+        roughness=height,
+    )
+
+
+def _first_form(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:
+    """What this form of a free motion leaves out, a sentence each."""
+    found = []
+    if steady.robot.channel is not None:
+        found.append(
+            "a first form of motion in a channel: the fluid is unbounded but for films between robot and wall, which "
+            "resist what nears the wall and nothing that slides along it"
+        )
+    if weight and not links.weight.any():
+        found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+    return found

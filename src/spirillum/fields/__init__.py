@@ -1,0 +1,1 @@
+"""Velocity and pressure of the fluid around a swimming robot, at points and on grids."""

@@ -1,0 +1,391 @@
+"""The fluid's velocity and pressure around a swimming robot, at points and on grids."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from dataclasses import field as repr_field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, get_args, runtime_checkable
+
+import numpy as np
+
+from spirillum.answer import versions
+from spirillum.arrays import Samples
+from spirillum.errors import InputError, did_you_mean
+from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
+from spirillum.fluid.tube.wall import Seat
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.units import KINDS, Kind, parse_option
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "FLOW_MODELS",
+    "PLANE_RESOLUTION",
+    "VOLUME_RESOLUTION",
+    "Flow",
+    "FluidField",
+    "Frame",
+    "box_around",
+    "flow",
+    "plane_around",
+    "seat_in_tube",
+]
+
+FLOW_MODELS = ("slender", "tube")
+"""The models whose tractions give a flow: in unbounded fluid, and in the channel."""
+Frame = Literal["lab", "body"]
+_OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
+PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
+"""Points along the longest side of a plane and of a box."""
+
+
+@runtime_checkable
+class FluidField(Protocol):
+    """Flow at one instant in the lab frame; SI, body axes."""
+
+    def inside(self, points: Samples) -> np.ndarray:
+        """Whether each of the points (n, 3) lies inside a solid or outside the tube, (n,)."""
+
+    def fields(self, points: Samples) -> tuple[Samples, Samples]:
+        """Velocity (n, 3) and pressure (n,) at points in the fluid.
+
+        Raises:
+            InputError: if a point lies inside a solid or outside the tube.
+        """
+
+    def wrench(self) -> Samples:
+        """Force (N) and torque about the origin (N m) that hold the robot to its motion, (6,)."""
+
+
+@dataclass(frozen=True)
+class Flow:
+    """The fluid around a swimming robot at one phase of its tail.
+
+    SI; axes of the body, origin at its mid-length on the motor axis, x forward. The body's frame moves with the
+    robot's forward velocity and does not turn; at the instant shown its origin and axes are those of the lab.
+    """
+
+    prediction: Prediction
+    """The motion."""
+    field: FluidField = repr_field(repr=False)
+    """The flow in the lab frame."""
+    phase: float
+    """Phase of the tail, rad."""
+    frame: Frame
+    """`lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the forward velocity)."""
+    held_force: float = 0.0
+    """Sideways force that holds the lateral motion at this phase, N; far away in unbounded fluid the flow is its."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.prediction.robot
+
+    @property
+    def seat(self) -> Seat | None:
+        """The tube and where in it the robot lies; None for unbounded fluid."""
+        return _seat(self.prediction)
+
+    @property
+    def heading(self) -> Samples:
+        """Unit vector along which the robot swims, in its axes, (3,): the channel's axis."""
+        pitch = 0.0 if self.seat is None else self.seat.pitch
+        return np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to be careful about, a sentence each."""
+        if self.robot.channel is None or self.seat is not None:
+            return self.prediction.warnings
+        walls = "the channel's walls are not computed: this is the flow in unbounded fluid"
+        return (*self.prediction.warnings, walls)
+
+    def inside(self, points: Samples) -> np.ndarray:
+        """Whether each point lies inside body, coupling or tail, or outside the tube, (n,).
+
+        Args:
+            points: (n, 3), m.
+
+        Raises:
+            InputError: if they have another shape or are not finite.
+        """
+        return np.asarray(self.field.inside(_checked(points)), dtype=bool)
+
+    def velocity(self, points: Samples) -> Samples:
+        """Velocity of the fluid in the chosen frame, m/s, (n, 3).
+
+        Args:
+            points: (n, 3), m.
+
+        Raises:
+            InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), or
+                as `inside`.
+        """
+        return self.fields(points)[0]
+
+    def pressure(self, points: Samples) -> Samples:
+        """Pressure of the fluid, Pa, (n,): above that far away, or in a tube above the mean of both ends.
+
+        Args:
+            points: (n, 3), m.
+
+        Raises:
+            InputError: as `velocity`.
+        """
+        return self.fields(points)[1]
+
+    def fields(self, points: Samples) -> tuple[Samples, Samples]:
+        """Velocity (n, 3) and pressure (n,) together, which costs as much as one of them.
+
+        Raises:
+            InputError: as `velocity`.
+        """
+        velocity, pressure = self.field.fields(_checked(points))
+        if self.frame == "body":
+            velocity = velocity - self.prediction.forward_velocity * self.heading
+        return velocity, pressure
+
+    def plane(
+        self,
+        plane: str = "xz",
+        *,
+        offset: str | float = 0.0,
+        extent: str | float | None = None,
+        resolution: int = PLANE_RESOLUTION,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Velocity and pressure on a plane through or beside the robot.
+
+        Args:
+            plane: `xz` (side view), `xy` (from above) or `yz` (across the axis).
+            offset: place of the plane on the axis across it, with its unit (``"-50 mm"``) or a float in m.
+            extent: how far the plane reaches beyond the robot on every side, with its unit or a float in m;
+                None: a little more than the robot's largest diameter. In a tube it ends at the glass.
+            resolution: points along the plane's longer side.
+            progress: told what is being computed, how many points are done, and of how many.
+
+        Returns:
+            Dataset over two of `x`, `y`, `z` (m; the third is a scalar) with `velocity_x`, `velocity_y`,
+            `velocity_z` (m/s), `pressure` (Pa), all NaN inside solids and outside the tube, and `inside`; settings in
+            the attributes.
+
+        Raises:
+            InputError: for an unknown plane, a wrong length, or a grid too small or too large.
+        """
+        return self._on(plane_around(self.robot, plane, offset, extent, resolution, self.seat), progress)
+
+    def volume(
+        self,
+        *,
+        extent: str | float | None = None,
+        resolution: int = VOLUME_RESOLUTION,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """Velocity and pressure in a box around the robot; arguments and result as for `plane`, over all of x, y, z.
+
+        Raises:
+            InputError: for a wrong length, or a grid too small or too large.
+        """
+        return self._on(box_around(self.robot, extent, resolution, self.seat), progress)
+
+    def _on(self, grid: Grid, progress: Progress | None) -> xr.Dataset:
+        dataset = dataset_on(grid, self.inside, self.fields, self.frame, progress, self.seat)
+        return dataset.assign_attrs(_attributes(self))
+
+
+def flow(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = "slender",
+    tail_rate: str | float | None = None,
+    friction: str | None = None,
+    calibrated: bool = False,
+    accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phase: str | float = 0.0,
+    frame: str = "lab",
+) -> Flow:
+    """The flow around a robot that swims as the model `slender` or `tube` predicts.
+
+    Lateral motion and tilt are held: the sideways force and torque that this takes at the given phase are in the flow.
+    With `slender` nothing pushes along the axis, and the fluid is unbounded, even where the robot has a channel. With
+    `tube` the fluid is that in the channel, the motion is the average over `model.tube.phases`, and the torque of the
+    wire's own spin is left out. Closer to the wire than its radius the flow is that of a line of blobs.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        model: `slender` (unbounded fluid) or `tube` (in the channel).
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
+            the robot's drive decides.
+        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        calibrated: apply calibration factors to the motion. They stand for walls that are not in the flow, which
+            then pulls at the robot; without them it swims free of force.
+        accuracy: of the model, `standard` or `high`; the flow of `standard` leaves out the torque of the wire's spin.
+            None: `high` with `slender`, the robot's own with `tube`.
+        placement: with `tube`, where in the channel the robot lies: `gap`, `eccentricity`, `pitch`, `tail_drop`,
+            `ends`, `flow`, each a quantity with its unit or a float in SI.
+        tolerance: with `tube`, relative, 0.0001 to 0.05; None: the robot's own.
+        phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
+        frame: `lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the robot's forward
+            velocity, not turning).
+
+    Raises:
+        InputError: for wrong input, or a robot outside the model's domain.
+    """
+    angle = parse_option("phase", phase, KINDS["angle"])
+    if frame not in get_args(Frame):
+        raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    prediction = predict(
+        robot,
+        model=_checked_model(model),
+        tail_rate=tail_rate,
+        friction=friction,
+        calibrated=calibrated,
+        accuracy="high" if accuracy is None and model == "slender" else accuracy,
+        placement=placement,
+        tolerance=tolerance,
+        band=False,
+    )
+    around = Flow(prediction, _field(prediction, angle), angle, cast("Frame", frame))
+    force = around.field.wrench()[:3]
+    sideways = force - (force @ around.heading) * around.heading
+    return replace(around, held_force=float(np.linalg.norm(sideways)))
+
+
+def _checked_model(model: str) -> str:
+    if model not in FLOW_MODELS:
+        raise InputError(
+            f"model = {model!r}{did_you_mean(str(model), FLOW_MODELS)}; allowed: {', '.join(FLOW_MODELS)}, whose "
+            "tractions give a flow"
+        )
+    return model
+
+
+def _field(prediction: Prediction, phase: float) -> FluidField:
+    """The flow of the predicted motion."""
+    from spirillum.fields.in_tube import tube_flow_field
+    from spirillum.fields.unbounded import flow_field
+
+    seat = _seat(prediction)
+    pitch = 0.0 if seat is None else seat.pitch
+    forward = prediction.forward_velocity * np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+    body, rotor = (
+        np.concatenate([forward, [rate, 0.0, 0.0]])
+        for rate in (prediction.body_rotation_rate, prediction.tail_rotation_rate)
+    )
+    if seat is None:
+        return flow_field(prediction.batch, body, rotor, phase)
+    return tube_flow_field(prediction.batch, body, rotor, phase, prediction.plug_velocity)
+
+
+def _seat(prediction: Prediction) -> Seat | None:
+    from spirillum.fluid.tube.place import place_of
+
+    return place_of(prediction.batch, 0).seat if prediction.model.name == "tube" else None
+
+
+def seat_in_tube(
+    robot: Robot,
+    model: str,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+) -> Seat | None:
+    """The tube and where in it a robot will lie, before anything is solved; None with the model `slender`.
+
+    Args:
+        robot: the robot.
+        model: `slender` or `tube`.
+        placement: as `flow`.
+        tolerance: as `flow`.
+
+    Raises:
+        InputError: for wrong input, or a robot outside the domain of `tube`.
+    """
+    from spirillum.fluid.tube.place import place_of
+
+    if _checked_model(model) != "tube":
+        return None
+    return place_of(prepared(robot, model, placement=placement, tolerance=tolerance)[2], 0).seat
+
+
+def plane_around(
+    robot: Robot,
+    plane: str = "xz",
+    offset: str | float = 0.0,
+    extent: str | float | None = None,
+    resolution: int = PLANE_RESOLUTION,
+    seat: Seat | None = None,
+) -> Grid:
+    """The grid of `Flow.plane`, checked before anything is solved; `seat` as `seat_in_tube` gives it.
+
+    Raises:
+        InputError: for an unknown plane, a wrong length, or a grid too small or too large.
+    """
+    plane = "".join(sorted(str(plane)))
+    if plane not in PLANES:
+        raise InputError(f"plane = {plane!r}{did_you_mean(str(plane), PLANES)}; allowed: {', '.join(PLANES)}")
+    at = parse_option("offset", offset, _OFFSET)
+    return plane_grid(robot, plane, at, _margin(extent), resolution, seat)
+
+
+def box_around(
+    robot: Robot,
+    extent: str | float | None = None,
+    resolution: int = VOLUME_RESOLUTION,
+    seat: Seat | None = None,
+) -> Grid:
+    """The grid of `Flow.volume`, checked before anything is solved; `seat` as `seat_in_tube` gives it.
+
+    Raises:
+        InputError: for a wrong length, or a grid too small or too large.
+    """
+    return volume_grid(robot, _margin(extent), resolution, seat)
+
+
+def _attributes(flow: Flow) -> dict[str, Any]:
+    """How the flow came about, in what a file can hold."""
+    motion = flow.prediction
+    return {
+        "title": f"Flow around {motion.robot.name}",
+        "robot": motion.robot.name,
+        "model": motion.model.name,
+        "friction": motion.friction,
+        "calibrated": int(motion.calibrated),
+        "frame": flow.frame,
+        "phase": flow.phase,
+        "forward_velocity": motion.forward_velocity,
+        "body_rotation_rate": motion.body_rotation_rate,
+        "tail_rotation_rate": motion.tail_rotation_rate,
+        **({} if flow.seat is None else {"plug_velocity": motion.plug_velocity}),
+        "held_force": flow.held_force,
+        "placement": json.dumps(motion.placement),
+        "settings": json.dumps(motion.robot.model_dump(), sort_keys=True),
+        "references": " ".join(motion.references),
+        "warnings": "\n".join(flow.warnings),
+        "versions": versions(),
+        "Conventions": "CF-1.11",
+    }
+
+
+def _checked(points: Samples) -> Samples:
+    try:
+        places = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError("points are no numbers; allowed: (n, 3), a row (x, y, z) in m for each point") from error
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise InputError(f"points have shape {places.shape}; allowed: (n, 3), a row (x, y, z) in m for each point")
+    if not np.all(np.isfinite(places)):
+        first = int(np.argmin(np.all(np.isfinite(places), axis=1)))
+        raise InputError(f"point {first} = {places[first].tolist()} is not finite; allowed: coordinates in m")
+    return places
+
+
+def _margin(extent: str | float | None) -> float | None:
+    return None if extent is None else parse_option("extent", extent, KINDS["length or zero"])

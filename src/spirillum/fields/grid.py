@@ -1,0 +1,207 @@
+"""Grids around a robot, and the flow on them as labelled data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.fluid.tube.wall import Seat
+from spirillum.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["PLANES", "Grid", "Progress", "dataset_on", "plane_grid", "volume_grid"]
+
+Progress = Callable[[str, int, int], None]
+PLANES = {"xz": "y", "xy": "z", "yz": "x"}
+"""Planes by the names of their axes, and the axis across each."""
+_AXES = "xyz"
+_MOST_POINTS = 2_000_000
+_LARGEST_RESOLUTION = 10_000
+_BLOCK = 2048
+_MARGIN = 1.2  # of the robot's largest diameter
+_GLASS = 0.05  # what is shown of the glass, over the tube's radius
+_WIDEST = 1.5  # a tube that is shown whole, over the box around the robot
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Evenly spaced points along x, y, z, m; an axis with one point is the place of a plane."""
+
+    axes: tuple[Samples, Samples, Samples]
+    """Coordinates along x, y, z."""
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Points along x, y, z."""
+        x, y, z = (axis.size for axis in self.axes)
+        return x, y, z
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return int(np.prod(self.shape))
+
+    def points(self, start: int, stop: int) -> Samples:
+        """Points number `start` to `stop`, z fastest, (n, 3)."""
+        places = np.unravel_index(np.arange(start, stop), self.shape)
+        points: Samples = np.stack([axis[place] for axis, place in zip(self.axes, places, strict=True)], axis=-1)
+        return points
+
+
+def plane_grid(
+    robot: Robot, plane: str, offset: float, margin: float | None, resolution: int, seat: Seat | None = None
+) -> Grid:
+    """A grid on one of `PLANES`.
+
+    Args:
+        robot: what it surrounds.
+        plane: name of the plane.
+        offset: place on the axis across it, m.
+        margin: how far it reaches beyond the robot, m; None: a default.
+        resolution: points along the longer side.
+        seat: the robot's place in a tube, beyond whose glass there is no grid.
+
+    Raises:
+        InputError: if the grid would be too small or too large.
+    """
+    box = {axis: side for axis, side in _box(robot, margin, seat).items() if axis in plane}
+    return _grid(box, {PLANES[plane]: np.array([offset])}, resolution, "resolution")
+
+
+def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> Grid:
+    """A grid in a box around the robot; arguments as for `plane_grid`.
+
+    Raises:
+        InputError: if the grid would be too small or too large.
+    """
+    return _grid(_box(robot, margin, seat), {}, resolution, "volume resolution")
+
+
+def _box(robot: Robot, margin: float | None, seat: Seat | None) -> dict[str, tuple[float, float]]:
+    """Both ends of the box along each axis, m."""
+    wire = 0.5 * robot.tail.wire_diameter
+    coupling = 0.5 * robot.coupling.diameter if robot.coupling.length > 0 else 0.0
+    radius = max(0.5 * robot.body.diameter, coupling, robot.tail.amplitude + wire)
+    beyond = _MARGIN * 2.0 * radius if margin is None else margin
+    nose = 0.5 * robot.body.length
+    across = (-radius - beyond, radius + beyond)
+    box = {
+        "x": (-nose - robot.coupling.length - robot.tail.length - wire - beyond, nose + beyond),
+        "y": across,
+        "z": across,
+    }
+    return box if seat is None else _in_glass(box, seat, whole=margin is None)
+
+
+def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -> dict[str, tuple[float, float]]:
+    """The box, cut off a little outside of a tube's wall.
+
+    Args:
+        box: both ends along each axis, m.
+        seat: the tube.
+        whole: show all of a tube that is not much wider than the box.
+    """
+    reach = (1.0 + _GLASS) * seat.radius
+    heights = [(seat.offset - x * np.sin(seat.pitch)) / np.cos(seat.pitch) for x in box["x"]]
+    up = reach / np.cos(seat.pitch)
+    glass = {"y": (-reach, reach), "z": (min(heights) - up, max(heights) + up)}
+    if whole and reach < _WIDEST * box["y"][1]:
+        return {**box, **glass}
+    return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}
+
+
+def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> Grid:
+    if not 2 <= resolution <= _LARGEST_RESOLUTION:
+        raise InputError(
+            f"{name} = {resolution}; allowed: 2 to {_LARGEST_RESOLUTION} points along the grid's longest side"
+        )
+    spacing, counts, size = _sizes(box, resolution)
+    if size > _MOST_POINTS:
+        most = resolution
+        while _sizes(box, most)[2] > _MOST_POINTS:
+            most -= 1
+        raise InputError(
+            f"{name} = {resolution} makes {size} points; allowed: at most {_MOST_POINTS} points, here a {name} of "
+            f"{most}"
+        )
+    even = {axis: _even(0.5 * (low + high), spacing, counts[axis]) for axis, (low, high) in box.items()}
+    x, y, z = ({**even, **fixed}[axis] for axis in _AXES)
+    return Grid((x, y, z))
+
+
+def _sizes(box: dict[str, tuple[float, float]], resolution: int) -> tuple[float, dict[str, int], int]:
+    """Spacing (m), points along each axis, and points in all."""
+    spacing = max(high - low for low, high in box.values()) / (resolution - 1)
+    counts = {axis: max(round((high - low) / spacing), 1) + 1 for axis, (low, high) in box.items()}
+    return spacing, counts, math.prod(counts.values())
+
+
+def _even(centre: float, spacing: float, count: int) -> Samples:
+    """Points about a centre, with one spacing for all axes: no direction is resolved better than another."""
+    places: Samples = centre + spacing * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
+    return places
+
+
+def dataset_on(
+    grid: Grid,
+    inside: Callable[[Samples], np.ndarray],
+    fields: Callable[[Samples], tuple[Samples, Samples]],
+    frame: str,
+    progress: Progress | None,
+    seat: Seat | None = None,
+) -> xr.Dataset:
+    """The flow on a grid, NaN inside solids; an axis with one point becomes a scalar.
+
+    Args:
+        grid: the points.
+        inside: tells of points (n, 3) whether they lie inside a solid.
+        fields: velocity (n, 3) and pressure (n,) at points in the fluid.
+        frame: the velocity's frame, for its description.
+        progress: told how many points are done.
+        seat: the robot's place in a tube, in whose glass points lie too.
+    """
+    import xarray as xr
+
+    values = np.full((grid.size, 4), np.nan)
+    solid = np.zeros(grid.size, dtype=bool)
+    for start in range(0, grid.size, _BLOCK):
+        if progress is not None:
+            progress("flow: points", start, grid.size)
+        block = slice(start, min(start + _BLOCK, grid.size))
+        points = grid.points(block.start, block.stop)
+        solid[block] = inside(points)
+        free = ~solid[block]
+        if free.any():
+            velocity, pressure = fields(points[free])
+            values[block][free] = np.column_stack([velocity, pressure])
+    if progress is not None:
+        progress("flow: points", grid.size, grid.size)
+    dims = tuple(axis for axis, count in zip(_AXES, grid.shape, strict=True) if count > 1)
+    shape = tuple(count for count in grid.shape if count > 1)
+    columns = {
+        **{f"velocity_{axis}": ("m/s", f"fluid velocity along {axis}, frame: {frame}") for axis in _AXES},
+        "pressure": ("Pa", f"fluid pressure, {'zero far away' if seat is None else 'above the mean of both ends'}"),
+    }
+    data: dict[str, Any] = {
+        name: (dims, values[:, place].reshape(shape), {"units": unit, "long_name": meaning})
+        for place, (name, (unit, meaning)) in enumerate(columns.items())
+    }
+    solids = "body, coupling or tail" if seat is None else "body, coupling or tail, or outside the tube"
+    meaning = f"whether the point lies inside {solids}"
+    data["inside"] = (dims, solid.reshape(shape), {"units": "1", "long_name": meaning})
+    return xr.Dataset(data, coords=dict(_coordinates(grid)))
+
+
+def _coordinates(grid: Grid) -> Iterator[tuple[str, Any]]:
+    along = {"x": "forward, from the body's mid-length", "y": "to the left", "z": "up"}
+    for axis, places in zip(_AXES, grid.axes, strict=True):
+        attributes = {"units": "m", "long_name": f"{axis}, {along[axis]}"}
+        yield axis, (axis, places, attributes) if places.size > 1 else ((), float(places[0]), attributes)

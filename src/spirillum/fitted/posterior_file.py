@@ -1,0 +1,243 @@
+"""A posterior on disk (`posterior.nc` of `spirillum calibrate`): its draws, checked, for one robot after another."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import (
+    CalibrationFile,
+    FittedFriction,
+    FittedValues,
+    calibrated_robot,
+    friction_of_tails,
+    nearest_channel,
+)
+from spirillum.robot.options import Calibration, FittedTo
+from spirillum.robot.robot import Robot
+
+__all__ = ["PosteriorFile", "posterior_checksum", "read_posterior"]
+
+_SCHEMA = "spirillum.posterior/1"
+_DRAWS = 1000
+_WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
+_TAIL = ("channel_diameter", "wavelength", "amplitude")
+_CHECKED = ("schema", "model", "channels", "parameters", "friction", "friction_reading", "quantities")
+_MAY_BE_ZERO = ("pitch",)
+
+
+@dataclass(frozen=True)
+class PosteriorFile:
+    """Draws of a posterior, thinned, with what they were fitted to."""
+
+    source: str
+    sha256: str
+    model: str
+    observations: str
+    synthetic: bool
+    channels: tuple[float, ...]
+    """Channel diameters, m."""
+    body: tuple[float, float]
+    """Diameter and length of the fitted body, m."""
+    draws: Mapping[str, Samples]
+    """Parameter to (draws, channels), or (draws, 1)."""
+    middle: Mapping[str, Samples]
+    """Their medians before thinning, (channels,) or (1,): those of `calibration.toml` too."""
+    discrepancy: Mapping[str, Samples]
+    """Quantity to (draws,)."""
+    error: Mapping[str, Samples]
+    """Relative error of a trial, quantity to (draws,)."""
+    friction: tuple[Mapping[str, float], ...]
+    """B_eff tail by tail, with `low` and `high`."""
+    friction_reading: str = ""
+    """Reading of the friction under which it was inferred."""
+
+    def central(self, robot: Robot) -> Robot:
+        """The robot with the middle of the posterior in place of its own values."""
+        factors = [name for name in ("body_drag", "body_rotation") if name in self.draws]
+        entries = []
+        for place, diameter in enumerate(self.channels if factors else ()):
+            middle = {name: float(self._column(name, place, self.middle)) for name in factors}
+            own = robot.calibration.get(self.model)
+            kept = {name: getattr(own, name) for name in ("body_drag", "body_rotation")} if own else {}
+            fitted_to = FittedTo.model_construct(
+                channel_diameter=diameter, body_diameter=self.body[0], body_length=self.body[1]
+            )
+            entries.append(Calibration.model_construct(**(kept | middle), source=self.source, fitted_to=fitted_to))
+        names = {"shared_friction": "friction"}
+        values: dict[str, Any] = {
+            names.get(name, name): float(self._column(name, 0, self.middle))
+            for name in self.draws
+            if names.get(name, name) in FittedValues.model_fields
+        }
+        file = CalibrationFile.model_construct(
+            calibration={self.model: tuple(entries)} if entries else {},
+            fitted=FittedValues.model_construct(**values),
+            friction=self.frictions,
+        )
+        return calibrated_robot(robot, file)
+
+    @property
+    def frictions(self) -> tuple[FittedFriction, ...]:
+        """The middle of B_eff, tail by tail."""
+        tails: list[dict[str, Any]] = [
+            {**{key: item[key] for key in _TAIL}, "effective": max(item["value"], 0.0)} for item in self.friction
+        ]
+        return tuple(FittedFriction.model_construct(**tail) for tail in tails)
+
+    def _column(self, name: str, channel: int, values: Mapping[str, Samples] | None = None) -> Samples:
+        columns = (self.draws if values is None else values)[name]
+        return columns[..., min(channel, columns.shape[-1] - 1)]
+
+    def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
+        """Draws for one robot: those of the nearest channel, of which `central` takes the middle, and B_eff.
+
+        That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
+        with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
+        """
+        diameter = robot.channel.diameter if robot.channel else np.inf
+        nearest = nearest_channel(robot, self.channels)
+        found = {name: self._column(name, nearest) for name in self.draws}
+        for item in self.friction:
+            keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
+            fitted = tuple(item[key] for key in _TAIL)
+            if np.allclose(keys, fitted, rtol=1e-6, atol=0.0) and np.isfinite(item["high"] - item["low"]):
+                spread = (item["high"] - item["low"]) / (2.0 * 1.96)
+                size = next(iter(found.values())).size
+                found["friction"] = np.maximum(item["value"] + spread * rng.normal(size=size), 0.0)
+        own, others = friction_of_tails(robot, self.frictions)
+        if own is None and others:
+            size = next(iter(found.values())).size
+            found["friction"] = _of_another_tail(others, size, rng)
+        return found
+
+
+_ALONE = 0.3
+"""Standard deviation of log B_eff from tail to tail where a single tail tells nothing of it; assumed."""
+_FACTOR = 20.0
+"""Factor from the middle within which B_eff of another tail is taken to lie."""
+
+
+def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generator) -> Samples:
+    """Draws of B_eff of one more tail, given those of some."""
+    middle = float(np.median(others))
+    if middle <= 0:
+        return np.zeros(size)
+    logs = np.log(np.maximum(others, middle / _FACTOR))
+    count = len(others)
+    off = _ALONE * rng.normal(size=size)
+    if count > 1:
+        off = float(logs.std(ddof=1)) * np.sqrt(1.0 + 1.0 / count) * rng.standard_t(count - 1, size=size)
+    found: Samples = middle * np.exp(np.clip(off, -np.log(_FACTOR), np.log(_FACTOR)))
+    return found
+
+
+def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Samples]) -> str:
+    """Checksum over a posterior's draws and over what says how to read them.
+
+    Args:
+        attributes: attributes of the file.
+        values: draws by label.
+    """
+    found = hashlib.sha256()
+    for name in _CHECKED:
+        found.update(f"{name}={attributes[name]}\n".encode())
+    for name in sorted(values):
+        found.update(f"{name}\n".encode() + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
+    return found.hexdigest()
+
+
+def _possible(name: str, values: Samples) -> bool:
+    """Whether draws of a parameter lie where it is defined."""
+    above = np.all(values >= 0) if name in _MAY_BE_ZERO else np.all(values > 0)
+    return bool(np.all(np.isfinite(values)) and above)
+
+
+def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
+    """Read a posterior that a calibration has written.
+
+    Args:
+        path: the file.
+        models: models that are asked, of which it has to be one; none: any.
+
+    Raises:
+        InputError: if it is no such file, is damaged, has not converged, or is of another model.
+    """
+    import xarray as xr
+
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; allowed: {_WHAT}")
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; allowed: {_WHAT}")
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            attributes = {str(name): item for name, item in tree.attrs.items()}
+            if attributes.get("schema") != _SCHEMA:
+                raise InputError(f"{path} is no posterior of a calibration; allowed: {_WHAT}")
+            values = {str(name): np.asarray(item.values, float) for name, item in tree["posterior"].data_vars.items()}
+        whole = attributes["checksum"] == posterior_checksum(attributes, values)
+        found = _read(path, attributes, values, hashlib.sha256(path.read_bytes()).hexdigest())
+    except (OSError, ValueError, KeyError, TypeError, IndexError, RuntimeError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path} is no posterior, or damaged; allowed: {_WHAT}") from error
+    if not whole:
+        raise InputError(f"{path} is no posterior, or damaged (its checksum is another); allowed: {_WHAT}")
+    if not attributes.get("converged"):
+        raise InputError(
+            f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
+        )
+    if "gap" in found.draws or "pitch" in found.draws:
+        raise InputError(
+            f"{path} is of a model that computes the walls, which cannot solve a thousand places; allowed: its "
+            "calibration.toml as --calibration, or a posterior of sbt, rft or slender"
+        )
+    if models and found.model not in models:
+        asked = ", ".join(f"'{name}'" for name in models)
+        raise InputError(f"{path} is of model '{found.model}', not {asked}; allowed: --model {found.model}")
+    return found
+
+
+def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
+    channels = tuple(float(item) for item in json.loads(attributes["channels"]))
+    listed = json.loads(attributes["parameters"])
+    flat = {name: array.reshape(-1) for name, array in values.items()}
+    size = min(array.size for array in flat.values())
+    kept = np.linspace(0, size - 1, min(size, _DRAWS)).round().astype(int)
+    draws: dict[str, Samples] = {}
+    middle: dict[str, Samples] = {}
+    for name in dict.fromkeys(item["parameter"] for item in listed):
+        columns = sorted((item for item in listed if item["parameter"] == name), key=lambda item: item["channel"] or 0)
+        draws[name] = np.stack([flat[item["label"]][kept] for item in columns], axis=1)
+        middle[name] = np.array([np.median(flat[item["label"]]) for item in columns])
+    quantities = json.loads(attributes["quantities"])
+    body = json.loads(attributes["settings"])[0]["body"]
+    if not (draws and channels and all(_possible(name, array) for name, array in draws.items())):
+        raise InputError(f"{path} holds draws that are no numbers, or impossible ones; allowed: {_WHAT}")
+    sizes = [flat[f"{kind}_{name}"] for kind in ("discrepancy", "error") for name in quantities]
+    if not all(np.all(np.isfinite(array)) and np.all(array >= 0) for array in sizes):
+        raise InputError(f"{path} holds a discrepancy or an error that is none; allowed: {_WHAT}")
+    return PosteriorFile(
+        source=f"{path.name} ({attributes['observations']})",
+        sha256=sha256,
+        model=str(attributes["model"]),
+        observations=str(attributes["observations"]),
+        synthetic=bool(attributes["synthetic"]),
+        channels=channels,
+        body=(float(body["diameter"]), float(body["length"])),
+        draws=draws,
+        middle=middle,
+        discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in quantities},
+        error={name: flat[f"error_{name}"][kept] for name in quantities},
+        friction=tuple(json.loads(attributes["friction"])),
+        friction_reading=str(attributes["friction_reading"]),
+    )

@@ -1,0 +1,178 @@
+"""What has to be said where fitted numbers are used: whose B_eff it is, under which reading, and on what it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.fitted.calibration_file import (
+    CalibrationFile,
+    FittedFriction,
+    FittedValues,
+    friction_of_tails,
+    placement_in,
+    read_calibration,
+)
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.model import SwimmerModel
+from spirillum.robot.robot import Robot
+
+__all__ = ["Fitted", "fitted_of"]
+
+_COEFFICIENTS = ("normal_factor", "tangential_factor")
+"""Fitted fields that act on `rft` alone."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a calibration file or a posterior says of its friction and its origin."""
+
+    friction: tuple[FittedFriction, ...] = ()
+    """B_eff, tail by tail."""
+    reading: str = ""
+    """Reading of the friction under which it was inferred."""
+    synthetic: str = ""
+    """Name of the observations, if they say that they are synthetic."""
+    model: str = ""
+    """Model whose torque B_eff was inferred with."""
+    drawn: bool = False
+    """Whether it is a posterior, so that answers have intervals."""
+    file: CalibrationFile | None = None
+    """The calibration file; None without one."""
+    name: str = ""
+    """Its name."""
+
+    def serves(self, robot: Robot, model: SwimmerModel) -> bool:
+        """Whether anything of it acts on a robot's answer with a model.
+
+        Args:
+            robot: the robot.
+            model: the hydrodynamic model.
+        """
+        if self.file is None or model.name in self.file.calibration:
+            return True
+        left_out = () if model.name == "rft" else _COEFFICIENTS
+        values = [getattr(self.file.fitted, name) for name in FittedValues.model_fields if name not in left_out]
+        placed = model.placed and placement_in(self.file, robot) is not None
+        known = any(value is not None for value in values)
+        return placed or known or friction_of_tails(robot, self.friction) != (None, ())
+
+    def idle_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[str]:
+        """Models to which nothing of a calibration file applies.
+
+        Args:
+            robots: the robots that are answered for.
+            models: the models that answer.
+        """
+        replaced = self.file is not None and self.file.calibration
+        instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
+        return [
+            f"nothing in {self.name or 'the calibration'} is for model '{model.name}': {instead}"
+            for model in models
+            if not any(self.serves(robot, model) for robot in robots)
+        ]
+
+    def origin_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[str]:
+        """Whether anything of it that is used was measured.
+
+        Args:
+            robots: the robots that are answered for.
+            models: the models that answer.
+        """
+        if not self.synthetic or not any(self.serves(robot, model) for robot in robots for model in models):
+            return []
+        return [
+            f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
+        ]
+
+    def reading_warnings(self, readings: Sequence[str]) -> list[str]:
+        """Whether B_eff is used under another reading than the one under which it was inferred.
+
+        Args:
+            readings: those that are asked.
+        """
+        other = [name for name in readings if name in ("rotor", "paper") and name != self.reading]
+        if not (self.friction and self.reading and other):
+            return []
+        return [
+            f"B_eff was inferred under friction reading '{self.reading}' and is used under '{other[0]}', where it "
+            "means another torque: rates and speeds of that reading do not follow from the observations"
+        ]
+
+    def model_warnings(self, models: Sequence[str], readings: Sequence[str]) -> list[str]:
+        """Whether B_eff is used with another model than the one whose torque it was inferred with.
+
+        Args:
+            models: those that are asked.
+            readings: readings of the friction that are asked.
+        """
+        other = [name for name in models if name != self.model]
+        if not (self.friction and self.model and other and {"rotor", "paper"} & set(readings)):
+            return []
+        names = " and ".join(f"'{name}'" for name in other)
+        return [
+            f"B_eff was inferred with the torque of model '{self.model}' and is used with {names}, where it makes up "
+            "for another torque: rates and speeds of the robot's own drive do not follow from the observations there"
+        ]
+
+    def tail_warnings(self, robot: Robot) -> list[str]:
+        """Whose B_eff a robot that is driven by its own motor has."""
+        own, others = friction_of_tails(robot, self.friction)
+        if own is not None and own > 0:
+            return []
+        if own is not None:
+            return [
+                "B_eff of this tail came out negative in the calibration: zero is used, and the rates are upper bounds"
+            ]
+        if not others:
+            return []
+        return [
+            f"B_eff of this tail was not fitted: the middle of {len(others)} fitted tails is used, "
+            f"{np.median(others):.4g} N m s/rad; they range from {min(others):.4g} to {max(others):.4g}"
+        ]
+
+    def tails_warnings(self, robots: Sequence[Robot]) -> list[str]:
+        """The same for many robots, in one sentence."""
+        found = [friction_of_tails(robot, self.friction) for robot in robots]
+        unknown = sum(1 for own, others in found if own is None and others)
+        zero = sum(1 for own, _ in found if own is not None and own <= 0)
+        sentences = []
+        if unknown:
+            sentences.append(
+                f"B_eff of {unknown} of {len(robots)} tails was not fitted: the middle of the fitted tails in their "
+                "channel is used" + (", and intervals hold their spread" if self.drawn else "")
+            )
+        if zero:
+            sentences.append(
+                f"B_eff of {zero} of {len(robots)} tails came out negative in the calibration: zero is used"
+            )
+        return sentences
+
+
+def fitted_of(
+    calibration: str | Path | CalibrationFile | None, posterior: PosteriorFile | None, name: str = ""
+) -> Fitted:
+    """What the file that is used says.
+
+    Args:
+        calibration: calibration file; None without one.
+        posterior: posterior; None without one.
+        name: name of the calibration file, where it was read before.
+
+    Raises:
+        InputError: if the calibration file is wrong.
+    """
+    if posterior is not None:
+        source = posterior.observations if posterior.synthetic else ""
+        return Fitted(posterior.frictions, posterior.friction_reading, source, posterior.model, drawn=True)
+    if calibration is None:
+        return Fitted()
+    file = calibration if isinstance(calibration, CalibrationFile) else read_calibration(calibration)
+    provenance = file.provenance
+    synthetic = (provenance.observations or "the calibration") if provenance.synthetic else ""
+    said = name or ("" if isinstance(calibration, CalibrationFile) else str(calibration))
+    reading, model = provenance.friction_reading, provenance.model
+    return Fitted(file.friction, reading, synthetic, model, file=file, name=said)

@@ -1,0 +1,234 @@
+"""Resistive force theory, eqs (8)-(16): every piece of wire feels a force of its own, F = -C u.
+
+With c_n = c_b the local matrix R C R' of (12) is c_n I + (c_t - c_n) t t', so no Frenet frame is needed.
+The tail's matrix is constant in a frame that turns with it. Body and tail do not feel each other.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Tensors, Values, Vectors
+from spirillum.errors import InputError
+from spirillum.fluid.algebra import both_parts, joint_locked, skew, two_parts_axial
+from spirillum.fluid.closed.coefficients import axis_height, coefficient_domain, local_coefficients
+from spirillum.fluid.closed.perrin import body_axial, body_matrix
+from spirillum.fluid.closed.thin_wire import thin_wire_cautions
+from spirillum.fluid.model import SwimmerModel
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import centreline
+from spirillum.robot.limits import Limit
+from spirillum.robot.options import ModelOptions
+
+__all__ = ["Rft", "tail_axial", "tail_matrix"]
+
+_PANELS_PER_TURN = 7
+_NODES_PER_PANEL = 16  # 112 nodes per wavelength; the paper uses at least 100 intervals
+_ROOT_BREAKS = np.array([0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 13.0, 18.0, 26.0, 38.0])
+
+
+def tail_matrix(batch: RobotBatch, phase: PerRobot) -> Matrix6:
+    """B_t of eq. (12) about the origin, by Gauss-Legendre quadrature along the wire.
+
+    Args:
+        batch: the robots.
+        phase: phase phi of the tail, rad.
+    """
+    fraction, weight = _along_the_wire(batch)
+    b = batch
+    columns = {
+        "root": b.root,
+        "wavelength": b.wavelength,
+        "amplitude": b.amplitude,
+        "length": b.tail_length,
+        "taper": b.taper,
+        "hand": b.hand,
+        "phase": phase,
+    }
+    columns = {name: column[:, None] for name, column in columns.items()}
+    line = centreline(fraction * columns["length"], **columns)
+    ds = (
+        weight
+        * columns["length"]
+        * (line.stretch if b.options.rft.arc_element == "true" else 1.0 / b.arc_fraction[:, None])
+    )
+    local = _local_matrix(batch, line.tangent)
+    arm = skew(line.position)
+    upper = np.concatenate([local, -local @ arm], axis=-1)
+    lower = arm @ upper
+    if b.options.rft.spin:
+        lower[..., 3:] += _spin_coefficient(b)[:, None, None, None] * _outer(line.tangent)
+    total: Matrix6 = np.einsum("...i,...ijk->...jk", ds, np.concatenate([upper, lower], axis=-2))
+    return total
+
+
+def _along_the_wire(batch: RobotBatch) -> tuple[Values, Values]:
+    """Nodes and weights on [0, 1] of the axial length: even panels, finer where the tapered root bends."""
+    turns = float(np.max(batch.tail_length / batch.wavelength))
+    breaks = [np.linspace(0.0, 1.0, int(np.ceil(_PANELS_PER_TURN * turns)) + 1)]
+    breaks += [_ROOT_BREAKS / c for c in np.unique(batch.taper[np.isfinite(batch.taper)])]
+    edges = np.unique(np.concatenate(breaks))
+    edges = edges[edges <= 1.0]
+    node, weight = np.polynomial.legendre.leggauss(_NODES_PER_PANEL)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (1.0 + node)).ravel(), (half * weight).ravel()
+
+
+def _outer(vector: Vectors) -> Tensors:
+    return vector[..., :, None] * vector[..., None, :]
+
+
+def _local_matrix(batch: RobotBatch, tangent: Vectors) -> Tensors:
+    """R C R' of eq. (12): force per arc length and velocity, in body axes."""
+    c = local_coefficients(batch)
+    normal, tangential = c.normal[:, None, None, None], c.tangential[:, None, None, None]
+    local: Tensors = normal * np.eye(3) + (tangential - normal) * _outer(tangent)
+    if c.floor_normal is not None:
+        up = np.array([0.0, 0.0, 1.0]) - tangent[..., 2:] * tangent
+        across = up / np.linalg.norm(up, axis=-1, keepdims=True)
+        local = local + (c.floor_normal[:, None, None, None] - normal) * _outer(across)
+    return local
+
+
+def _spin_coefficient(batch: RobotBatch) -> PerRobot:
+    """4 pi mu a^2: torque per arc length and spin of a wire about its own tangent."""
+    return np.pi * batch.viscosity * batch.wire_diameter**2
+
+
+class _Integrand(NamedTuple):
+    """Axial entries per axial length."""
+
+    drag: Values
+    coupling: Values
+    rotation: Values
+
+
+def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """(B11, B14, B44) of eq. (12), averaged over the tail's phase where a floor makes them depend on it.
+
+    Away from the root the tail is a plain helix, whose integrand is constant; what the taper changes is
+    integrated in w = exp(-c xi/L_t) by Gauss-Legendre nodes in tau, sinh(tau) = (B_o c/L_t) w, where the
+    integrand is smooth however steep the root is.
+    """
+    plain = _axial_integrand(batch, np.zeros((1, 1)))
+    far = [batch.tail_length * entry[:, 0] for entry in plain]
+    tapered = np.isfinite(batch.taper)
+    if not np.any(tapered):
+        return far[0], far[1], far[2]
+    c = np.where(tapered, batch.taper, 1.0)[:, None]
+    steepness = batch.amplitude[:, None] * c / batch.tail_length[:, None]
+    hard = float(np.max(steepness)) > 10.0 or batch.options.rft.coefficients == "brennen-winet"
+    nodes = 64 if hard else 16
+    node, weight = np.polynomial.legendre.leggauss(nodes)
+    low, high = np.arcsinh(steepness * np.exp(-c)), np.arcsinh(steepness)
+    tau = low + 0.5 * (high - low) * (1.0 + node)
+    w = np.sinh(tau) / steepness
+    # dxi = (L_t/c) dw/w and dw/w = dtau/tanh(tau)
+    measure = np.where(tapered[:, None], batch.tail_length[:, None] / c, 0.0)
+    measure = measure * 0.5 * (high - low) * weight / np.tanh(tau)
+    near = _axial_integrand(batch, w)
+    root = [np.sum(measure * (entry - limit), axis=-1) for entry, limit in zip(near, plain, strict=True)]
+    return far[0] + root[0], far[1] + root[1], far[2] + root[2]
+
+
+def _axial_integrand(batch: RobotBatch, w: Values) -> _Integrand:
+    """Axial entries per axial length where the envelope is r = B_o (1 - w)."""
+    c = local_coefficients(batch)
+    normal, difference = c.normal[:, None], (c.tangential - c.normal)[:, None]
+    r = batch.amplitude[:, None] * (1.0 - w)
+    taper = np.where(np.isfinite(batch.taper), batch.taper, 0.0)
+    slope2 = ((batch.amplitude * taper / batch.tail_length)[:, None] * w) ** 2
+    turning = (2.0 * np.pi / batch.wavelength)[:, None] * r
+    turning2 = turning**2
+    along2 = 1.0 / (1.0 + slope2 + turning2)  # t_x^2
+    drag = normal + difference * along2
+    coupling = difference * turning * along2  # c_xth with t_x t_th = h k r t_x^2
+    rotation = normal + difference * turning2 * along2
+    if c.floor_normal is not None:  # the floor's part, averaged over the phase in closed form
+        extra = (c.floor_normal - c.normal)[:, None]
+        along = np.sqrt(along2)
+        across2 = np.maximum(slope2 + turning2, 1e-300)
+        share = turning2 / across2
+        drag = drag + extra * along * (1.0 - along)
+        coupling = coupling - extra * turning * along2 * along / (1.0 + along)
+        rotation = rotation + extra * (share * along2 * along + 1.0 - share) / (1.0 + along)
+    spin = _spin_coefficient(batch)[:, None] * along2 if batch.options.rft.spin else 0.0
+    arc = 1.0 / np.sqrt(along2) if batch.options.rft.arc_element == "true" else 1.0 / batch.arc_fraction[:, None]
+    hand = batch.hand[:, None]
+    return _Integrand(arc * drag, arc * hand * coupling * r, arc * (rotation * r**2 + spin))
+
+
+class Rft(SwimmerModel):
+    """Resistive force theory for the tail, Perrin's spheroid for the body."""
+
+    name = "rft"
+    title = "RFT"
+    references = ("biorob2012", "gray1955", "lighthill1976", "brennen1977", "katz1975", "jeffrey1981", "perrin1934")
+    known_error = (
+        "against a resolved wire (25, 2.5 mm) the printed coefficients give about +56 % drag, +22 % thrust and "
+        "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %, Lighthill's coefficients "
+        "+89, +97 and -12 %; body and tail do not interact, which alone adds some 15 % to the speed"
+    )
+    parts = ("body", "tail", "rotor", "robot")
+
+    def stated_error(self, options: ModelOptions) -> str:
+        """See `ResistanceModel.stated_error`; the near-floor coefficients were not compared with a resolved wire."""
+        chosen = options.rft.coefficients
+        if chosen != "brennen-winet":
+            return self.known_error
+        return (
+            f"the '{chosen}' coefficients have not been compared with a resolved wire here; sets differ from each "
+            "other by a factor of up to two in speed; body and tail do not interact, which alone adds some 15 % to it"
+        )
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """0 < c_t < c_n, and a wire clear of the floor."""
+        return coefficient_domain(batch)
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """A wire thin against its wave; with a floor, closer to it than the tail is long."""
+        cautions = thin_wire_cautions(batch, 2.6)
+        if batch.options.rft.coefficients == "brennen-winet":
+            cautions.append(
+                Limit.of(
+                    "model.rft.axis_height",
+                    axis_height(batch),
+                    "less than",
+                    batch.tail_length,
+                    "mm",
+                    "the near-floor coefficients hold for h well below the tail's length",
+                    "floor-too-far",
+                )
+            )
+        return cautions
+
+    def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
+        """See `ResistanceModel.placement_of`; the near-floor coefficients know the height of the tail's axis."""
+        if batch.options.rft.coefficients == "brennen-winet":
+            return {"kind": "above a plane floor", "tail_axis_height": quantity(float(axis_height(batch)[0]), "m")}
+        return super().placement_of(batch)
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`; with `model.rft.row4 = "zeroed"` not symmetric, as (15) is printed."""
+        drag, rotation = body_axial(batch)
+        r = two_parts_axial((drag, np.zeros(1), rotation), tail_axial(batch))
+        if batch.options.rft.row4 == "zeroed":
+            r[..., 3, 2] = 0.0
+        return r
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """See `SwimmerModel.resistance`."""
+        return both_parts(body_matrix(batch), tail_matrix(batch, phase))
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """See `ResistanceModel.part_matrix`; the rotor is the tail, since RFT leaves the coupling out."""
+        if part == "body":
+            return body_matrix(batch)
+        if part in ("tail", "rotor"):
+            return tail_matrix(batch, phase)
+        if part == "robot":
+            return joint_locked(self.resistance(batch, phase))
+        raise InputError(f"part = {part!r} with model 'rft'; allowed: {', '.join(self.parts)} (it has no coupling)")

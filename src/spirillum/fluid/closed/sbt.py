@@ -1,0 +1,149 @@
+"""Lighthill's slender-body theory of a helix, eqs (1)-(7), as an axial resistance block.
+
+For uniform axial and azimuthal forces per arc length (f_x, f_th), Lighthill's theorem averaged along the
+wire gives (u_x, u_th) = M (f_x, f_th)/(4 pi mu) with
+
+    M = [[Psi/1.5, alpha beta q], [alpha beta q, 1/chi]],   q = -1 - log(eps) + A1,   beta^2 = 1 - alpha^2.
+
+Its inverse is the tail's symmetric block; the ordinary force balance with the body's D_x and E_x then
+reproduces (1), (2), (4) and (5). `L_t` of the printed equations is the wire's arc length.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot
+from spirillum.errors import InputError
+from spirillum.fluid.algebra import two_parts_axial
+from spirillum.fluid.closed.lighthill_integrals import ALPHA_MIN, lighthill_integrals
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.closed.thin_wire import (
+    EXACT_EPS_CONSTANT,
+    PRINTED_EPS_CONSTANT,
+    cutoff,
+    thin_wire_cautions,
+)
+from spirillum.fluid.model import SwimmerModel
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit
+
+__all__ = ["HelixFunctions", "Sbt", "helix_functions", "tail_axial"]
+
+
+class HelixFunctions(NamedTuple):
+    """Lighthill's dimensionless functions of a helix."""
+
+    alpha: PerRobot
+    """Axial over arc length."""
+    q: PerRobot
+    """-1 - log(eps) + A1, the bracket of (1) and (7)."""
+    torque: PerRobot
+    """1/chi, the inverse of eq. (3)."""
+    Psi: PerRobot
+    """Velocity reduction of a towed helix, eq. (6)."""
+    psi: PerRobot
+    """Velocity reduction of a swimming helix, eq. (7)."""
+
+
+def _eps_constant(batch: RobotBatch) -> float:
+    return EXACT_EPS_CONSTANT if batch.options.sbt.eps_constant == "exact" else PRINTED_EPS_CONSTANT
+
+
+def helix_functions(batch: RobotBatch) -> HelixFunctions:
+    """chi, Psi, psi of eqs (3), (6), (7); NaN for alpha outside the expansion of A1, A2, A3."""
+    alpha = batch.arc_fraction
+    a1, a2, a3 = lighthill_integrals(alpha)
+    log_eps = np.log(cutoff(batch, _eps_constant(batch)))
+    alpha2 = alpha * alpha
+    log_kl = np.log(2.0 * np.pi * batch.tail_length / batch.wavelength)  # k L_t: 2 pi times the turns
+    q = -1.0 - log_eps + a1
+    torque = -(1.0 - alpha2) - (2.0 - alpha2) * log_eps + alpha2 * a1 + 2.0 * (1.0 - alpha2) * a2  # (3)
+    big_psi = 1.5 * (
+        2.0 - alpha2 - 3.0 / alpha + 2.0 / alpha * log_kl - (1.0 + alpha2) * log_eps - 2.0 * a3 - (1.0 - alpha2) * a1
+    )  # (6)
+    small_psi = big_psi - 1.5 * alpha2 * (1.0 - alpha2) * q * q / torque  # (7)
+    return HelixFunctions(alpha, q, torque, big_psi, small_psi)
+
+
+def tail_axial(batch: RobotBatch) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """(B11, B14, B44) of the tail: 4 pi mu l diag(1, B_o) M^-1 diag(1, B_o), and the wire's own spin if asked for."""
+    f = helix_functions(batch)
+    towed = f.Psi / 1.5
+    mixed = f.alpha * np.sqrt(1.0 - f.alpha**2) * f.q
+    scale = 4.0 * np.pi * batch.viscosity * batch.arc_length / (towed * f.torque - mixed**2)
+    b = batch.amplitude
+    rotation = scale * b * b * towed
+    if batch.options.sbt.spin:
+        rotation = rotation + np.pi * batch.viscosity * (batch.wire_diameter * f.alpha) ** 2 * batch.arc_length
+    return scale * f.torque, -batch.hand * scale * b * mixed, rotation
+
+
+class Sbt(SwimmerModel):
+    """Lighthill's slender-body theory for the tail, Perrin's spheroid for the body; axial entries only."""
+
+    name = "sbt"
+    title = "SBT"
+    references = ("lighthill1976", "biorob2012", "perrin1934")
+    known_error = (
+        "a long plain helix with uniform forces: end effects decay as one over the number of turns, thick-wire "
+        "effects as eps^2; body and tail do not interact, which alone overestimates the speed by about 15 %; "
+        "the wire's own spin, some 8 % of the axial torque, is an option"
+    )
+    parts = ("body", "tail", "rotor", "robot")
+    axial_only = True
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """Alpha within the expansion; chi, q and psi positive, so that the block is positive definite."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            f = helix_functions(batch)
+        limits = [
+            Limit.of(
+                "tail.amplitude",
+                batch.amplitude,
+                "at most",
+                batch.wavelength * np.sqrt(ALPHA_MIN**-2 - 1.0) / (2.0 * np.pi),
+                "mm",
+                f"slender-body theory is tabulated for alpha from {ALPHA_MIN:g} to 1",
+                "coil-too-tight",
+            )
+        ]
+        inside = limits[0].holds
+        why = "the wire (tail.wire_diameter) is too thick, or the helix too short, for slender-body theory"
+        for name, value in (("1/chi", f.torque), ("q", f.q), ("Psi", f.Psi), ("psi", f.psi)):
+            limit = Limit.of(f"{name} of eqs (1)-(7)", value, "more than", 0.0, "1", why, "outside-slender-body-theory")
+            limits.append(replace(limit, holds=limit.holds | ~inside))
+        return limits
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """A wire thin against its wave, and at least one turn."""
+        return thin_wire_cautions(batch, _eps_constant(batch))
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`."""
+        drag, rotation = body_axial(batch)
+        return two_parts_axial((drag, np.zeros(1), rotation), tail_axial(batch))
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """See `SwimmerModel.resistance`; all but the axial entries are NaN."""
+        r = np.full((batch.size, 12, 12), np.nan)
+        axial = np.array([0, 3, 6, 9])
+        r[:, axial[:, None], axial] = self.axial(batch)
+        return r
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """See `ResistanceModel.part_matrix`; all but the axial entries are NaN."""
+        if part not in self.parts:
+            raise InputError(f"part = {part!r} with model 'sbt'; allowed: {', '.join(self.parts)} (it has no coupling)")
+        drag, rotation = body_axial(batch)
+        body = (drag, np.zeros(1), rotation)
+        tail = tail_axial(batch)
+        chosen = {"body": (body,), "robot": (body, tail)}.get(part, (tail,))
+        b11, b14, b44 = (sum(entries) for entries in zip(*chosen, strict=True))
+        matrix = np.full((batch.size, 6, 6), np.nan)
+        matrix[:, 0, 0], matrix[:, 3, 3] = b11, b44
+        matrix[:, 0, 3] = matrix[:, 3, 0] = b14
+        return matrix

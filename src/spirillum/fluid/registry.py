@@ -1,0 +1,62 @@
+"""The models by name."""
+
+from __future__ import annotations
+
+from spirillum.errors import InputError, did_you_mean
+from spirillum.fluid.closed.perrin import Perrin
+from spirillum.fluid.closed.rft import Rft
+from spirillum.fluid.closed.sbt import Sbt
+from spirillum.fluid.model import ResistanceModel, SwimmerModel
+from spirillum.fluid.tube.model import Tube
+from spirillum.fluid.wire.slender import Slender
+from spirillum.robot.fields import field_values
+from spirillum.robot.placement import Placement
+
+__all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model"]
+
+SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender(), Tube())}
+"""Models that make a robot swim."""
+MODELS: dict[str, ResistanceModel] = {**SWIMMER_MODELS, "perrin": Perrin()}
+"""Models that give a resistance matrix."""
+
+
+def find_model(name: str) -> ResistanceModel:
+    """The model of that name.
+
+    Raises:
+        InputError: if there is none.
+    """
+    if str(name) not in MODELS:
+        raise InputError(f"model = {name!r}{did_you_mean(str(name), MODELS)}; allowed: {', '.join(MODELS)}")
+    return MODELS[name]
+
+
+def find_swimmer_model(name: str) -> SwimmerModel:
+    """The model of that name that makes a robot swim.
+
+    Raises:
+        InputError: if there is none.
+    """
+    if str(name) not in SWIMMER_MODELS:
+        hint = did_you_mean(str(name), SWIMMER_MODELS)
+        raise InputError(f"model = {name!r}{hint}; allowed: {', '.join(SWIMMER_MODELS)}")
+    return SWIMMER_MODELS[name]
+
+
+def check_placement(placement: Placement, *models: ResistanceModel) -> None:
+    """Refuse a placement in the channel that none of the models asks for.
+
+    Raises:
+        InputError: if something is placed and no model computes the walls.
+    """
+    if not placement.is_given or any(model.placed for model in models):
+        return
+    unset = type(placement)()
+    given = next(item for item in field_values(placement) if item.value != getattr(unset, item.path))
+    shown = f"{given.value:g} {given.unit}" if given.unit else str(given.value)
+    names = " or ".join(f"'{model.name}'" for model in models)
+    walled = ", ".join(name for name, model in MODELS.items() if model.placed)
+    raise InputError(
+        f"placement.{given.path} = {shown} with model {names}, which does not compute the channel's walls; allowed: "
+        f"{f'only with model {walled}' if walled else 'no placement'}"
+    )

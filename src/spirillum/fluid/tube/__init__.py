@@ -1,0 +1,1 @@
+"""The model `tube`: the resolved robot in a circular tube, with no calibrated factor."""

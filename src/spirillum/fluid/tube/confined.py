@@ -1,0 +1,255 @@
+"""Body, coupling and tail in a circular tube: the coupled flow with the wall, for all rigid motions at once.
+
+Solids and wall are factored once for a place in the tube (`tube_solids`); every tail at every phase is solved against
+them by conjugate gradients on the forces along its wire, which meet the wall by the same waves.
+
+Inside, axes are x along the robot, y up, z to the right; answers come in body axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.algebra import axis_rotation
+from spirillum.fluid.tube.solids import MOTIONS, Solids
+from spirillum.fluid.tube.wall import Seat, point_reflection, waves_between
+from spirillum.fluid.wire.interaction import one_thread, share
+from spirillum.fluid.wire.sources import Sources
+from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
+
+__all__ = ["Held", "Strengths", "held_in_tube"]
+
+_EIGHT_PI = 8.0 * np.pi
+_RESIDUAL = 1e-7
+_MOST_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Strengths:
+    """What solids and wires do to the fluid, for each of the 12 unit twists and the flow held back; viscosity 1."""
+
+    solids: Solids
+    """Solids, with the unknowns of `tractions`."""
+    tractions: tuple[Samples, Samples]
+    """Modes of the tractions, even and odd, (unknowns, 13)."""
+    wires: tuple[Wire, ...]
+    """Wires, in the axes used here."""
+    forces: Samples
+    """At the wires' stations, in the axes used here, (3 stations, 13)."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the robot feels for each of the 12 unit twists, and in the flow of unit mean velocity; viscosity 1."""
+
+    matrix: Samples
+    """R for zero net flux, 12x12, made symmetric; zero for a part that is not there."""
+    load: Samples
+    """Wrenches on the robot at rest in the flow of unit mean velocity, (12,)."""
+    drag: float
+    """Work of the tractions at rest in that flow against it, over the mean velocity squared."""
+    asymmetry: float
+    """What the matrix lacked in symmetry (reciprocity), relative to the geometric mean of diagonal entries."""
+    strengths: Strengths = field(repr=False)
+    """Where it comes from."""
+
+
+def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float = 0.0) -> Held:
+    """Resistance of two rigid parts in a tube with no net flux, twists about the origin.
+
+    Args:
+        solids: solids and wall.
+        wires: wires at their phase, in body axes, and the part (0 body, 1 rotor) with which each moves.
+        drop: how far the wires lie below where they turn, m.
+    """
+    with one_thread():
+        if solids.none:
+            return _wires_alone(_Link.of(solids, wires, drop))
+        matrix = solids.wrenches(solids.moving)
+        tractions, forces = solids.moving, np.zeros((0, MOTIONS))
+        lines: tuple[Wire, ...] = ()
+        if wires:
+            link = _Link.of(solids, wires, drop)
+            strengths = _conjugate_gradients(link, link.motion - solids.wrenches(solids.moving, link.sent))
+            answer = [solids.solve(parity, link.sent[parity] @ strengths) for parity in (0, 1)]
+            matrix = matrix + link.motion.T @ strengths - solids.wrenches(answer)
+            matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
+            even, odd = (moving - lost for moving, lost in zip(solids.moving, answer, strict=True))
+            tractions, lines = (even, odd), link.wires
+            forces = strengths[: sum(line.points.size for line in lines)]
+    found = Strengths(solids, (_EIGHT_PI * tractions[0], _EIGHT_PI * tractions[1]), lines, _EIGHT_PI * forces)
+    return _held(_EIGHT_PI * matrix, found)
+
+
+def _wires_alone(link: _Link) -> Held:
+    from scipy.linalg import cho_factor, cho_solve
+
+    strengths = cho_solve(cho_factor(link.mobility, lower=True, check_finite=False), link.motion, check_finite=False)
+    matrix = link.motion.T @ strengths
+    matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
+    forces = strengths[: sum(line.points.size for line in link.wires)]
+    nothing = np.zeros((0, MOTIONS))
+    return _held(_EIGHT_PI * matrix, Strengths(link.solids, (nothing, nothing), link.wires, _EIGHT_PI * forces))
+
+
+def turned_motions() -> Samples:
+    """From the 13 motions in the axes used here to those in body axes, (13, 13)."""
+    turn = np.eye(MOTIONS)
+    quarter = axis_rotation(np.array([0.5 * np.pi]))[0]
+    for first in range(0, MOTIONS - 1, 3):
+        turn[first : first + 3, first : first + 3] = quarter
+    return turn
+
+
+def _held(full: Samples, strengths: Strengths) -> Held:
+    turn = turned_motions()
+    full = turn @ full @ turn.T
+    matrix, load = full[:-1, :-1], 0.5 * (full[:-1, -1] + full[-1, :-1])
+    there = np.diag(matrix) > 0
+    scale = np.sqrt(np.diag(matrix)[there])
+    lack = (matrix - matrix.T)[np.ix_(there, there)] / np.outer(scale, scale)
+    asymmetry = float(np.max(np.abs(lack), initial=0.0))
+    return Held(0.5 * (matrix + matrix.T), load, float(full[-1, -1]), asymmetry, strengths)
+
+
+@dataclass(frozen=True)
+class _Link:
+    """Equations of the wires in the tube, and what they send to the solids."""
+
+    solids: Solids
+    wires: tuple[Wire, ...]
+    system: WireSystem
+    mobility: Samples
+    """Of the wires with the wall, the solids not there."""
+    motion: Samples
+    """Velocities at the stations (and gradients along moments), (3 n + q n, 13)."""
+    sent: tuple[Samples, ...]
+    """Velocities on the solids from unit forces and moments at the stations, even and odd; nothing without solids."""
+
+    @classmethod
+    def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:
+        turned = [(_turned(wire), part) for wire, part in wires]
+        system = wire_system(turned, solids.fineness.wire)
+        lines = tuple(_lowered(wire, drop) for wire, _ in turned)
+        points = np.concatenate([wire.points for wire in lines])
+        seat, forces = solids.seat, 3 * len(points)
+        placed = seat.placed(points)
+        distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
+        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.damping)
+        along = np.kron(np.eye(len(points)), seat.rotation)  # from forces in robot axes to those in the tube's
+        mobility = system.mobility.copy()
+        mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
+        start = 0
+        for wire in lines:
+            here = slice(start, start + wire.points.size)
+            mobility[here, here] += _near_wall(wire, seat)
+            start = here.stop
+        motion = np.zeros((len(system.motion), MOTIONS))
+        motion[:, : MOTIONS - 1] = system.motion
+        speed = 2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / seat.radius**2
+        motion[:forces, MOTIONS - 1] = (speed[:, None] * seat.rotation[0]).ravel()
+        if solids.none:
+            return cls(solids, lines, system, mobility, motion, ())
+        sent = _sent_unbounded(solids, lines, system)
+        waves = solids.waves(0.5 * (solids.gap + distance), placed)
+        for family, wall in zip(sent, solids.rings.sent(waves, solids.rows, placed), strict=True):
+            family[:, :forces] -= wall @ along
+        return cls(solids, lines, system, mobility, motion, sent)
+
+    def apply(self, strengths: Samples) -> Samples:
+        """Velocities at the stations from forces and moments there, the solids held."""
+        answer = [self.solids.solve(parity, self.sent[parity] @ strengths) for parity in (0, 1)]
+        velocities: Samples = self.mobility @ strengths - self.solids.wrenches(answer, self.sent)
+        return velocities
+
+
+def _near_wall(wire: Wire, seat: Seat) -> Samples:
+    """What a line of forces lacks of a wire of finite thickness at a wall, (3 n, 3 n), robot axes.
+
+    A straight line at a height h over a plane has mobilities per length 4 log(2 h/a), 2 log(2 h/a) and
+    2 log(2 h/a) - 2 along itself, sideways and towards the plane, without the factor 1/(8 pi mu); a cylinder has
+    arccosh(h/a) in place of the logarithm, and 2 sqrt(1 - (a/h)^2) in place of 2 (Jeffrey and Onishi, 1981). The
+    difference is spread over a length h of the wire, for shorter waves of force do not feel the wall.
+    """
+    placed, tangents = seat.placed(wire.points), wire.tangents @ seat.rotation.T
+    rho = np.hypot(placed[:, 1], placed[:, 2])
+    height = seat.radius - rho
+    ratio = height / wire.radius
+    outward = placed * np.array([0.0, 1.0, 1.0]) / np.maximum(rho, 1e-300)[:, None]
+    normal = outward - np.sum(outward * tangents, axis=1, keepdims=True) * tangents
+    missing = np.arccosh(ratio) - np.log(2.0 * ratio)
+    film = 1.0 - np.sqrt(1.0 - ratio**-2)
+    local = missing[:, None, None] * (np.eye(3) + _dyads(tangents)) + film[:, None, None] * _dyads(normal)
+    local = 2.0 * seat.rotation.T @ local @ seat.rotation
+    apart = np.linalg.norm(wire.points[:, None] - wire.points, axis=-1)
+    width = 0.5 * (height[:, None] + height)
+    spread = np.exp(-0.5 * (apart / width) ** 2) / (np.sqrt(2.0 * np.pi) * width)
+    both = 0.5 * spread[:, :, None, None] * (local[:, None] + local)
+    matrix: Samples = both.swapaxes(1, 2).reshape(3 * len(placed), -1)
+    return matrix
+
+
+def _dyads(vectors: Samples) -> Samples:
+    products: Samples = vectors[:, :, None] * vectors[:, None, :]
+    return products
+
+
+def _turned(wire: Wire) -> Wire:
+    """In the axes used here: (x, y, z) of the body are (x, -z, y)."""
+    swap = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    return Wire(wire.points @ swap.T, wire.tangents @ swap.T, wire.lengths, wire.radius)
+
+
+def _lowered(wire: Wire, drop: float) -> Wire:
+    return Wire(wire.points - np.array([0.0, drop, 0.0]), wire.tangents, wire.lengths, wire.radius)
+
+
+def _sent_unbounded(solids: Solids, wires: tuple[Wire, ...], system: WireSystem) -> tuple[Samples, Samples]:
+    """Velocities on the solids from unit forces and moments at the stations, without the wall."""
+    sources = Sources.of(wires, system)
+    modes: tuple[list[Samples], list[Samples]] = ([], [])
+    for last, bearing in solids.tiers:
+        cross = sources.velocities(solids.panels.of_solids(bearing), last)
+        rows = np.flatnonzero(np.repeat(bearing[solids.panels.solid_of_node], 3))
+        for m in range(len(modes[0]), last):
+            turn = sources.turn(m, cross[m].shape[1])
+            for family, phase in zip(modes, (turn.real, turn.imag), strict=True):
+                whole = np.zeros((3 * solids.panels.size, len(system.mobility)))
+                whole[rows] = sources.columns(share(m) * cross[m] * phase)
+                family.append(whole)
+    even, odd = (rows.gathered(family) for rows, family in zip(solids.rows, modes, strict=True))
+    return even, odd
+
+
+def _conjugate_gradients(link: _Link, velocities: Samples) -> Samples:
+    """Forces and moments along the wires from velocities there, solids and wall answering; every column by itself."""
+    from scipy.linalg import cho_factor, cho_solve
+
+    factor = cho_factor(link.mobility, lower=True, check_finite=False)
+
+    def dot(a: Samples, b: Samples) -> Samples:
+        product: Samples = np.einsum("ij,ij->j", a, b)
+        return product
+
+    found: Samples = cho_solve(factor, velocities, check_finite=False)
+    enough = _RESIDUAL**2 * dot(velocities, found)
+    residual = velocities - link.apply(found)
+    direction = step = cho_solve(factor, residual, check_finite=False)
+    norm = dot(residual, step)
+    for _ in range(_MOST_STEPS):
+        open_ = norm > enough
+        if not np.any(open_):
+            break
+        moved = link.apply(direction)
+        length = np.where(open_, norm / np.where(open_, dot(direction, moved), 1.0), 0.0)
+        found = found + length * direction
+        residual = residual - length * moved
+        step = cho_solve(factor, residual, check_finite=False)
+        fresh = dot(residual, step)
+        direction = step + np.where(open_, fresh / np.where(open_, norm, 1.0), 0.0) * direction
+        norm = np.where(open_, fresh, norm)
+    return found

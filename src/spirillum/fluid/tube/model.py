@@ -1,0 +1,275 @@
+"""The robot in its tube: confinement computed from first principles, with no calibrated factor.
+
+Body and coupling are as they are, the tail is a wire, the glass is a circular cylinder, and the flow between them all
+is solved for (`confined`). The answer depends on where the robot lies and on the tail's phase. No net flux passes the
+tube in that solution; open ends and an imposed flow follow from one scalar, the mean velocity U_m:
+
+    8 pi mu L_eff U_m = load . V - drag U_m,    L_eff = L_ch + 1.09 R,
+
+with the wrench `load` and the work `drag` of the flow of unit mean velocity past the robot at rest (reciprocal
+theorem). The two losses at the ends of a free, thin-walled tube together are worth 1.09 R of its length, computed with
+the tube's own wall meshed in an unbounded bath (`benchmarks/tube_reference.py`); a flange or a thick wall at both ends
+makes 3 pi R/8 of it (Dagan, Weinbaum and Pfeffer, J. Fluid Mech. 115:505, 1982).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Axial, AxialLoad, Flags, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.algebra import axis_rotation, joint_locked
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.cache import kept_or_computed
+from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.place import Place, number_of, place_of, placement_answer, seat_limits
+from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids
+from spirillum.fluid.wire.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
+from spirillum.fluid.wire.slender import Slender
+from spirillum.fluid.wire.stokeslets import Wire
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.options import ModelOptions
+from spirillum.robot.outline import Outline
+
+__all__ = ["END_LOSS", "Tube", "held_robot"]
+
+END_LOSS = 1.09
+"""Length of tube over R that the losses at both open ends are worth."""
+_CUT = 0.2
+"""Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
+_COARSER = 10.0
+"""The same of the resolution that gives the error estimate."""
+_COARSEST = 0.05
+"""Coarsest tolerance of Fourier modes."""
+_MOST_WAVES = 1_000_000
+"""Orders and wave numbers together: minutes."""
+_MOST_UNKNOWNS = 11_000
+"""Of one parity: 2 GiB for the factors of both."""
+
+
+def _near(g: Geometry) -> Samples:
+    """Where any tail's root may be, behind the coupling: (x, rho, blob radius), the same for all tails of a robot."""
+    widest = max(0.5 * g.coupling_diameter, 4.0 * g.wire_diameter)
+    rho = np.linspace(0.0, widest, 9)
+    blob = wire_of_geometry(g, 1.0).blob
+    return np.stack([np.full(9, -0.5 * g.body_length - g.coupling_length), rho, np.full(9, blob)], axis=1)
+
+
+class _SolidKey(NamedTuple):
+    """All that decides the solids and the wall."""
+
+    solids: tuple[tuple[Outline, int], ...]
+    near: tuple[tuple[float, ...], ...]
+    place: Place
+    fineness: Fineness
+
+
+def _solid_key(g: Geometry, part: str, place: Place, fineness: Fineness) -> _SolidKey:
+    solids = tuple((outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part])
+    near = tuple(map(tuple, _near(g).tolist())) if "tail" in PIECES[part] else ()
+    return _SolidKey(solids, near, place._replace(drop=0.0), fineness)
+
+
+@lru_cache(maxsize=1)
+def _solids(key: _SolidKey) -> Solids:
+    """The last one is kept: tails at one place come one after the other, and factors take memory."""
+    return Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+
+
+@lru_cache(maxsize=4096)
+def _size(key: _SolidKey) -> int:
+    """Number of unknowns of one parity."""
+    return Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3)).size
+
+
+@lru_cache(maxsize=4096)
+def _waves(key: _SolidKey) -> int:
+    """Number of waves between solids and wall."""
+    solids = Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    return 0 if solids.none else sum(solids.waves(solids.gap).orders)
+
+
+def _turned(wire: Wire, phase: float) -> Wire:
+    turn = axis_rotation(np.array([phase]))[0]
+    return Wire(wire.points @ turn.T, wire.tangents @ turn.T, wire.lengths, wire.radius)
+
+
+class _Question(NamedTuple):
+    """All that decides an answer, but for the viscosity and the ends."""
+
+    geometry: Geometry
+    part: str
+    place: Place
+    fineness: Fineness
+    phase: float
+
+
+def _held(question: _Question) -> Held:
+    g, part, place, fineness, phase = question
+    wires = [(_turned(wire_of_geometry(g, 1.0), phase), 1)] if "tail" in PIECES[part] else []
+    return held_in_tube(_solids(_solid_key(g, part, place, fineness)), wires, place.drop)
+
+
+def _computed(question: _Question) -> Samples:
+    """R, load and drag for viscosity 1, as one (13, 13)."""
+    held = _held(question)
+    if np.min(np.diag(held.matrix)) < 0:
+        raise InputError(
+            "the flow in the tube is not resolved at this placement.gap; allowed: a wider gap or a finer tolerance"
+        )
+    found = np.empty((MOTIONS, MOTIONS))
+    found[:-1, :-1], found[:-1, -1], found[-1, :-1], found[-1, -1] = held.matrix, held.load, held.load, held.drag
+    return found
+
+
+@lru_cache(maxsize=4096)
+def _answer(question: _Question) -> Samples:
+    found = kept_or_computed(question, _computed)
+    found.flags.writeable = False
+    return found
+
+
+def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
+    """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux.
+
+    Args:
+        batch: robots inside the domain of the model.
+        index: which.
+        phase: of the tail, rad.
+    """
+    fineness = Tube().fineness(batch.options)
+    return _held(_Question(Geometry.of(batch, index), "robot", place_of(batch, index), fineness, phase))
+
+
+class Tube(SwimmerModel):
+    """Body, coupling and tail in their tube, and all the flow between them and the wall."""
+
+    name = "tube"
+    title = "tube"
+    references = ("happel1983", "cortez2001", "pozrikidis1992", "dagan1982", "biorob2012")
+    known_error = (
+        "no calibrated factor: the walls are computed; what the paper does not tell, the gap under the body and its "
+        "pitch, decides much of the answer"
+    )
+    parts = ("body", "coupling", "tail", "rotor", "robot")
+    closed_form = False
+    placed = True
+
+    def __init__(self, coarser: float = 1.0) -> None:
+        """Resolve the flow to each robot's `model.tube.tolerance`, or more coarsely by a factor."""
+        self._coarser = coarser
+
+    def fineness(self, options: ModelOptions) -> Fineness:
+        """How finely the flow is resolved with these options."""
+        return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST))
+
+    def checked_by(self, options: ModelOptions) -> SwimmerModel:
+        """See `SwimmerModel.checked_by`."""
+        return Tube(_COARSER)
+
+    def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
+        """See `ResistanceModel.placement_of`."""
+        if not np.all(all_hold(self.domain(batch))):
+            return {"kind": "in the channel"}
+        return placement_answer(batch)
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """What `slender` asks for, and a place in a tube where the flow can be resolved."""
+        return self.part_domain(batch, "robot")
+
+    def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
+        """See `ResistanceModel.part_domain`."""
+        limits = [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
+        fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch) + limits), (batch.size,))
+        unknowns, waves = np.zeros(batch.size), np.zeros(batch.size)
+        for index in np.flatnonzero(fit).tolist():
+            g = Geometry.of(batch, index)
+            unknowns[index] = _size(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+            if unknowns[index] <= _MOST_UNKNOWNS:
+                waves[index] = _waves(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+        name, why = (
+            "that gap and tolerance ask for",
+            "a wider placement.gap, a larger model.tube.tolerance or a narrower",
+        )
+        asked = (("unknowns", unknowns, _MOST_UNKNOWNS), ("waves", waves, _MOST_WAVES))
+        return limits + [
+            Limit.of(f"{what} {name}", count, "at most", float(most), "1", f"{why} channel needs fewer", "gap-too-thin")
+            for what, count, most in asked
+        ]
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`: the average over `model.tube.phases` phases, ends condensed."""
+        answers, _ = self._axial(batch)
+        return answers[:, :4, :4]
+
+    def axial_load(self, batch: RobotBatch) -> AxialLoad:
+        """See `SwimmerModel.axial_load`."""
+        answers, _ = self._axial(batch)
+        return (batch.placement.flow or 0.0) * answers[:, :4, 4]
+
+    def mean_flow(self, batch: RobotBatch) -> MeanFlow:
+        """See `SwimmerModel.mean_flow`."""
+        return self._axial(batch)[1]
+
+    def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
+        """R and load along the tube and about the motor axis, (n, 5, 5), and the mean flow, (n, 5)."""
+        phases = 2.0 * np.pi * np.arange(batch.options.tube.phases) / batch.options.tube.phases
+        along = np.zeros((5, MOTIONS))
+        along[[1, 3, 4], [3, 9, 12]] = 1.0
+        pitch = batch.placement.pitch or 0.0
+        for row, first in ((0, 0), (2, 6)):
+            along[row, first], along[row, first + 2] = np.cos(pitch), -np.sin(pitch)
+        answers, flows = np.zeros((batch.size, 5, 5)), np.zeros((batch.size, 5))
+        for phase in phases:
+            full = along @ self._full(batch, "robot", np.array([phase])) @ along.T
+            condensed, flow = self._with_ends(batch, full)
+            answers += condensed / len(phases)
+            flows += flow / len(phases)
+        return answers, flows
+
+    def _with_ends(self, batch: RobotBatch, full: Samples) -> tuple[Samples, Samples]:
+        """Ends condensed: (n, k, k) with the flow as last row and column, and the mean flow that goes with motions."""
+        length, radius = (
+            np.broadcast_to(v, (batch.size,)) for v in (batch.channel_length, 0.5 * batch.channel_diameter)
+        )
+        flow = np.zeros(full.shape[:2])
+        opened = np.array([batch.placement.ends_of(float(value)) == "open" for value in length])
+        if batch.placement.flow is not None:
+            flow[:, -1] = batch.placement.flow
+        if np.any(opened):
+            viscosity = np.broadcast_to(batch.viscosity, (batch.size,))
+            against = 8.0 * np.pi * viscosity * (length + END_LOSS * radius) + full[:, -1, -1]
+            flow[:, :-1] = np.where(opened[:, None], full[:, :-1, -1] / against[:, None], 0.0)
+            full = full.copy()
+            full[:, :-1, :-1] -= flow[:, :-1, None] * full[:, None, :-1, -1]
+        return full, flow
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """See `SwimmerModel.resistance`; about the origin in body axes, ends condensed."""
+        return self._with_ends(batch, self._full(batch, "robot", phase))[0][:, :-1, :-1]
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """See `ResistanceModel.part_matrix`; that part alone in the channel, where the robot lies."""
+        if part not in self.parts:
+            raise InputError(f"part = {part!r} with model 'tube'; allowed: {', '.join(self.parts)}")
+        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
+            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
+        return joint_locked(self._with_ends(batch, self._full(batch, part, phase))[0][:, :-1, :-1])
+
+    def _full(self, batch: RobotBatch, part: str, phase: PerRobot) -> Samples:
+        """R, load and drag of a part, (n, 13, 13), no net flux; NaN outside the domain."""
+        found = np.full((batch.size, MOTIONS, MOTIONS), np.nan)
+        limits = assembly_limits(batch) + self.part_domain(batch, part)
+        answerable: Flags = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
+        fineness = self.fineness(batch.options)
+        turns = np.broadcast_to(phase, (batch.size,))
+        for index in np.flatnonzero(answerable):
+            g, place = Geometry.of(batch, int(index)), place_of(batch, int(index))
+            turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
+            question = _Question(g, part, place, fineness, turn)
+            found[index] = number_of(batch.viscosity, int(index)) * _answer(question)
+        return found

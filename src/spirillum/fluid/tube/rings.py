@@ -1,0 +1,381 @@
+"""Solids of revolution in a tube: the wall's waves as Fourier modes on their rings, about their own axis.
+
+Axes here: x along the robot, y up, z to the right; angles count from y.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.wall import Seat, Waves, each, extensions, point_waves, times_layers, weighted_layers
+from spirillum.fluid.wire.revolution import Panels
+
+__all__ = ["LevelRings", "Rings", "Rows", "TiltedRings"]
+
+_FINER = 4
+"""Nodes that average waves over a panel, over its own."""
+_FINER_TILTED = 2
+"""The same where the axis is pitched: bodies then come close to the wall in one place only."""
+_TIER = 1.6
+"""Ratio of the distances from the wall in one tier of panels."""
+_AVERAGED_TIERS = 3
+"""Tiers near the wall in which waves are averaged over panels."""
+
+
+class Rows(NamedTuple):
+    """Unknowns of one parity: for each mode the rows, of 3 a node, that bear it."""
+
+    parity: int
+    """0 even, 1 odd."""
+    of_mode: tuple[np.ndarray, ...]
+    """For each mode."""
+    dual: Samples
+    """What makes an integral over the surface of an unknown, (unknowns,)."""
+
+    @property
+    def starts(self) -> np.ndarray:
+        """First unknown of each mode, and their number."""
+        return np.concatenate([[0], np.cumsum([rows.size for rows in self.of_mode])])
+
+    def gathered(self, modes: Sequence[Samples]) -> Samples:
+        """Values of all unknowns from values of each mode on all rows."""
+        return np.concatenate([values[rows] for values, rows in zip(modes, self.of_mode, strict=True)])
+
+
+class Rings(ABC):
+    """What the wall does to solids of revolution: their rings see its waves as Fourier modes about their own axis."""
+
+    @abstractmethod
+    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+        """Take what the wall reflects of the solids' tractions from their single layer's matrices.
+
+        Args:
+            waves: those that matter between the solids.
+            rows: of both parities.
+            matrices: of both parities, (unknowns, unknowns), changed in place.
+        """
+
+    @abstractmethod
+    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
+        """Velocities on the solids from unit forces at points, by the wall, (unknowns, 3 n) for each of `rows`.
+
+        Without the minus sign.
+
+        Args:
+            waves: those that matter between points and solids.
+            rows: of both parities.
+            points: about the tube's axis, in its axes, (n, 3), m.
+        """
+
+
+class LevelRings(Rings):
+    """Rings about an axis parallel to the tube's, `offset` below it.
+
+    A wave is carried over to the second axis by its velocities on one cylinder about it, the reference: Fourier modes
+    there follow from its values around the cylinder, and each mode extends to other rings as in a tube.
+    """
+
+    def __init__(self, panels: Panels, offset: float, modes: int) -> None:
+        """Rings of solids.
+
+        Args:
+            panels: of the solids.
+            offset: m.
+            modes: Fourier modes about the second axis.
+        """
+        self.panels, self.offset, self.modes = panels, offset, modes
+        self.reference = float(np.max(panels.rho))
+
+    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+        """See `Rings.subtract`."""
+        at_nodes, averages = self._strengths(waves), self._strengths(waves, averaged=True)
+        between = self._matrices(waves)
+
+        def lessen(family: Rows) -> None:
+            starts, matrix = family.starts, matrices[family.parity]
+            for band, near in self._bands(waves):
+                active = [np.flatnonzero(near[here]) for here in family.of_mode]
+                size = waves.k[band].size
+                sources = [
+                    averages[n][there[some], band].reshape(some.size, 6 * size)
+                    for n, (there, some) in enumerate(zip(family.of_mode, active, strict=True))
+                ]
+                for m, (here, some) in enumerate(zip(family.of_mode, active, strict=True)):
+                    target = at_nodes[m][here[some], band].swapaxes(0, 1).reshape(size, 2 * some.size, 3)
+                    pressed = target @ between[family.parity][band, m].reshape(size, 3, 3 * self.modes)
+                    shaped = pressed.reshape(size, some.size, 2, self.modes, 3).transpose(3, 1, 0, 2, 4)
+                    left = np.ascontiguousarray(shaped).reshape(self.modes, some.size, 6 * size)
+                    lines = starts[m] + some[:, None]
+                    for n, source in enumerate(sources):
+                        columns = starts[n] + active[n]
+                        matrix[lines, columns] -= (left[n] @ source.T) * family.dual[columns]
+
+        each(lessen, rows)
+
+    def _bands(self, waves: Waves) -> Iterator[tuple[slice, np.ndarray]]:
+        """Bands of k, each with the rows (of 3 a node) that its waves reach before they are damped, there and back."""
+        distance = np.repeat(waves.radius - self.offset - self.panels.rho.ravel(), 3)
+        edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
+        for low, high in pairwise([0, *edges.tolist(), waves.k.size]):
+            if high > low:
+                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + 3.0
+
+    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
+        """See `Rings.sent`."""
+        columns = 3 * len(points)
+        middle = np.empty((2, self.modes, waves.k.size, 2, 3, columns))
+
+        def fill(number: int) -> None:
+            pressed = times_layers(point_waves(points, waves, number), waves, number)
+            for parity, trace in enumerate(self._traces(waves, number)):
+                flat = trace.reshape(3 * self.modes, -1)
+                both = flat @ pressed[:, :, parity].transpose(2, 3, 1, 0).reshape(flat.shape[1], -1)
+                middle[parity, :, number] = both.reshape(self.modes, 3, 2, columns).swapaxes(1, 2)
+
+        each(fill, range(waves.k.size))
+        strengths = self._strengths(waves)
+        found = []
+        for family in rows:
+            parts = [
+                strengths[m][here].reshape(here.size, -1) @ middle[family.parity, m].reshape(-1, columns)
+                for m, here in enumerate(family.of_mode)
+            ]
+            found.append(np.concatenate(parts))
+        return found
+
+    def _traces(self, waves: Waves, number: int) -> tuple[Samples, Samples]:
+        """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
+        from spirillum.kernels.tube_waves import circle_waves
+
+        orders = waves.orders[number]
+        theta = _angles(max(waves.orders), self.modes)
+        y, z = self.reference * np.cos(theta) - self.offset, self.reference * np.sin(theta)
+        angle = np.arctan2(z, y)
+        values = extensions(float(waves.k[number]), waves.radius, np.hypot(y, z), orders)
+        even, odd = (np.empty((3, theta.size, orders, 3)) for _ in range(2))
+        circle_waves(values, angle, angle - theta, even, odd)
+        found = []
+        for parity, field in enumerate((even, odd)):
+            flat = field.reshape(3, theta.size, -1)
+            modes = [matrix @ part for matrix, part in zip(_projectors(theta, self.modes, parity), flat, strict=True)]
+            found.append(np.stack(modes, axis=1).reshape(self.modes, 3, orders, 3))
+        return found[0], found[1]
+
+    def _matrices(self, waves: Waves) -> tuple[Samples, Samples]:
+        """sum_p eps_p U S U' between modes, even and odd, (k, modes, 3, modes, 3), with the weights in k."""
+        size = 3 * self.modes
+
+        def product(number: int) -> list[Samples]:
+            layers = weighted_layers(waves, number)
+            found = []
+            for trace in self._traces(waves, number):
+                flat = trace.reshape(size, -1, 3)
+                pressed = np.matmul(flat.swapaxes(0, 1), layers).swapaxes(0, 1)
+                matrix = pressed.reshape(size, -1) @ flat.reshape(size, -1).T
+                found.append(matrix.reshape(self.modes, 3, self.modes, 3))
+            return found
+
+        pairs = each(product, range(waves.k.size))
+        return np.stack([pair[0] for pair in pairs]), np.stack([pair[1] for pair in pairs])
+
+    def _strengths(self, waves: Waves, *, averaged: bool = False) -> list[Samples]:
+        """Each mode on the nodes from unit modes on the reference cylinder, (3 nodes, k, 2, 3) each.
+
+        The 2 stands for the real and the imaginary part of the wave. The film between a body and the wall may be
+        thinner than nodes are apart: tractions enter by averages over the panels, with what each node contributes.
+        """
+        panels = self.panels
+        x, rho, average = _finer(panels, _FINER) if averaged else (panels.x, panels.rho, None)
+        found: list[Samples] = [np.empty((3 * panels.size, waves.k.size, 2, 3)) for _ in range(self.modes)]
+
+        def fill(number: int) -> None:
+            k = float(waves.k[number])
+            values = extensions(k, self.reference, rho.ravel(), self.modes).reshape(*x.shape, self.modes, 3, 3)
+            wave = np.exp(1j * k * x)[..., None] * np.array([1j, 1.0, 1.0])
+            parts = np.stack([wave.real, wave.imag], axis=-1)[..., None]
+            for q in range(self.modes):
+                block = parts * values[:, :, q, :, None, :]
+                if average is not None:
+                    block = np.matmul(average, block.reshape(*x.shape, 18))
+                found[q][:, number] = block.reshape(-1, 2, 3)
+
+        each(fill, range(waves.k.size))
+        return found
+
+
+class _Tier(NamedTuple):
+    """Panels at about one distance from the wall: steep waves do not reach those further away."""
+
+    distance: float
+    """Smallest distance from the wall, m."""
+    modes: int
+    """Fourier modes that they bear."""
+    sample: tuple[Samples, Samples, Samples | None]
+    """x and rho of their nodes, (panels, p), and None: waves at the nodes."""
+    averaged: tuple[Samples, Samples, Samples | None]
+    """x and rho of more nodes, and averages over them; near the wall only."""
+    rows: tuple[tuple[np.ndarray, ...], ...]
+    """[parity][mode]: which of their 3 nodes bear it."""
+    unknowns: tuple[np.ndarray, ...]
+    """[parity]: the unknowns that these are."""
+
+
+class TiltedRings(Rings):
+    """Rings about an axis that is pitched against the tube's: every wave is projected on every ring that it reaches."""
+
+    def __init__(self, panels: Panels, seat: Seat, counts: np.ndarray) -> None:
+        """Rings of solids.
+
+        Args:
+            panels: of the solids.
+            seat: where their axis runs in the tube.
+            counts: Fourier modes about it that each node bears.
+        """
+        self.panels, self.seat, self.counts = panels, seat, counts
+
+    def _tiers(self, rows: Sequence[Rows]) -> list[_Tier]:
+        fine = _finer(self.panels, _FINER_TILTED)
+        distances = self.seat.distances(*fine[:2]).min(axis=1)
+        step = np.floor(np.log(distances / distances.min()) / np.log(_TIER))
+        tiers = []
+        for number in np.unique(step):
+            here = step == number
+            nodes = np.repeat(here, self.panels.order)
+            place = np.full(3 * self.panels.size, -1)
+            place[np.repeat(nodes, 3)] = np.arange(3 * np.count_nonzero(nodes))
+            modes = int(self.counts[nodes].max())
+            of_mode, unknowns = [], []
+            for family in rows:
+                local = [place[bearing] for bearing in family.of_mode]
+                of_mode.append(tuple(part[part >= 0] for part in local[:modes]))
+                unknowns.append(np.flatnonzero(np.concatenate(local) >= 0))
+            sample = self.panels.x[here], self.panels.rho[here], None
+            averaged = (fine[0][here], fine[1][here], fine[2][here]) if number < _AVERAGED_TIERS else sample
+            tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
+        return tiers
+
+    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+        """See `Rings.subtract`."""
+        tiers, lock = self._tiers(rows), Lock()
+        blocks = {
+            (a, b, p): np.zeros((tiers[a].unknowns[p].size, tiers[b].unknowns[p].size))
+            for a in range(len(tiers))
+            for b in range(len(tiers))
+            for p in (0, 1)
+        }
+
+        def lessen(number: int) -> None:
+            nearest = min(tier.distance for tier in tiers)
+            orders = [waves.orders_between(number, 0.5 * (tier.distance + nearest)) for tier in tiers]
+            reached = [(t, tier, count) for t, (tier, count) in enumerate(zip(tiers, orders, strict=True)) if count]
+            sides = [
+                (
+                    self._on_rings(waves, number, tier, tier.sample, count),
+                    self._on_rings(waves, number, tier, tier.averaged, count),
+                )
+                for _, tier, count in reached
+            ]
+            for (a, tier_a, count_a), (targets, _) in zip(reached, sides, strict=True):
+                pressed = [times_layers(target, waves, number) for target in targets]
+                for (b, tier_b, count_b), (_, sources) in zip(reached, sides, strict=True):
+                    far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
+                    count = min(count_a, count_b, far)
+                    for parity in (0, 1) if count else ():
+                        left, right = pressed[parity][:, :, :count], sources[parity][:, :, :count]
+                        block = left.reshape(len(left), -1) @ right.reshape(len(right), -1).T
+                        with lock:
+                            blocks[a, b, parity] += block
+
+        each(lessen, range(waves.k.size))
+        for (a, b, parity), block in blocks.items():
+            columns = tiers[b].unknowns[parity]
+            matrices[parity][np.ix_(tiers[a].unknowns[parity], columns)] -= block * rows[parity].dual[columns]
+
+    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
+        """See `Rings.sent`."""
+        tiers = self._tiers(rows)
+        away = waves.radius - float(np.max(np.hypot(points[:, 1], points[:, 2])))
+        found: list[Samples] = [np.zeros((family.dual.size, 3 * len(points))) for family in rows]
+        lock = Lock()
+
+        def add(number: int) -> None:
+            pressed = times_layers(point_waves(points, waves, number), waves, number)
+            for tier in tiers:
+                count = waves.orders_between(number, 0.5 * (tier.distance + away))
+                for parity, target in enumerate(
+                    self._on_rings(waves, number, tier, tier.sample, count) if count else ()
+                ):
+                    right = pressed[:, :, parity, :count].reshape(len(pressed), -1)
+                    block = target.reshape(len(target), -1) @ right.T
+                    with lock:
+                        found[parity][tier.unknowns[parity]] += block
+
+        each(add, range(waves.k.size))
+        return found
+
+    def _on_rings(
+        self,
+        waves: Waves,
+        number: int,
+        tier: _Tier,
+        sample: tuple[Samples, Samples, Samples | None],
+        orders: int,
+    ) -> list[Samples]:
+        """Waves of one k on the unknowns of a tier, even and odd, (unknowns, 2, orders, 3) each."""
+        from spirillum.kernels.tube_waves import tilted_waves
+
+        x, rho, average = sample
+        theta = _angles(orders, tier.modes)
+        along = np.broadcast_to(x.ravel(), (theta.size, x.size))
+        up, side = np.cos(theta)[:, None] * rho.ravel(), np.sin(theta)[:, None] * rho.ravel()
+        placed = self.seat.placed(np.stack([along, up, side], axis=-1).reshape(-1, 3))
+        k = float(waves.k[number])
+        values = extensions(k, waves.radius, np.hypot(placed[:, 1], placed[:, 2]), orders)
+        shape = (theta.size, x.size)
+        angle, phase = np.arctan2(placed[:, 2], placed[:, 1]).reshape(shape), (k * placed[:, 0]).reshape(shape)
+        out = np.empty((3, 2, *shape, 2, orders, 3))
+        tilted_waves(values.reshape(*shape, orders, 3, 3), angle, phase, theta, self.seat.pitch, out)
+        found: list[Samples] = []
+        for parity, of_mode in enumerate(tier.rows):
+            projectors = _projectors(theta, tier.modes, parity)
+            parts = [
+                matrix @ field[parity].reshape(theta.size, -1) for matrix, field in zip(projectors, out, strict=True)
+            ]
+            both = np.stack([part.reshape(tier.modes, x.size, -1) for part in parts], axis=2)
+            if average is not None:
+                both = np.matmul(average, both.reshape(tier.modes, *x.shape, -1))
+            modes = both.reshape(tier.modes, -1, 2, orders, 3)
+            joined: Samples = np.concatenate([values[rows] for values, rows in zip(modes, of_mode, strict=True)])
+            found.append(joined)
+        return found
+
+
+def _angles(orders: int, modes: int) -> Samples:
+    """Midpoints of a half circle, as many as waves need whose modes are then cut off."""
+    count = int(0.6 * (orders + modes)) + 12
+    angles: Samples = np.pi * (np.arange(count) + 0.5) / count
+    return angles
+
+
+def _projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Samples, Samples]:
+    """From values (x, rho, theta) on a half circle to Fourier modes (x, rho, g), (modes, angles) each."""
+    q = np.arange(modes)[:, None]
+    cos, sin = (function(q * theta) * (2.0 / theta.size) for function in (np.cos, np.sin))
+    cos[0] *= 0.5
+    return (cos, cos, -sin) if parity == 0 else (-sin, -sin, -cos)
+
+
+def _finer(panels: Panels, times: int) -> tuple[Samples, Samples, Samples]:
+    """Places x, rho of more nodes on each panel, (panels, q), and averages over them, (panels, p, q)."""
+    places, gauss = np.polynomial.legendre.leggauss(times * panels.order)
+    cardinal = panels.cardinals(places)
+    x, rho = panels.x @ cardinal.T, panels.rho @ cardinal.T
+    average: Samples = cardinal.T * (gauss * rho)[:, None, :] / panels.area.reshape(*panels.x.shape, 1)
+    return x, rho, average

@@ -1,0 +1,261 @@
+"""Solids of revolution in a circular tube: their single layer and the wall, factored.
+
+The equations are those of `interaction`, mode by mode, plus the wall's reflection (`tube_wall`), which couples the
+modes of a body that lies off the axis. Mirror symmetry keeps two families of modes apart, even and odd to the sides.
+Neither tails nor their phases enter: one factorisation serves all of them.
+
+Axes are x along the robot, y up, z to the right; angles count from y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, TiltedRings
+from spirillum.fluid.tube.wall import Seat, Waves, waves_between
+from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
+from spirillum.fluid.wire.revolution import Panels, panels_of
+from spirillum.fluid.wire.stokeslets import Accuracy
+from spirillum.robot.outline import Outline
+
+__all__ = ["MOTIONS", "Fineness", "Solids"]
+
+MOTIONS = 13
+"""Right-hand sides: 12 unit twists, and the flow of unit mean velocity through the tube, held back."""
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How finely the flow in a tube is resolved."""
+
+    wire: Accuracy = "standard"
+    """Form of the wires."""
+    tolerance: float = 1e-4
+    """At which Fourier modes are cut off."""
+    order: int = 8
+    """Gauss nodes of a panel."""
+    panel: float = 2.5
+    """Longest panels over the length on which the film's traction varies."""
+
+    @property
+    def damping(self) -> float:
+        """At which waves are cut off: at a gap of 0.2 mm a hundredth costs less than 1e-5, a tenth several percent."""
+        return float(min(10.0 * self.tolerance, 0.2 * np.sqrt(self.tolerance)))
+
+
+class Solids:
+    """Solids of revolution and the wall."""
+
+    def __init__(
+        self, solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples | None = None
+    ) -> None:
+        """Cut into panels and count modes; nothing is solved for yet.
+
+        Args:
+            solids: outlines, and the part (0 body, 1 rotor) with which each moves; none for wires alone.
+            seat: where in the tube they are.
+            fineness: how finely.
+            lines: points of wires (x, rho, blob radius) that come close, (n, 3), m.
+        """
+        self.seat, self.fineness = seat, fineness
+        self.parts = np.array([part for _, part in solids])
+        near = np.zeros((0, 3)) if lines is None else lines
+        if not solids:
+            return
+        longest = _longest(solids, seat, fineness, near)
+        self.panels = panels_of([outline for outline, _ in solids], longest, fineness.order)
+        self.counts = _mode_counts(self.panels, seat, fineness, near)
+
+    @property
+    def none(self) -> bool:
+        """Whether there are no solids: then there is nothing but `seat` and `fineness`."""
+        return self.parts.size == 0
+
+    @property
+    def modes(self) -> int:
+        """Number of Fourier modes."""
+        return int(self.counts.max())
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns of each parity."""
+        return 0 if self.none else int(3 * self.counts.sum())
+
+    @cached_property
+    def gap(self) -> float:
+        """Smallest distance from the wall, m."""
+        return float(np.min(self.seat.distances(self.panels.x, self.panels.rho)))
+
+    @cached_property
+    def rows(self) -> tuple[Rows, Rows]:
+        """Unknowns, even and odd: mode 0 of the even ones does not swirl, that of the odd ones does nothing else."""
+        area = np.repeat(self.panels.area, 3)
+        swirls = np.tile([False, False, True], self.panels.size)
+        found = []
+        for parity in (0, 1):
+            of_mode = [np.flatnonzero(np.repeat(self.counts > m, 3)) for m in range(self.modes)]
+            of_mode[0] = np.flatnonzero(swirls == bool(parity))
+            dual = np.concatenate([area[rows] / share(m) for m, rows in enumerate(of_mode)])
+            found.append(Rows(parity, tuple(of_mode), dual))
+        return found[0], found[1]
+
+    @cached_property
+    def rings(self) -> Rings:
+        """How the rings of the solids meet the wall's waves."""
+        if self.seat.pitch == 0:
+            return LevelRings(self.panels, self.seat.offset, self.modes)
+        return TiltedRings(self.panels, self.seat, self.counts)
+
+    def waves(self, distance: float, points: Samples | None = None) -> Waves:
+        """The waves that matter between the solids, or solids and points about the tube's axis.
+
+        Args:
+            distance: mean of the smallest distances of both from the wall, m.
+            points: (n, 3), m.
+        """
+        x = self.panels.x.ravel()
+        if points is not None:
+            x = np.concatenate([x, points[:, 0]])
+        return waves_between(self.seat.radius, float(np.ptp(x)), distance, self.fineness.damping)
+
+    @cached_property
+    def motion(self) -> tuple[Samples, Samples]:
+        """Velocities on the surfaces, even and odd, (unknowns, 13); see `MOTIONS`."""
+        twists = surface_motion(self.panels, self.parts)
+        found = []
+        for rows, part in zip(self.rows, (twists.real, twists.imag), strict=True):
+            modes = [np.zeros((3 * self.panels.size, MOTIONS)) for _ in range(self.modes)]
+            for m in (0, 1):
+                modes[m][:, : MOTIONS - 1] = part[m]
+            if rows.parity == 0:
+                for m, values in enumerate(self._through_flow()):
+                    modes[m][:, MOTIONS - 1] = values
+            found.append(rows.gathered(modes))
+        return found[0], found[1]
+
+    def _through_flow(self) -> list[Samples]:
+        """Even modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on pitched rings."""
+        modes = min(4, self.modes)
+        theta = np.pi * (np.arange(8) + 0.5) / 8
+        x, rho = (values.ravel()[:, None] for values in (self.panels.x, self.panels.rho))
+        cos, sin = np.cos(theta), np.sin(theta)
+        places = np.stack(np.broadcast_arrays(x, rho * cos, rho * sin), axis=-1)
+        placed = self.seat.placed(places.reshape(-1, 3))
+        speed = (2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / self.seat.radius**2).reshape(x.size, -1)
+        along, up = self.seat.rotation[0, :2]
+        parts = np.stack([speed * along, speed * up * cos, -speed * up * sin], axis=1)
+        q = np.arange(modes)[:, None]
+        weights = np.where(q == 0, 1.0, 2.0) / theta.size
+        like, other = weights * np.cos(q * theta), -weights * np.sin(q * theta)
+        found = np.stack([parts[:, 0] @ like.T, parts[:, 1] @ like.T, parts[:, 2] @ other.T], axis=1)
+        return [found[:, :, m].ravel() for m in range(modes)]
+
+    @cached_property
+    def factors(self) -> tuple[tuple[Samples, np.ndarray], ...]:
+        """LU factors of the equations, even and odd."""
+        from scipy.linalg import lu_factor
+
+        def factored(matrix: Samples) -> tuple[Samples, np.ndarray]:
+            factors: tuple[Samples, np.ndarray] = lu_factor(matrix, overwrite_a=True, check_finite=False)
+            return factors
+
+        with one_thread():
+            matrices = [np.zeros((rows.dual.size, rows.dual.size), order="F") for rows in self.rows]
+            self.rings.subtract(self.waves(self.gap), self.rows, matrices)
+            for m, free in enumerate(self._free()):
+                for rows, matrix in zip(self.rows, matrices, strict=True):
+                    here, (start, stop) = rows.of_mode[m], rows.starts[m : m + 2]
+                    matrix[start:stop, start:stop] += free[np.ix_(here, here)]
+            with ThreadPoolExecutor(2) as pool:
+                return tuple(pool.map(factored, matrices))
+
+    def _free(self) -> list[Samples]:
+        """The single layer in unbounded fluid, one matrix a mode."""
+        found: list[Samples] = []
+        for last, bearing in self.tiers:
+            blocks = self.panels.of_solids(bearing).matrices(last)
+            rows = np.flatnonzero(np.repeat(bearing[self.panels.solid_of_node], 3))
+            for m in range(len(found), last):
+                whole = np.zeros((3 * self.panels.size,) * 2)
+                whole[np.ix_(rows, rows)] = blocks[m]
+                found.append(whole)
+        return found
+
+    @cached_property
+    def tiers(self) -> list[tuple[int, np.ndarray]]:
+        """Numbers of modes up to which the same solids bear them, and which those are."""
+        most = np.array([self.counts[self.panels.solid_of_node == solid].max() for solid in range(len(self.parts))])
+        return [(int(last), most >= last) for last in sorted(set(most.tolist()))]
+
+    def solve(self, parity: int, velocities: Samples) -> Samples:
+        """Tractions from velocities on the surfaces, both as modes, (unknowns, n)."""
+        from scipy.linalg import lu_solve
+
+        tractions: Samples = lu_solve(self.factors[parity], velocities, check_finite=False)
+        return tractions
+
+    @cached_property
+    def moving(self) -> tuple[Samples, Samples]:
+        """Tractions for `motion`."""
+        return self.solve(0, self.motion[0]), self.solve(1, self.motion[1])
+
+    def wrenches(self, tractions: Sequence[Samples], against: Sequence[Samples] | None = None) -> Samples:
+        """Work of tractions, even and odd, against velocities, or else against `motion`, (13 or m, n)."""
+        velocities = self.motion if against is None else against
+        total: Samples = np.sum(
+            [v.T @ (rows.dual[:, None] * f) for rows, v, f in zip(self.rows, velocities, tractions, strict=True)],
+            axis=0,
+        )
+        return total
+
+
+def _mode_counts(panels: Panels, seat: Seat, fineness: Fineness, lines: Samples) -> np.ndarray:
+    """Number of modes to keep at each node; 0 and 1 hold all rigid motions.
+
+    What a ring of radius rho at a distance e from the axis sends to the wall and back in mode m falls off as
+    exp(-2 m zeta), cosh(zeta) = (R^2 - rho^2 - e^2)/(2 e rho), where the film's thickness vanishes at complex angles;
+    for a film that is squeezed times powers of m, hence some more. So with wires, see `interaction`.
+    """
+    x, rho = panels.x.ravel(), panels.rho.ravel()
+    r = seat.radius
+    e = r - rho - np.maximum(seat.distances(x, rho), 1e-12 * r)
+    zeta = np.arccosh(np.maximum((r**2 - rho**2 - e**2) / np.maximum(2.0 * e * rho, 1e-300), 1.0 + 1e-12))
+    cut = -0.5 * np.log(fineness.tolerance)
+    counts = 3 + np.ceil(_SQUEEZED * cut / zeta)
+    if len(lines):
+        near2 = (lines[:, :1] - x) ** 2 + (lines[:, 1:2] - rho) ** 2 + lines[:, 2:3] ** 2
+        between = np.arccosh(1.0 + near2 / (2.0 * np.maximum(lines[:, 1:2] * rho, 1e-300)))
+        counts = np.maximum(counts, 1 + np.ceil(cut / np.min(between, axis=0)))
+    found: np.ndarray = np.minimum(counts, _MOST_MODES).astype(int)
+    return found
+
+
+_MOST_MODES = 64
+_SQUEEZED = 1.4
+"""Modes over what their exponential decay asks for: the normal resistance at 0.2 mm is then good to half a percent."""
+
+
+def _longest(
+    solids: Sequence[tuple[Outline, int]], seat: Seat, fineness: Fineness, lines: Samples
+) -> Callable[[int, Samples, Samples], Samples]:
+    """Longest panels allowed at (x, rho): against other solids, the film at the wall, and wires."""
+
+    def longest(solid: int, x: Samples, rho: Samples) -> Samples:
+        found: Samples = np.full(np.shape(x), np.inf)
+        for other, (outline, _) in enumerate(solids):
+            if other != solid:
+                found = np.minimum(found, 2.0 * outline.distance(x, rho))
+        film = np.maximum(seat.distances(x, rho), 0.0)
+        found = np.minimum(found, fineness.panel * np.sqrt(2.0 * film * np.maximum(rho, film)))
+        if len(lines):
+            near = np.min(np.hypot(x[:, None] - lines[:, 0], rho[:, None] - lines[:, 1]), axis=1)
+            found = np.minimum(found, 4.0 * np.hypot(near, lines[:, 2].min()))
+        return found
+
+    return longest

@@ -1,0 +1,252 @@
+"""The real tail and body: a wire of its own shape, solids of revolution, and the flow between them.
+
+The tail is a line of regularised Stokeslets (`wire`), body and coupling are single layers (`revolution`), coupled in
+unbounded fluid (`interaction`). The 12x12 is constant in the tail's frame: it is computed once for a geometry and
+turned with the tail.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from spirillum.arrays import Axial, Flags, Matrix6, Matrix12, PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
+from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.wire.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
+from spirillum.fluid.wire.stokeslets import Accuracy, Wire, closest_approach, station_count
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import coil_spacing
+from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.options import ModelOptions
+from spirillum.robot.outline import Outline
+
+__all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
+
+_MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
+_SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
+_SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
+_SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness
+
+_RESOLUTIONS = {
+    "standard": Resolution("standard", order=8, tolerance=1e-4),
+    "high": Resolution("high", order=12, tolerance=1e-6),
+}
+_CHECKS = {  # what differs most from each: the form of the wire, and the spacing of its stations
+    "standard": Resolution("high", order=8, tolerance=1e-4),
+    "high": Resolution("high", order=8, tolerance=1e-4, spacing=1.25),
+}
+
+
+def solids_of(batch: RobotBatch, index: int) -> tuple[tuple[str, Outline, int], ...]:
+    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution of robot number `index`."""
+    return tuple(solids_of_geometry(Geometry.of(batch, index)))
+
+
+def tail_wire(batch: RobotBatch, index: int) -> Wire:
+    """The tail of robot number `index` as a wire, at phase 0."""
+    return wire_of_geometry(Geometry.of(batch, index), 1.0)
+
+
+def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
+    """Tractions on robot number `index` for all unit twists, at phase 0."""
+    return _solved(Geometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
+
+
+def _solved(g: Geometry, part: str, resolution: Resolution) -> Solution:
+    solids = [(outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part]]
+    wires = [(wire_of_geometry(g, resolution.spacing), 1)] if "tail" in PIECES[part] else []
+    return solve(solids, wires, resolution)
+
+
+def _slimness(batch: RobotBatch) -> list[Limit]:
+    """Body and coupling neither needles nor foils: their outlines are resolved against their own thickness."""
+    solid = batch.coupling_length - 2.0 * batch.coupling_clearance
+    coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
+    why = "solids are resolved up to a ratio of length and diameter of a thousand"
+    rows = (
+        ("body.diameter", batch.body_diameter, _SLIMMEST * batch.body_length),
+        ("body.length", batch.body_length, _SLIMMEST * batch.body_diameter),
+        ("coupling.diameter", np.where(coupled, batch.coupling_diameter, np.inf), _SLIMMEST * solid),
+        ("coupling.length less clearance", np.where(coupled, solid, np.inf), _SLIMMEST * batch.coupling_diameter),
+    )
+    return [Limit.of(name, value, "at least", bound, "mm", why, "solid-too-slim") for name, value, bound in rows]
+
+
+def _apart(batch: RobotBatch, fit: Flags) -> Limit:
+    """No part of the wire touches another, the arm at its root included; asked of robots that can be built."""
+    fit = np.broadcast_to(fit & batch.known & all_hold(assembly_limits(batch)), (batch.size,))
+    nearest = np.full(batch.size, np.inf)
+    for index in np.flatnonzero(fit):
+        nearest[index] = _closest(Geometry.of(batch, int(index)))
+    why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
+    return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
+
+
+@lru_cache(maxsize=4096)
+def _closest(g: Geometry) -> float:
+    return closest_approach(wire_of_geometry(g, 1.0))
+
+
+@lru_cache(maxsize=4096)
+def _matrix(g: Geometry, part: str, resolution: Resolution) -> Samples:
+    """12x12 of a part at phase 0 and viscosity 1."""
+    matrix = _solved(g, part, resolution).matrix
+    matrix.flags.writeable = False
+    return matrix
+
+
+_STATED = {
+    "standard": (
+        "against a fully resolved wire and robot (tail 25, 2.5 mm) drag, thrust and axial torque of the tail are 0.6, "
+        "0.5 and 0.8 % low, speed and torque per turn 0.5 and 0.8 %; thrust up to 2.7 % off for short, wide coils; "
+        "with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
+    ),
+    "high": (
+        "against fully resolved wires and a robot, drag, thrust and axial torque of the tail, speed and torque per "
+        "turn agree to 0.4 %; with a coupling, torque is as good as its clearance; unbounded fluid, no channel walls"
+    ),
+}
+
+
+class Slender(SwimmerModel):
+    """The tail as a line of regularised Stokeslets, body and coupling as they are, and the flow between them."""
+
+    name = "slender"
+    title = "resolved"
+    references = ("cortez2001", "cortez2012", "pozrikidis1992", "biorob2012")
+    known_error = _STATED["standard"]
+    parts = ("body", "coupling", "tail", "rotor", "robot")
+    closed_form = False
+
+    def __init__(self, resolution: Resolution | None = None) -> None:
+        """Resolve the flow as each robot's `model.slender.accuracy` says, or in one way for all."""
+        self._resolution = resolution
+
+    def stated_error(self, options: ModelOptions) -> str:
+        """See `ResistanceModel.stated_error`."""
+        return _STATED[options.slender.accuracy]
+
+    def checked_by(self, options: ModelOptions) -> SwimmerModel:
+        """See `SwimmerModel.checked_by`."""
+        return Slender(_CHECKS[options.slender.accuracy])
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """Solids apart from each other, and a wire that the line of Stokeslets can follow."""
+        coupled = (batch.coupling_length > 0) & (batch.coupling_diameter > 0)
+        resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        # No more than the plain helix and the arm from the axis to it.
+        wire_length = batch.arc_length + np.where(np.isfinite(batch.taper), batch.amplitude, 0.0)
+        limits = [
+            Limit.of(
+                "coupling.length",
+                batch.coupling_length,
+                "more than",
+                0.5 * batch.wire_diameter,
+                "mm",
+                "the tail's root, coupling.length behind the body, would lie in the body",
+                "tail-in-body",
+            ),
+            Limit.of(
+                "coupling.length",
+                batch.coupling_length,
+                "at least",
+                _SMALLEST_GAP * batch.amplitude,
+                "mm",
+                "the film between body and tail is resolved down to a hundredth of tail.amplitude",
+                "film-too-thin",
+            ),
+            Limit.of(
+                "coupling.clearance",
+                np.where(coupled, batch.coupling_clearance, np.inf),
+                "at least",
+                _SMALLEST_CLEARANCE * batch.coupling_diameter,
+                "mm",
+                "the film between body and coupling is resolved down to a hundredth of coupling.diameter",
+                "film-too-thin",
+            ),
+            Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                0.5 * batch.arc_length,
+                "mm",
+                "a wire is at least twice as long as it is thick",
+                "wire-too-short",
+            ),
+            Limit.of(
+                "stations along the tail (tail.wire_diameter)",
+                station_count(wire_length, 0.5 * batch.wire_diameter),
+                "at most",
+                float(_MOST_STATIONS[resolution.wire]),
+                "1",
+                "their equations would fill the memory",
+                "wire-too-thin",
+            ),
+            *_slimness(batch),
+        ]
+        return [*limits, _apart(batch, all_hold(limits))]
+
+    def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
+        """See `ResistanceModel.part_domain`."""
+        return _slimness(batch) if part in ("body", "coupling") else self.domain(batch)
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """A wire thin against its wave, its turns apart, and long enough for its ends not to matter much."""
+        return [
+            thin_wire_cautions(batch, EXACT_EPS_CONSTANT)[0],
+            Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                coil_spacing(batch.wavelength, batch.amplitude) / 3.0,
+                "mm",
+                "turns of the coil closer than two wire diameters to each other are resolved to some 5 % only",
+                "close-turns",
+            ),
+            Limit.of(
+                "tail.wire_diameter",
+                batch.wire_diameter,
+                "at most",
+                0.2 * batch.arc_length,
+                "mm",
+                "the ends of a wire shorter than five diameters are resolved to some 5 % only",
+                "short-wire",
+            ),
+        ]
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`; NaN for robots outside the domain."""
+        zero = np.zeros(1)
+        return axial_entries(self.resistance(batch, zero))
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
+        """See `SwimmerModel.resistance`; NaN for robots outside the domain."""
+        matrices = self._matrices(batch, "robot")
+        turn = np.zeros((*np.shape(phase), 12, 12))
+        for first in range(0, 12, 3):
+            turn[..., first : first + 3, first : first + 3] = axis_rotation(phase)
+        return turn @ matrices @ np.swapaxes(turn, -1, -2)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
+        """See `ResistanceModel.part_matrix`; the rotor is coupling and tail."""
+        if part not in self.parts:
+            raise InputError(f"part = {part!r} with model 'slender'; allowed: {', '.join(self.parts)}")
+        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
+            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
+        return rotated(joint_locked(self._matrices(batch, part)), axis_rotation(phase))
+
+    def _matrices(self, batch: RobotBatch, part: str) -> Samples:
+        """12x12 of a part at phase 0; the other entries are zero, all are NaN outside the domain."""
+        limits = assembly_limits(batch) + self.part_domain(batch, part)
+        answerable = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
+        resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
+        found = np.full((batch.size, 12, 12), np.nan)
+        for index in np.flatnonzero(answerable):
+            viscosity = float(batch.viscosity[index if batch.viscosity.size > 1 else 0])
+            found[index] = viscosity * _matrix(Geometry.of(batch, int(index)), part, resolution)
+        return found

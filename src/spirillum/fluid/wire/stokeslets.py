@@ -1,0 +1,304 @@
+"""A thin wire of any curve: a line of regularised Stokeslets.
+
+A blob of radius a sqrt(e) on the centreline gives the velocity that slender-body theory gives on a wire of radius a,
+along and across it, to leading order in its curvature (Cortez and Nicholas, Commun. Appl. Math. Comput. Sci. 7:33,
+2012); the matrix from forces to velocities is symmetric positive definite.
+
+`standard` adds the torque of cross-sections that spin and tilt as if each were alone. `high` gives every
+cross-section, besides its force, the first moments of its traction: those that resist its spin, its tilt, and its
+strain. They act through the gradients of the same kernel; on a straight wire each has the resistance of a
+cylinder. With them the effect of curvature on the traction is there: what remains falls off with its square.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from spirillum.arrays import PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.algebra import skew
+
+__all__ = [
+    "Accuracy",
+    "Wire",
+    "WireSystem",
+    "closest_approach",
+    "station_count",
+    "stations_along",
+    "wire_along",
+    "wire_system",
+]
+
+Accuracy = Literal["standard", "high"]
+
+_BLOB = float(np.exp(0.5))
+"""Blob radius over a: the velocity on a straight wire is that of slender-body theory, along and across."""
+_SPACING = 0.75
+"""Spacing of stations over the blob radius: the smooth kernel's sums are then integrals to 2e-4."""
+_INSET = 0.375
+"""Distance of the outermost stations from the wire's cut ends, over the blob radius. Rods of 10 to 50 diameters,
+solved for with their edges, then have the right drag along and across to 0.4 %."""
+_MOST_STATIONS = 6000
+_FARTHEST = 1e9
+_LEVI_CIVITA = np.cross(np.eye(3)[:, None], np.eye(3)[None])
+_TILT = 0.5
+"""Torque of a tilting cross-section over that of a spinning one; see `_own_torque`."""
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Stations along a wire's centreline; SI."""
+
+    points: Samples
+    """(n, 3), m."""
+    tangents: Samples
+    """Unit tangents, (n, 3)."""
+    lengths: Samples
+    """Arc length that each station stands for, m, (n,)."""
+    radius: float
+    """Radius a of the wire, m."""
+
+    @property
+    def blob(self) -> float:
+        """Blob radius, m."""
+        return _BLOB * self.radius
+
+    def distance(self, points: Samples) -> Samples:
+        """Distance of points from the centreline, m, (k,).
+
+        Args:
+            points: (k, 3), m.
+        """
+        from scipy.spatial import cKDTree
+
+        _, nearest = cKDTree(self.points).query(points)
+        offset = points - self.points[nearest]
+        half = 0.5 * self.lengths[nearest]
+        along = np.clip(np.sum(offset * self.tangents[nearest], axis=1), -half, half)
+        distance: Samples = np.linalg.norm(offset - along[:, None] * self.tangents[nearest], axis=1)
+        return distance
+
+
+def station_count(arc_length: PerRobot, radius: PerRobot) -> PerRobot:
+    """Stations that wires of these lengths and radii take."""
+    blob = _BLOB * radius
+    return np.ceil(np.maximum(arc_length / blob - 2.0 * _INSET, 0.0) / _SPACING) + 1.0
+
+
+def wire_along(curve: Samples, radius: float, *, spacing: float = 1.0, closed: bool = False) -> Wire:
+    """The wire along a curve.
+
+    Args:
+        curve: points along the centreline, dense against its bends, (k, 3), m; a closed one ends where it starts.
+        radius: a, m.
+        spacing: of the stations, relative to the standard one.
+        closed: whether the wire is a ring without ends.
+
+    Raises:
+        InputError: if the curve is no curve, has too many stations, or a wire of that radius runs into itself.
+    """
+    line = _checked(curve, radius, spacing, closed=closed)
+    wire = stations_along(line, float(radius), float(spacing), closed=closed)
+    near = closest_approach(wire, closed=closed)
+    if near < 2.0 * wire.radius:
+        raise InputError(
+            f"the wire comes within {1e3 * near:.3g} mm of another part of its centreline; allowed: more than its "
+            f"diameter, {2e3 * wire.radius:.3g} mm"
+        )
+    return wire
+
+
+def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> Samples:
+    """The curve as numbers that make a wire."""
+    try:
+        line = np.asarray(curve, dtype=float)
+        sizes = float(radius), float(spacing)
+    except (TypeError, ValueError) as error:
+        raise InputError("curve, radius or spacing is no number; allowed: points (x, y, z) and lengths in m") from error
+    if line.ndim != 2 or line.shape[1] != 3 or len(line) < 4 or not np.all(np.isfinite(line)):
+        raise InputError(f"curve has shape {line.shape}; allowed: at least 4 finite points (x, y, z) in m")
+    for name, value in zip(("radius", "spacing"), sizes, strict=True):
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{name} = {value}; allowed: a finite number above 0")
+    if np.max(np.abs(line)) > _FARTHEST or np.ptp(line, axis=0).max() < 1.0 / _FARTHEST:
+        raise InputError(f"curve spans {np.ptp(line, axis=0).max():.3g} m; allowed: 1/{_FARTHEST:g} to {_FARTHEST:g} m")
+    length = float(np.sum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    if closed and np.linalg.norm(line[-1] - line[0]) > 1e-9 * length:
+        raise InputError("curve with closed = True ends elsewhere than it starts; allowed: the same point")
+    if closed and length < 2.0 * np.pi * sizes[0]:
+        raise InputError(
+            f"radius = {sizes[0]:.3g} m is larger than a ring of length {length:.3g} m; allowed: a thinner wire"
+        )
+    count = float(station_count(np.array([length]), np.array([sizes[0]]))[0]) / sizes[1]
+    if count > _MOST_STATIONS:
+        raise InputError(f"radius = {sizes[0]:.3g} m makes {count:.0f} stations; allowed: at most {_MOST_STATIONS}")
+    return line
+
+
+def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
+    """The same of a curve that is known to make a wire; it may touch itself."""
+    from scipy.interpolate import CubicSpline
+
+    gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
+    apart = np.concatenate([[True], gaps > 1e-12 * np.sum(gaps)])
+    curve = np.array(curve[apart])
+    if closed:
+        curve[-1] = curve[0]
+    chord = np.concatenate([[0.0], np.cumsum(gaps[apart[1:]])])
+    spline = CubicSpline(chord, curve, axis=0, bc_type="periodic" if closed else "not-a-knot")
+    node, weight = np.polynomial.legendre.leggauss(4)
+    steps = np.diff(chord)
+    speed = np.linalg.norm(spline(chord[:-1, None] + 0.5 * (1.0 + node) * steps[:, None], 1), axis=-1)
+    arc = np.concatenate([[0.0], np.cumsum(0.5 * steps * (speed @ weight))])
+    at, lengths = _stations(float(arc[-1]), _BLOB * radius, spacing, closed=closed)
+    where = np.interp(at, arc, chord)
+    tangents = spline(where, 1)
+    tangents = tangents / np.linalg.norm(tangents, axis=1, keepdims=True)
+    return Wire(spline(where), tangents, lengths, radius)
+
+
+def closest_approach(wire: Wire, *, closed: bool = False) -> float:
+    """Least distance between stations further apart along the wire than half a tightest turn, m.
+
+    Infinite where none is closer than the wire's diameter.
+    """
+    from scipy.spatial import cKDTree
+
+    total = float(np.sum(wire.lengths))
+    at = np.cumsum(wire.lengths) - 0.5 * wire.lengths
+    pairs = cKDTree(wire.points).query_pairs(2.0 * wire.radius, output_type="ndarray")
+    along = np.abs(at[pairs[:, 0]] - at[pairs[:, 1]])
+    along = np.minimum(along, total - along) if closed else along
+    close = pairs[along > np.pi * wire.radius]
+    distances = np.linalg.norm(wire.points[close[:, 0]] - wire.points[close[:, 1]], axis=1)
+    return float(np.min(distances, initial=np.inf))
+
+
+def _stations(length: float, blob: float, spacing: float, *, closed: bool) -> tuple[Samples, Samples]:
+    """Arc lengths of the stations, and what each stands for."""
+    step = _SPACING * spacing * blob
+    if closed:
+        count = int(np.ceil(length / step))
+        around: Samples = np.linspace(0.0, length, count, endpoint=False)
+        return around, np.full(count, length / count)
+    inset = min(_INSET * blob, 0.5 * length)
+    at: Samples = np.linspace(inset, length - inset, int(np.ceil((length - 2.0 * inset) / step)) + 1)
+    ends = np.concatenate([np.zeros(1), 0.5 * (at[1:] + at[:-1]), np.full(1, length)])
+    lengths: Samples = np.diff(ends)
+    return at, lengths
+
+
+@dataclass(frozen=True)
+class WireSystem:
+    """Equations of wires that move with rigid parts, all without the factor 1/(8 pi mu).
+
+    Forces at the stations, and with `high` accuracy first moments m after them, follow from A f = S V - u for unit
+    twists V and the velocities (and gradients along the moments) u that others make there; the fluid's wrench on the
+    parts is S' f + K V.
+    """
+
+    mobility: Samples
+    """A, symmetric positive definite, (3 n + q n, 3 n + q n)."""
+    motion: Samples
+    """S, (3 n + q n, 12)."""
+    own: Samples
+    """K, (12, 12)."""
+    moments: Samples
+    """Tensors of the q first moments at each station, force by displacement, (n, q, 3, 3)."""
+
+    @property
+    def torques(self) -> Samples:
+        """Torque of each unit moment, (n, 3, q)."""
+        torques: Samples = np.einsum("ikb,nqbk->niq", _LEVI_CIVITA, self.moments)
+        return torques
+
+
+def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSystem:
+    """Equations of wires.
+
+    Args:
+        wires: each with the part (0 body, 1 rotor) that it moves with.
+        accuracy: `standard` or `high`.
+    """
+    from spirillum.kernels.blobs import force_matrix
+
+    none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))
+    if not wires:
+        return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), none, nothing)
+    points = np.concatenate([wire.points for wire, _ in wires])
+    e2 = np.concatenate([np.full(len(wire.points), wire.blob**2) for wire, _ in wires])
+    part = np.concatenate([np.full(len(wire.points), part) for wire, part in wires])
+    forces: Samples = force_matrix(points, e2)
+    motion = _on_part(np.concatenate([np.tile(np.eye(3), (len(points), 1, 1)), -skew(points)], axis=-1), part)
+    if accuracy == "standard":
+        own: Samples = np.sum([_own_torque(*item) for item in wires], axis=0) / (8.0 * np.pi)
+        return WireSystem(forces, motion, own, np.zeros((len(points), 0, 3, 3)))
+    moments, across, gradients = _first_moments([wire for wire, _ in wires], points, e2)
+    spin = np.einsum("nqbl,kbl->nqk", moments, -_LEVI_CIVITA)  # gradient along l of a rotation about k: e_k x e_l
+    rotation = _on_part(np.concatenate([np.zeros_like(spin), spin], axis=-1), part)
+    mobility: Samples = np.block([[forces, across], [across.T, gradients]])
+    return WireSystem(mobility, np.concatenate([motion, rotation]), none, moments)
+
+
+def _on_part(rows: Samples, part: np.ndarray) -> Samples:
+    """Rows (stations, k, 6) against the twist of the part that each station moves with, (k stations, 12)."""
+    motion = np.zeros((*rows.shape[:2], 12))
+    for which in (0, 1):
+        motion[part == which, :, 6 * which : 6 * which + 6] = rows[part == which]
+    return motion.reshape(-1, 12)
+
+
+def _own_torque(wire: Wire, part: int) -> Samples:
+    """Torque over rotation of a wire's cross-sections, each alone, (12, 12); viscosity 1.
+
+    4 pi a^2 per arc length about the tangent, as a spinning cylinder, and half of it across: first moments of the
+    traction tilt a cross-section as they would in the line's own flow.
+    """
+    tangent = wire.tangents.T @ (wire.lengths[:, None] * wire.tangents)
+    across = np.sum(wire.lengths) * np.eye(3) - tangent
+    matrix = np.zeros((12, 12))
+    at = slice(6 * part + 3, 6 * part + 6)
+    matrix[at, at] = 4.0 * np.pi * wire.radius**2 * (tangent + _TILT * across)
+    return matrix
+
+
+def _first_moments(wires: Sequence[Wire], points: Samples, e2: Samples) -> tuple[Samples, Samples, Samples]:
+    """First moments that cross-sections bear, (n, 5, 3, 3), their velocities at the stations, and their gradients.
+
+    Force by displacement: spin about the tangent, tangential forces displaced along each of two normals, and two
+    strains of the cross-section; trace-free, of unit norm, orthogonal. On an infinite cylinder a unit density of each
+    moves the gradient along it by 4, 4, 4, 2, 2 over 8 pi mu a^2; the kernel's own answer on an infinite straight line
+    is 2 (a/e)^2 of that, and what is missing is added to each station's own entry.
+    """
+    from spirillum.kernels.blobs import moment_matrices
+
+    tangents = np.concatenate([wire.tangents for wire in wires])
+    helper = np.eye(3)[np.argmin(np.abs(tangents), axis=1)]
+    first = np.cross(tangents, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangents, first)
+    moments: Samples = np.stack(
+        [
+            np.sqrt(0.5) * (_dyad(second, first) - _dyad(first, second)),
+            _dyad(tangents, first),
+            _dyad(tangents, second),
+            np.sqrt(0.5) * (_dyad(first, first) - _dyad(second, second)),
+            np.sqrt(0.5) * (_dyad(first, second) + _dyad(second, first)),
+        ],
+        axis=1,
+    )
+    lengths = np.concatenate([wire.lengths for wire in wires])
+    a2 = np.concatenate([np.full(len(wire.points), wire.radius**2) for wire in wires])
+    across, gradients = moment_matrices(points, e2, moments)
+    missing = ((1.0 / a2 - 2.0 / e2) / lengths)[:, None] * np.array([4.0, 4.0, 4.0, 2.0, 2.0])
+    gradients[np.diag_indices_from(gradients)] += missing.ravel()
+    return moments, across, gradients
+
+
+def _dyad(force: Samples, displacement: Samples) -> Samples:
+    product: Samples = force[:, :, None] * displacement[:, None, :]
+    return product

@@ -1,0 +1,1 @@
+"""One folder for each paper: its study, statements, constants and figures."""

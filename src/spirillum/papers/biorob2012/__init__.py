@@ -1,0 +1,1 @@
+"""BioRob 2012: sixteen helical tails in two channels."""

@@ -1,0 +1,1 @@
+"""Folders and reports that are written: study, measurement, calibration."""

@@ -1,0 +1,172 @@
+"""What a calibration leaves on disk."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spirillum.calibration.answers import calibration_text
+from spirillum.errors import InputError
+from spirillum.files import output_folder, write_text
+
+if TYPE_CHECKING:
+    from spirillum.calibration.fit import Calibrated
+    from spirillum.calibration.problem import Progress
+
+__all__ = ["check_folder", "earlier_results", "predictions_text", "write_calibration"]
+
+_RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
+_FIGURES = ("observed-", "residuals", "posterior", "profiles")
+_RECORD = ".written-by-spirillum"
+"""Checksums of the figures beside it: one with another checksum is the user's own."""
+_SYNTHETIC = "# the observations say that they are synthetic: nothing here is measured\n"
+_COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm", "rows")
+_MARKS: dict[str, str | tuple[str, ...]] = {
+    "calibration.toml": "# Written by `spirillum calibrate`",
+    "predictions.csv": (_SYNTHETIC, ",".join(_COLUMNS)),
+}
+"""What a file of ours begins with."""
+_SCHEMA = "spirillum.posterior/"
+
+
+def earlier_results(folder: Path) -> list[Path]:
+    """Files of an earlier calibration in a folder, which a new one takes the place of."""
+    named = [folder / name for name in _RESULTS if (folder / name).is_file()]
+    return named + [
+        path
+        for path in sorted((folder / "figures").glob("*"))
+        if path.is_file() and path.suffix in (".png", ".svg", ".pdf") and path.stem.startswith(_FIGURES)
+    ]
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder for results before any work is done.
+
+    Raises:
+        InputError: if it is a file, or holds a file of the same name that no calibration has written.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; allowed: a folder for the results (-o DIR)")
+    known = _recorded(folder)
+    for path in earlier_results(folder):
+        if not _ours(path, known):
+            raise InputError(
+                f"{folder} holds {path.relative_to(folder)} of unknown origin; allowed: a new folder (-o DIR)"
+            )
+
+
+def _recorded(folder: Path) -> dict[str, str]:
+    """Checksums of the figures that the calibration in a folder has drawn, by name."""
+    try:
+        lines = (folder / "figures" / _RECORD).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return {}
+    pairs = [line.split("  ", 1) for line in lines if "  " in line]
+    return {name: checksum for checksum, name in pairs}
+
+
+def _ours(path: Path, known: Mapping[str, str]) -> bool:
+    """Whether a calibration has written a file, by what it says of itself, or by its checksum."""
+    try:
+        if path.name == "posterior.nc":
+            return _is_posterior(path)
+        if path.name in _MARKS:
+            return path.read_text(encoding="utf-8").startswith(_MARKS[path.name])
+        return known.get(path.name) == _checksum(path)
+    except (OSError, UnicodeDecodeError):
+        return False
+
+
+def _is_posterior(path: Path) -> bool:
+    import h5netcdf
+
+    try:
+        with h5netcdf.File(path, "r") as stored:
+            return str(stored.attrs.get("schema", "")).startswith(_SCHEMA)
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError):
+        return False
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def write_calibration(
+    found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
+) -> list[Path]:
+    """Write all files of a calibration, the figures last; each is whole or not there.
+
+    Raises:
+        InputError: if the folder cannot be written to, or holds files of the same names that no calibration has
+            written.
+    """
+    check_folder(folder)
+    output_folder(folder)
+    for path in earlier_results(folder):  # half of an older calibration beside a new one would be believed
+        path.unlink(missing_ok=True)
+    (folder / "figures" / _RECORD).unlink(missing_ok=True)
+    written = [folder / "calibration.toml", folder / "predictions.csv"]
+    write_text(written[0], calibration_text(found))
+    write_text(written[1], predictions_text(found))
+    if found.posterior is not None:
+        from spirillum.calibration.posterior_tree import write_posterior
+
+        written.append(write_posterior(found, folder / "posterior.nc"))
+    return written + (_drawn(found, folder, progress) if figures else [])
+
+
+def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
+    from spirillum.view.figures.calibration import calibration_figures
+    from spirillum.view.figures.style import save
+
+    tell = progress or (lambda _what, _done, _total: None)
+    tell("figures", 0, 1)
+    inside = output_folder(folder / "figures")
+    written: list[Path] = []
+    for name, figure in calibration_figures(found).items():
+        try:
+            save(figure, inside / name)
+        finally:  # what an interrupted run has drawn may be replaced by the next one too
+            written += [path for path in (inside / f"{name}.png", inside / f"{name}.svg") if path.is_file()]
+            write_text(inside / _RECORD, "".join(f"{_checksum(path)}  {path.name}\n" for path in written))
+    tell("figures", 1, 1)
+    return written
+
+
+def predictions_text(found: Calibrated) -> str:
+    """Observed against predicted of every tail, as CSV; speeds at the mean observed rate."""
+    experiment = found.experiment
+    stream = io.StringIO()
+    if experiment.synthetic:
+        stream.write(_SYNTHETIC)
+    names = list(found.predicted)
+    table = csv.writer(stream, lineterminator="\n")
+    header = list(_COLUMNS)
+    for name in names:
+        header += [f"{name}_observed", f"{name}_predicted", f"{name}_low", f"{name}_high", f"{name}_residual"]
+    table.writerow([*header, "effective_friction", "effective_friction_low", "effective_friction_high"])
+    for place, robot in enumerate(experiment.robots):
+        diameter = robot.channel.diameter if robot.channel else math.nan
+        row = [_short(diameter * 1e3), _short(robot.tail.wavelength * 1e3), _short(robot.tail.amplitude * 1e3)]
+        row.append(" ".join(str(number) for number in experiment.rows[place]))
+        for name in names:
+            seen = float(found.problem.ratio(name).mean[place])
+            value, low, high = (float(column[place]) for column in found.predicted[name])
+            row += [_short(number) for number in (seen, value, low, high, seen / value - 1.0)]
+        friction = found.friction[place] if found.friction else None
+        row += [
+            _short(number) for number in ((friction.value, friction.low, friction.high) if friction else (np.nan,) * 3)
+        ]
+        table.writerow(row)
+    return stream.getvalue()
+
+
+def _short(value: float) -> str:
+    return f"{value:.8g}" if math.isfinite(value) else ""

@@ -1,0 +1,107 @@
+"""What stands in a report besides its pictures and claims, read from the dataset alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from spirillum.citations import REFERENCES
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["FRICTION_MEANINGS", "content"]
+
+FRICTION_MEANINGS = {
+    "none": "no friction: the tail turns against the fluid alone, so that a motor's rates and speeds are upper bounds",
+    "rotor": "B_eff acts inside the joint, which gives (18); the body feels the tail's hydrodynamic torque only",
+    "body": "the channel's wall brakes the body's rotation; (18) alone cannot find how much",
+    "paper": "as (19) is printed: B_eff brakes the tail from outside, and the body feels the whole motor torque",
+}
+"""A line of meaning for each reading of the friction."""
+
+MOST_CALIBRATIONS = 40
+MOST_WARNINGS = 100
+
+
+def content(dataset: xr.Dataset) -> dict[str, Any]:
+    """The names that the page's template uses."""
+    attributes = dataset.attrs
+    settings = json.loads(attributes.get("settings", "{}"))
+    robots = settings.get("robots", [])
+    models = [str(name) for name in dataset["model"].values]
+    readings = [str(name) for name in dataset["friction"].values]
+    calibrations = list(_calibrations(robots, models))
+    warnings = [line for line in str(attributes.get("warnings", "")).split("\n") if line]
+    keys = str(attributes.get("references", "")).split()
+    return {
+        "title": str(attributes.get("title", "Study")),
+        "note": str(attributes.get("note", "")),
+        "observations": str(attributes["observations"]) if "observed_forward_velocity" in dataset else None,
+        "size": _size(dataset),
+        "models": [(name, _known_errors(name, robots)) for name in models],
+        "readings": [(name, FRICTION_MEANINGS.get(name, "")) for name in readings],
+        "calibrations": calibrations[:MOST_CALIBRATIONS],
+        "more_calibrations": max(len(calibrations) - MOST_CALIBRATIONS, 0),
+        "warnings": warnings[:MOST_WARNINGS],
+        "more_warnings": max(len(warnings) - MOST_WARNINGS, 0),
+        "versions": str(attributes.get("versions", "")),
+        "fingerprint": str(attributes.get("fingerprint", "")),
+        "references": [(key, REFERENCES[key]) for key in keys if key in REFERENCES],
+        "code": _code(models[0], readings[0]),
+    }
+
+
+def _size(dataset: xr.Dataset) -> str:
+    """The question of the study in a line."""
+    sizes = dataset.sizes
+    if "channel" in sizes:
+        robots = f"{sizes['channel']} channels × {sizes['wavelength']} wavelengths × {sizes['amplitude']} amplitudes"
+    else:
+        robots = f"{sizes['robot']} robots"
+    rates = f" × {sizes['assumed_motor_rate']} assumed motor rates" if "assumed_motor_rate" in sizes else ""
+    return f"{robots} × {sizes['model']} models × {sizes['friction']} friction readings{rates}"
+
+
+def _known_errors(name: str, robots: list[Mapping[str, Any]]) -> str:
+    """Known error of a model with the options of the robots."""
+    known = SWIMMER_MODELS.get(name)
+    if known is None:
+        return ""
+    options = [_options(robot.get("model", {})) for robot in robots] or [ModelOptions()]
+    return "; or ".join(dict.fromkeys(known.stated_error(option) for option in options))
+
+
+def _options(table: Mapping[str, Any]) -> ModelOptions:
+    """Options as a robot has stored them: checked when it was loaded."""
+    return ModelOptions.model_construct(
+        rft=RftOptions.model_construct(**table.get("rft", {})),
+        slender=SlenderOptions.model_construct(**table.get("slender", {})),
+        tube=TubeOptions.model_construct(**table.get("tube", {})),
+    )
+
+
+def _calibrations(robots: list[Mapping[str, Any]], models: list[str]) -> Iterator[dict[str, str]]:
+    """A line for each robot and model."""
+    for robot in robots:
+        for model in models:
+            entry = (robot.get("calibration") or {}).get(model)
+            yield {
+                "robot": str(robot.get("name", "")),
+                "model": model,
+                "drag": f"{entry['body_drag']:g}" if entry else "1",
+                "rotation": f"{entry['body_rotation']:g}" if entry else "1",
+                "source": str(entry["source"]) if entry else "none",
+            }
+
+
+def _code(model: str, reading: str) -> str:
+    """Three lines of Python that open the dataset."""
+    return (
+        "import xarray as xr\n"
+        'ds = xr.open_dataset("dataset.nc", engine="h5netcdf")\n'
+        f'print(ds["forward_velocity"].sel(model="{model}", friction="{reading}"))  # m/s'
+    )

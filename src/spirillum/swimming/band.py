@@ -1,0 +1,217 @@
+"""Answers where nobody knows how a robot lies in its channel: a band over the places that are possible.
+
+Two things decide much of how a robot swims in its channel and are seldom reported: the gap under its body, and how near
+its tail comes to the floor. Where a placement leaves one of them open, the motion is computed at a few places, each a
+steady state of its own, and the least and the largest value of every quantity are its band. A band is no interval of
+confidence: nothing says that one place is likelier than another.
+
+The gaps are the ends of `GAP_BAND` and their geometric mean, capped by what the channel leaves. The pitches are level,
+the steepest that gap and tail allow, and half of it. At the steepest one the wire's surface, at its lowest point of a
+turn, or the coupling, is still `WIRE_FILM` of the wire's radius away from the glass: a thinner film below the wire is
+not resolved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import PerRobot
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.place import GAP_BAND, WIRE_FILM
+from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.geometry import amplitude_envelope
+from spirillum.robot.limits import broken
+from spirillum.robot.options import ModelOptions
+from spirillum.robot.placement import Placement
+from spirillum.robot.seat import contact_pitch, largest_gap
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.steady import requirements
+from spirillum.units import show
+
+__all__ = ["PLACES_PER_FIELD", "TOLERANCE", "Band", "band_of", "band_places", "joined", "left_open"]
+
+PLACES_PER_FIELD = 3
+"""Gaps, and pitches at each of them."""
+TOLERANCE = 0.25
+"""Tolerance `model.tube.tolerance` of the places: nominal, for at gaps of 0.3 and 1 mm the paper's robot has its speed
+there within 0.1 %, its body rate within 3 %; a band spans several times as much."""
+_SLACK = 1.0 + 1e-6  # rounding must not carry the steepest place out of the domain
+_SWEPT = 129  # rings of what the tail sweeps in a turn
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Band:
+    """Steady swimming of one robot at the places that its placement leaves open, SI."""
+
+    over: tuple[str, ...]
+    """Fields of the placement that it goes over: `gap`, `pitch` or both."""
+    gap: PerRobot
+    """Gap of each place, m."""
+    pitch: PerRobot
+    """Pitch of each place, rad."""
+    swimming: Swimming
+    """The quantities at each place; NaN where it has no answer."""
+    reference: Swimming
+    """The quantities at the reference place, which belongs to the band."""
+    left_out: tuple[str, ...]
+    """Places without an answer, a sentence each."""
+
+    def limits(self, name: str) -> tuple[float, float]:
+        """Least and largest value of a quantity over all places; NaN where it does not apply.
+
+        Args:
+            name: an attribute of `Swimming`.
+        """
+        values = np.concatenate([getattr(self.swimming, name), getattr(self.reference, name)])
+        known = values[np.isfinite(values)]
+        return (float(known.min()), float(known.max())) if known.size else (float("nan"), float("nan"))
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Entries `low`, `high` and `kind` of a quantity's JSON; none for one that does not apply."""
+        low, high = self.limits(name)
+        return {"low": low, "high": high, "kind": "band"} if np.isfinite(low) else {}
+
+    def placed(self, placement: dict[str, Any]) -> dict[str, Any]:
+        """A model's account of a placement, which also says over what the band goes."""
+        found = dict(placement)
+        for name, unit in (("gap", "m"), ("pitch", "rad")):
+            if name in self.over:
+                values = getattr(self, name)
+                ends = {"low": float(values.min()), "high": float(values.max()), "kind": "band"}
+                found[name] = {**quantity(None, unit), **found.get(name, {}), **ends}
+        return found
+
+    def to_dict(self) -> dict[str, Any]:
+        """All places with their answers, as quantities whose values are lists."""
+        units = {f.name: f.metadata["unit"] for f in fields(Swimming) if f.name != "valid"}
+        found = {"gap": quantity(self.gap, "m"), "pitch": quantity(self.pitch, "rad")}
+        return found | {name: quantity(getattr(self.swimming, name), unit) for name, unit in units.items()}
+
+
+def left_open(placement: Placement, model: SwimmerModel) -> tuple[str, ...]:
+    """Fields of a placement over which a model's answer has a band; none for a model that does not ask for it."""
+    if not model.placed or placement.eccentricity is not None:
+        return ()
+    return tuple(name for name in ("gap", "pitch") if getattr(placement, name) is None)
+
+
+def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
+    """The places of a robot's band, from wide gaps to narrow ones and from level to steep.
+
+    As many for every robot, so that the places of several robots compare: where a robot has no room, some are the same.
+
+    Args:
+        batch: one robot, inside the domain of the model, with what is known of its placement.
+        model: a hydrodynamic model.
+
+    Returns:
+        `PLACES_PER_FIELD` for one open field, its square for two; empty where nothing is open.
+    """
+    over = left_open(batch.placement, model)
+    if not over:
+        return []
+    g, radius = Geometry.of(batch, 0), 0.5 * float(batch.channel_diameter[0])
+    known = batch.placement
+    gaps = _gaps(g, radius, known.pitch or 0.0) if "gap" in over else [known.gap]
+    places = []
+    for gap in gaps:
+        assert gap is not None  # noqa: S101 - either open or given
+        alike = g._replace(wavelength=1.0, hand=1.0)
+        steepest = _steepest(alike, radius, gap, known.tail_drop) if "pitch" in over else 0.0
+        pitches = np.linspace(0.0, steepest, PLACES_PER_FIELD).tolist() if "pitch" in over else [known.pitch]
+        places += [known.model_copy(update={"gap": gap, "pitch": pitch}) for pitch in pitches]
+    return places
+
+
+def _gaps(g: Geometry, radius: float, pitch: float) -> list[float]:
+    body = next(outline for name, outline, _ in solids_of_geometry(g) if name == "body")
+    room = largest_gap(body, radius, pitch)
+    ends = [min(share * 0.5 * g.body_diameter, room) for share in GAP_BAND]
+    return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
+
+
+@lru_cache(maxsize=4096)
+def _steepest(g: Geometry, radius: float, gap: float, drop: float) -> float:
+    """Pitch at which tail or coupling keep no more than the clearance, rad; 0 where even a level robot does not.
+
+    The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
+    """
+    outlines = {name: outline for name, outline, _ in solids_of_geometry(g)}
+    xi = g.tail_length * np.linspace(0.0, 1.0, _SWEPT)
+    reach, _ = amplitude_envelope(xi, *(np.full(1, value) for value in (g.amplitude, g.tail_length, g.taper)))
+    behind = -0.5 * g.body_length - g.coupling_length - xi
+    wire = 0.5 * g.wire_diameter
+    found = contact_pitch(
+        outlines["body"],
+        np.stack([behind, reach, np.zeros(_SWEPT)], axis=1),
+        wire,
+        radius,
+        gap,
+        coupling=outlines.get("coupling"),
+        tail_drop=drop,
+        clearance=_SLACK * WIRE_FILM * wire,
+    )
+    return 0.0 if np.isnan(found) else found
+
+
+def at_place(batch: RobotBatch, place: Placement) -> RobotBatch:
+    """The same robots at a place of the band, to be resolved as finely as a band needs."""
+    own: ModelOptions = batch.options
+    tube = own.tube.model_copy(update={"tolerance": TOLERANCE})
+    return replace(batch, placement=place, options=own.model_copy(update={"tube": tube}))
+
+
+def joined(parts: list[Swimming]) -> Swimming:
+    """Several answers one after the other."""
+    return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+
+
+def band_of(
+    batch: RobotBatch,
+    model: SwimmerModel,
+    reference: Swimming,
+    answer: Callable[[RobotBatch], Swimming],
+    tell: Progress,
+) -> Band | None:
+    """The band of one robot; None where its placement leaves nothing open.
+
+    Args:
+        batch: one robot inside the domain of the model, with what is known of its placement.
+        model: a hydrodynamic model.
+        reference: its answer at the reference place.
+        answer: how it swims where it is.
+        tell: called with what is being done, places done and places in all, the reference place being the first.
+    """
+    places = band_places(batch, model)
+    if not places:
+        return None
+    found, left_out = [], []
+    for done, place in enumerate(places):
+        assert place.gap is not None  # noqa: S101 - every place has both
+        assert place.pitch is not None  # noqa: S101
+        where = f"gap {show(place.gap, 'mm')}, pitch {show(place.pitch, 'deg')}"
+        tell(f"{model.name}, {where}", done + 1, len(places) + 1)
+        there = at_place(batch, place)
+        found.append(answer(there))
+        if not found[-1].valid[0]:
+            outside = broken(requirements(there, model))
+            why = outside[0].sentence() if outside else "the robot finds no steady motion there"
+            left_out.append(f"the band leaves out {where}: {why}")
+    tell(model.name, len(places) + 1, len(places) + 1)
+    return Band(
+        left_open(batch.placement, model),
+        np.array([place.gap for place in places], dtype=float),
+        np.array([place.pitch for place in places], dtype=float),
+        joined(found),
+        reference,
+        tuple(left_out),
+    )

@@ -1,0 +1,234 @@
+"""All models side by side on one robot, at the same drive or tail rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady import friction_reading
+
+__all__ = ["ModelComparison", "compare_models", "estimated_error", "uneven_models"]
+
+_UNITS: dict[str, str] = {f.name: f.metadata["unit"] for f in fields(Swimming) if f.name != "valid"}
+
+
+@dataclass(frozen=True)
+class ModelComparison:
+    """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
+
+    robot: Robot
+    """The robot."""
+    friction: FrictionReading
+    """Reading of the friction, the same for all models."""
+    models: tuple[str, ...]
+    """Names of the models, in the order of the question."""
+    predictions: Mapping[str, Prediction]
+    """Answers by model, in that order."""
+    refusals: Mapping[str, str]
+    """Why a model does not answer, a sentence each."""
+
+    @cached_property
+    def reference(self) -> str:
+        """The model that the others are held against.
+
+        The last that puts a number on its own error, for such a model resolves what the others neglect; the first
+        that answers where none does.
+        """
+        bounded = [name for name, answer in self.predictions.items() if estimated_error(answer) is not None]
+        return bounded[-1] if bounded else next(iter(self.predictions))
+
+    def relative_difference(self, model: str, name: str) -> float:
+        """model/reference - 1 of a quantity; NaN where one of them has none, or the reference is zero.
+
+        Args:
+            model: a model that answers.
+            name: a quantity, as in `Prediction`.
+
+        Raises:
+            InputError: for a model without an answer, or an unknown quantity.
+        """
+        if model not in self.predictions:
+            raise InputError(f"model = {model!r} has no answer here; allowed: {', '.join(self.predictions)}")
+        if name not in _UNITS:
+            raise InputError(f"quantity = {name!r}; allowed: {', '.join(_UNITS)}")
+        value, base = (getattr(self.predictions[key], name) for key in (model, self.reference))
+        return float(value / base - 1.0) if base != 0 else math.nan
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What to be careful about, a sentence each; one that holds for some models only names them."""
+        count = len(self.predictions)
+        said: dict[str, list[str]] = {}
+        for name, answer in self.predictions.items():
+            for sentence in answer.warnings:
+                said.setdefault(sentence, []).append(name)
+        found = [
+            sentence if len(names) == count else f"{', '.join(names)}: {sentence}" for sentence, names in said.items()
+        ]
+        calibrated = [name for name, answer in self.predictions.items() if answer.calibrated]
+        return (*uneven_models([self.robot], list(self.predictions), calibrated), *found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum compare-models --json`."""
+        entries = {name: self._answered(name, answer) for name, answer in self.predictions.items()}
+        entries |= {name: {"model": name, "answered": False, "reason": why} for name, why in self.refusals.items()}
+        content = {
+            "robot": self.robot.name,
+            "friction": self.friction,
+            "reference": self.reference,
+            "models": [entries[name] for name in self.models],
+        }
+        return envelope("model-comparison", content, self.warnings)
+
+    def _answered(self, name: str, answer: Prediction) -> dict[str, Any]:
+        """One model's prediction, without what stands once for all models."""
+        left_out = ("schema", "robot", "friction", "warnings")
+        return {
+            "model": name,
+            "title": answer.model.title,
+            "answered": True,
+            **{key: value for key, value in answer.to_dict().items() if key not in left_out},
+            "relative_difference": {key: quantity(self.relative_difference(name, key), "1") for key in _UNITS},
+        }
+
+
+def uneven_models(robots: Sequence[Robot], models: Sequence[str], calibrated: Sequence[str]) -> list[str]:
+    """What sets models apart besides their theory, a sentence each.
+
+    Args:
+        robots: the robots that they answer for.
+        models: names of the models.
+        calibrated: those of them that take calibration factors.
+    """
+    found = []
+    walled = [name for name in models if find_swimmer_model(name).placed]
+    open_ = [name for name in models if name not in walled]
+    if walled and open_ and any(robot.channel is not None for robot in robots):
+        found.append(
+            f"the channel's walls are computed by {', '.join(walled)} and not by {', '.join(open_)}: the differences "
+            "contain them"
+        )
+    bare = [name for name in open_ if name not in calibrated]
+    if calibrated and bare:
+        found.append(
+            f"calibration factors stand for the walls with {', '.join(calibrated)} and not with {', '.join(bare)}: the "
+            "differences contain them; without calibration only the models differ"
+        )
+    turned = [name for name in models if "coupling" in find_swimmer_model(name).parts]
+    without = [name for name in models if name not in turned]
+    if turned and without and any(robot.coupling.length > 0 and robot.coupling.diameter > 0 for robot in robots):
+        found.append(
+            f"the coupling turns with the tail in {', '.join(turned)} and is left out by {', '.join(without)}: torques "
+            "and efficiencies differ by it too"
+        )
+    return found
+
+
+def estimated_error(prediction: Prediction) -> float | None:
+    """The relative error that a model estimates of its own speed; None where it states its error in words only."""
+    return prediction.error_estimate if math.isfinite(prediction.error_estimate) else None
+
+
+def compare_models(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    models: Sequence[str] | None = None,
+    tail_rate: str | float | None = None,
+    friction: str | None = None,
+    calibrated: bool | None = None,
+    calibration: str | Path | None = None,
+    accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> ModelComparison:
+    """Predict the steady swimming of one robot with several models.
+
+    A model whose domain the robot leaves is listed with its reason; the others answer.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        models: names of models; None: all that make a robot swim.
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
+            the robot's drive decides, and the models differ in their rates too.
+        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
+            factors that stand for walls in some models and not in others hide how the models differ.
+        calibration: calibration file whose factors replace the robot's.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.
+        tolerance: of the model `tube`, relative; None: the robot's own.
+        phases: of the model `tube`, number of phases of the tail; None: the robot's own.
+        progress: told what is being computed, how many models are done, and of how many.
+
+    Raises:
+        InputError: for wrong input, or if no model answers.
+    """
+    own = load(robot)
+    factors = calibration is not None if calibrated is None else calibrated
+    if accuracy is not None:
+        own = with_accuracy(own, accuracy)
+    if tolerance is not None:
+        own = with_tolerance(own, tolerance)
+    if phases is not None:
+        own = with_phases(own, phases)
+    ready = own if calibration is None else with_calibration(own, calibration)
+    reading = friction_reading(friction or ready.friction.reading)
+    names = _chosen(models)
+    place = Placement.of(placement)
+    check_placement(place, *(find_swimmer_model(name) for name in names))
+    predictions: dict[str, Prediction] = {}
+    refusals: dict[str, str] = {}
+    for done, name in enumerate(names):
+        if progress is not None:
+            progress(f"model {name}", done, len(names))
+        try:
+            predictions[name] = predict(
+                own,
+                model=name,
+                tail_rate=tail_rate,
+                friction=reading,
+                calibrated=factors,
+                calibration=calibration,
+                placement=place if find_swimmer_model(name).placed and place != Placement() else None,
+                band=False,
+            )
+        except InputError as error:
+            refusals[name] = str(error)
+    if not predictions:
+        raise InputError(*_nobody_answers(refusals))
+    return ModelComparison(ready, reading, tuple(names), predictions, refusals)
+
+
+def _chosen(models: Sequence[str] | None) -> list[str]:
+    """Names of the models, each once.
+
+    Raises:
+        InputError: for an unknown name, or none at all.
+    """
+    asked = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
+    if not asked:
+        raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")
+    return list(dict.fromkeys(find_swimmer_model(name).name for name in asked))
+
+
+def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
+    """A sentence and every model's reason; what has nothing to do with models, such as a wrong rate, is said once."""
+    reasons = list(dict.fromkeys(refusals.values()))
+    if len(reasons) == 1:
+        return reasons[0], ()
+    return f"no model answers: {'; '.join(reasons)}", tuple(reasons)

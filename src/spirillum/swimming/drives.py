@@ -1,0 +1,171 @@
+"""Rates of body and tail: from the robots' drive, or at prescribed rates, for every reading of the friction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from spirillum.arrays import PerRobot
+from spirillum.errors import InputError
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.swimming.balance import (
+    FrictionTorques,
+    TorqueBalance,
+    coasting_rates,
+    friction_torques,
+    rates_per_torque,
+)
+from spirillum.swimming.motor import steady_current
+
+__all__ = ["DriveState", "at_rate", "driven", "one_piece"]
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """Rates and what the motor does to keep them."""
+
+    body_rate: PerRobot
+    tail_rate: PerRobot
+    current: PerRobot
+    effective: PerRobot
+    torques: FrictionTorques
+    residual: PerRobot
+    step_out: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: fastest rotation of the field that the robot follows, rad/s."""
+    lag: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: angle of the moment behind the turning field, rad; NaN where the robot does not follow."""
+    driving_rate: PerRobot = field(default_factory=lambda: np.full(1, np.nan))
+    """Magnetic drive: rate of the field, against which its torque works, rad/s."""
+
+
+def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
+    """(B_eff or B, B_m); unset, B_eff is the rotor's own B_m alone and the wall's B is zero."""
+    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    if friction == "none":
+        return np.zeros(1), rotor
+    unset = np.isnan(batch.effective_friction)
+    return np.where(unset, 0.0 if friction == "body" else rotor, batch.effective_friction), rotor
+
+
+def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> DriveState:
+    """Motion under the robots' own drive: what the joint torque adds to coasting; the motor closes it."""
+    effective, rotor = _joint_friction(batch, friction)
+    t = friction_torques(friction, effective, rotor)
+    none = np.full(1, np.nan)
+    if batch.drive == "rate":
+        body_rate, tail = _rates_by_torque_sum(s, t, batch.drive_rate, none)
+        return DriveState(body_rate, tail, none, effective, t, none)
+    body_coasting, tail_coasting = coasting_rates(s, t)
+    body_per_torque, tail_per_torque = rates_per_torque(s, t)
+    if batch.drive == "torque":
+        torque, current = batch.drive_torque, none
+    elif batch.drive == "dc-motor" and batch.electrics is not None:
+        motor = batch.electrics
+        slip = tail_per_torque - body_per_torque
+        per_current = motor.back_emf_constant * motor.torque_constant * slip
+        coasting = motor.back_emf_constant * motor.polarity * (tail_coasting - body_coasting)
+        current = motor.polarity * steady_current(motor, coasting, per_current)
+        torque = motor.torque_constant * current
+    else:
+        raise InputError("drive is missing; allowed: a [drive] table, or a tail rate (--tail-rate)")
+    # Reading `paper` pushes the tail backwards once B_eff exceeds E_x: no steady motion of that kind.
+    tail_per_torque = np.where(tail_per_torque > 0, tail_per_torque, np.nan)
+    body_rate, tail = body_per_torque * torque + body_coasting, tail_per_torque * torque + tail_coasting
+    return DriveState(body_rate, tail, current, effective, t, none)
+
+
+def at_rate(
+    batch: RobotBatch,
+    s: TorqueBalance,
+    tail_rate: PerRobot,
+    motor_rate: PerRobot,
+    friction: FrictionReading,
+) -> DriveState:
+    """Motion at prescribed rates; with a DC-motor the friction follows from (17) and (18)."""
+    effective, rotor = _joint_friction(batch, friction)
+    none = np.full(1, np.nan)
+    motor = batch.electrics
+    if batch.drive != "dc-motor" or motor is None:
+        t = friction_torques(friction, effective, rotor)
+        body_rate, tail = _rates_by_torque_sum(s, t, tail_rate, motor_rate)
+        return DriveState(body_rate, tail, none, effective, t, none)
+    if friction == "paper":
+        return _at_rate_paper(s, motor, tail_rate, motor_rate)
+    wall = effective if friction == "body" else np.zeros(1)
+    # What acts inside the joint cancels in the sum of both torques and does not change the motion.
+    body_rate, tail = _rates_by_torque_sum(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
+    slip = np.where(np.isnan(motor_rate), tail - body_rate, motor_rate)
+    current = _current_at(motor, slip)
+    spare = motor.torque_constant * current - s.rotor_load(body_rate, tail)
+    if friction == "rotor":
+        inferred = spare / slip
+        t = friction_torques("rotor", inferred, rotor)
+        return DriveState(body_rate, tail, current, inferred, t, none)
+    t = friction_torques(friction, effective, rotor)
+    residual = spare - (rotor * slip if friction == "body" else 0.0)
+    return DriveState(body_rate, tail, current, effective, t, residual)
+
+
+def _rates_by_torque_sum(
+    s: TorqueBalance, t: FrictionTorques, tail_rate: PerRobot, motor_rate: PerRobot
+) -> tuple[PerRobot, PerRobot]:
+    """(Omega, omega) from the sum of both torque rows, in which the joint torque cancels."""
+    on_body, on_tail = (s.bb + s.rb) + (t.bb + t.rb), (s.br + s.rr) + (t.br + t.rr)
+    on_body = np.where(on_body > 0, on_body, np.nan)  # `paper` beyond E_x: as in `driven`
+    flow = s.t_b + s.t_r
+    tail = np.where(np.isnan(tail_rate), (motor_rate * on_body + flow) / (on_body + on_tail), tail_rate)
+    return -on_tail / on_body * tail + flow / on_body, tail
+
+
+def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, motor_rate: PerRobot) -> DriveState:
+    """Reading `paper`: the body row holds -K_m I and the flow's torque, so the current decides the body's rate."""
+    k, k_b = motor.torque_constant, motor.back_emf_constant
+    observed = ~np.isnan(motor_rate)
+    emf = k_b * motor.polarity * np.where(observed, motor_rate, tail_rate * (1.0 + s.br / s.bb) - s.t_b / s.bb)
+    current = motor.polarity * steady_current(motor, emf, np.where(observed, 0.0, k_b * k / s.bb))
+    from_motor = -(k * current + s.br * motor_rate - s.t_b) / (s.bb + s.br)
+    body_rate = np.where(np.isnan(tail_rate), from_motor, -(k * current + s.br * tail_rate - s.t_b) / s.bb)
+    tail = np.where(np.isnan(tail_rate), body_rate + motor_rate, tail_rate)
+    slip = np.where(observed, motor_rate, tail - body_rate)
+    inferred = (k * current - s.rotor_load(body_rate, tail)) / slip
+    t = friction_torques("paper", inferred, motor.rotor_friction)
+    body_coasting, tail_coasting = coasting_rates(s, t)
+    with_motor = (tail - tail_coasting) * (slip - (tail_coasting - body_coasting)) > 0
+    tail = np.where(with_motor, tail, np.nan)  # B_eff beyond E_x pushes the tail backwards: as in `driven`
+    return DriveState(body_rate, tail, current, inferred, t, np.full(1, np.nan))
+
+
+def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
+    """Signed current at a given motor rate, from (17)."""
+    return motor.polarity * steady_current(motor, motor.back_emf_constant * motor.polarity * motor_rate, np.zeros(1))
+
+
+def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> DriveState:
+    """Fixed joint: body and tail turn together under an external torque or rate."""
+    load, flow = s.bb + s.br + s.rb + s.rr, s.t_b + s.t_r
+    zero, none = np.zeros(1), np.full(1, np.nan)
+    frictionless = FrictionTorques(zero, zero, zero, zero, zero)
+    if batch.drive == "magnetic" and np.all(np.isnan(tail_rate)):
+        step_out, lag, rate = _in_rotating_field(batch, load, flow)
+        return DriveState(rate, rate, none, none, frictionless, none, step_out, lag, batch.field_rate)
+    own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + flow) / load
+    rate = np.where(np.isnan(tail_rate), own, tail_rate)
+    return DriveState(rate, rate, none, none, frictionless, none)
+
+
+def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tuple[PerRobot, PerRobot, PerRobot]:
+    """Step-out rate, phase lag and mean rate of a robot held to the axis about which the field turns.
+
+    The moment's part across the axis, m sin(moment_angle), lags behind the field by an angle with
+    m B sin(lag) = load * rate. Beyond step-out the lag grows without end, d(lag)/dt = rate - step_out sin(lag), and
+    the robot turns at rate - sqrt(rate^2 - step_out^2) on average (R. Adler, Proc. IRE 34:351, 1946).
+    """
+    strength = batch.magnetic_moment * np.sin(batch.moment_angle) * batch.magnetic_field
+    wanted = batch.field_rate - flow / load  # what the field has to drive beyond the flow's own turning
+    step_out = strength / load
+    follows = np.abs(wanted) <= step_out
+    lag = np.where(follows, np.arcsin(np.where(follows, np.abs(wanted) / step_out, 0.0)), np.nan)
+    slipping = wanted - np.sign(wanted) * np.sqrt(np.where(follows, 0.0, wanted**2 - step_out**2))
+    return step_out, lag, np.where(follows, wanted, slipping) + flow / load

@@ -1,0 +1,119 @@
+"""What is free to move: lateral motion and tilt held, as the channel's floor does, or released.
+
+Held, the whole robot has one velocity along x. Released, no force and no lateral torque acts on it, and the motion is
+a screw: seen from the tail, the velocity U of the origin and the rotation w = (omega, Omega_y, Omega_z) of the tail are
+constant, so that the robot advances along the fixed direction of w at U.w/|w| while its axis circles around it.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple, cast, get_args
+
+import numpy as np
+
+from spirillum.arrays import Matrix12, PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.model import SwimmerModel
+from spirillum.swimming.balance import TorqueBalance
+
+__all__ = ["LINKS", "Motion", "Screw", "check_full", "motion_of", "released"]
+
+Motion = Literal["held", "free"]
+"""Lateral motion and tilt held, or released."""
+
+LINKS = np.zeros((12, 7))
+"""Twists of body and rotor from the seven rates (U, Omega_b, omega_m), all about the origin in body axes."""
+LINKS[:6, :6] = LINKS[6:, :6] = np.eye(6)
+LINKS[9, 6] = 1.0
+
+_SPINS = np.zeros((12, 7))
+"""Twists from (U, Omega_y, Omega_z) of both parts and their own rates about x, Omega and omega."""
+for _column, _row in enumerate((0, 1, 2, 4, 5)):
+    _SPINS[_row, _column] = _SPINS[6 + _row, _column] = 1.0
+_SPINS[3, 5] = _SPINS[9, 6] = 1.0
+
+
+class Screw(NamedTuple):
+    """The free motion, as long as both parts turn steadily; SI."""
+
+    speed: PerRobot
+    """Speed along the axis of the screw, positive where the nose leads, m/s."""
+    tilt: PerRobot
+    """Angle between the motor axis and the axis of the screw, rad."""
+    radius: PerRobot
+    """Radius of the helix on which the origin moves, m."""
+
+    @classmethod
+    def of(cls, shared: Samples, body_rate: PerRobot, tail_rate: PerRobot) -> Screw:
+        """The screw of robots with such rates.
+
+        Args:
+            shared: U (3), Omega_y and Omega_z per rate of body and rotor, (n, 5, 2), from `released`.
+            body_rate: Omega, rad/s.
+            tail_rate: omega, rad/s.
+        """
+        moving = shared[..., 0] * body_rate[..., None] + shared[..., 1] * tail_rate[..., None]
+        velocity = moving[..., :3]
+        spin = np.concatenate([np.broadcast_to(tail_rate, moving.shape[:-1])[..., None], moving[..., 3:]], axis=-1)
+        size = np.linalg.norm(spin, axis=-1)
+        turning = np.where(size > 0, size, np.inf)
+        forward = np.where(tail_rate < 0, -1.0, 1.0)
+        along = forward * np.sum(velocity * spin, axis=-1) / turning
+        return cls(
+            speed=np.where(size > 0, along, velocity[..., 0]),
+            tilt=np.arctan2(np.linalg.norm(spin[..., 1:], axis=-1), np.abs(tail_rate)),
+            radius=np.linalg.norm(np.cross(spin, velocity), axis=-1) / turning**2,
+        )
+
+
+def motion_of(name: str) -> Motion:
+    """The motion of that name.
+
+    Raises:
+        InputError: if there is none.
+    """
+    if name not in get_args(Motion):
+        raise InputError(f"motion = {name!r}; allowed: {', '.join(get_args(Motion))}")
+    return cast("Motion", name)
+
+
+def check_full(model: SwimmerModel) -> None:
+    """Refuse a model that does not know all that a free motion needs.
+
+    Raises:
+        InputError: for a model of the axial entries only, or one whose answer holds at one place in the channel.
+    """
+    if model.axial_only:
+        why = "knows the entries along and about the motor axis only"
+    elif model.placed:
+        why = "answers at one place in the channel, which a free robot leaves"
+    else:
+        return
+    raise InputError(f"motion = 'free' with model '{model.name}', which {why}; allowed: motion 'held', or rft, slender")
+
+
+def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
+    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot.
+
+    Args:
+        r: R at phase 0 of the tail, 12x12. For a body of revolution the tail's phase does not matter.
+
+    Returns:
+        The torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
+    """
+    shared = np.swapaxes(_SPINS, 0, 1) @ r @ _SPINS
+    rates: Samples = -np.asarray(np.linalg.solve(shared[..., :5, :5], shared[..., :5, 5:]), dtype=np.float64)
+    s = shared[..., 5:, 5:] + shared[..., 5:, :5] @ rates
+    zero = np.zeros(s.shape[:-2])
+    balance = TorqueBalance(
+        bb=s[..., 0, 0],
+        br=s[..., 0, 1],
+        rb=s[..., 1, 0],
+        rr=s[..., 1, 1],
+        u_b=rates[..., 0, 0],
+        u_r=rates[..., 0, 1],
+        u_0=zero,
+        t_b=zero,
+        t_r=zero,
+    )
+    return balance, rates

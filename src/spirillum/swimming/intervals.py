@@ -1,0 +1,284 @@
+"""Swimming with what a calibration does not know: a posterior's draws, each swum, and the intervals over them.
+
+A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
+discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
+discrepancy then goes onto speed and rates, independently for each draw, for a tail that was not observed may be missed
+by as much as those that were; torques, currents, powers and efficiencies are computed from the rates and speeds that it
+leaves. An interval is of the robot's own motion, not of a single measured trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Axial, PerRobot, Samples
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.model import SwimmerModel
+from spirillum.robot.batch import CalibrationFactors, RobotBatch
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.balance import friction_torques
+from spirillum.swimming.motor import battery_voltage, run_time, steady_current
+from spirillum.swimming.steady import friction_reading, swim
+
+__all__ = ["LEVEL", "Intervals", "drawn_kinematics", "intervals_of"]
+
+LEVEL = 0.95
+"""Level of the intervals."""
+_ELECTRIC = ("torque_constant", "back_emf_constant")
+_COEFFICIENTS = ("normal_factor", "tangential_factor")
+_WIRE_POINTS = 7
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Limits of the intervals of every quantity of one robot."""
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
+        if not np.isfinite(self.low[name]):
+            return {}
+        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
+
+
+def intervals_of(
+    robot: Robot,
+    model: SwimmerModel,
+    posterior: PosteriorFile,
+    *,
+    tail_rate: float | None,
+    friction: str,
+) -> Intervals:
+    """Swim every draw of a posterior and take the limits of 95 % intervals.
+
+    Args:
+        robot: the robot, as `PosteriorFile.central` gives it.
+        model: the hydrodynamic model of the posterior.
+        posterior: its draws.
+        tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
+        friction: reading of the friction.
+    """
+    rng = np.random.default_rng(1)
+    draws = posterior.of(robot, rng)
+    size = next(iter(draws.values())).size
+    batch = _drawn_batch(robot, posterior.model, draws, size)
+    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    rates = None if tail_rate is None else np.full(size, tail_rate)
+    swum = swim(batch, drawn, tail_rate=rates, friction=friction)
+    values = _with_discrepancy(swum, batch, posterior, rng, own_drive=tail_rate is None, friction=friction)
+    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
+    limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
+    nan = float("nan")
+    return Intervals(
+        {name: float(limits[name][0]) if name in limits else nan for name in values},
+        {name: float(limits[name][1]) if name in limits else nan for name in values},
+    )
+
+
+def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
+    """Advance per radian and body over tail rate of every draw, without the model's discrepancy, (draws,).
+
+    Args:
+        robot: the robot, as `PosteriorFile.central` gives it.
+        model: the hydrodynamic model of the posterior.
+        posterior: its draws.
+    """
+    draws = posterior.of(robot, np.random.default_rng(1))
+    size = next(iter(draws.values())).size
+    batch = _drawn_batch(robot, posterior.model, draws, size)
+    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    swum = swim(batch, drawn, tail_rate=np.full(size, robot.hand), friction="none")
+    return {"advance": swum.advance_per_radian, "turning": swum.body_rotation_rate / swum.tail_rotation_rate}
+
+
+def _known(column: Samples) -> bool:
+    """Whether at least nineteen of twenty draws have an answer, and the draws differ: else nothing acts on it."""
+    known = column[np.isfinite(column)]
+    if known.size < LEVEL * column.size:
+        return False
+    return bool(np.ptp(known) > 1e-9 * np.max(np.abs(known)))
+
+
+def _drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
+    """A robot for each draw."""
+    one = np.ones(size)
+    columns: dict[str, np.ndarray] = {}
+    own = robot.friction.effective
+    columns["friction.effective"] = np.full(size, np.nan if own is None else own)
+    for name, path in (
+        ("wire_diameter", "tail.wire_diameter"),
+        ("viscosity", "fluid.viscosity"),
+        ("shared_friction", "friction.effective"),
+        ("friction", "friction.effective"),
+    ):
+        if name in draws:
+            columns[path] = draws[name]
+    batch = RobotBatch.of(robot).with_values(columns)
+    if batch.electrics is not None:
+        motor = {name: draws[name] for name in _ELECTRIC if name in draws}
+        batch = replace(batch, electrics=replace(batch.electrics, **motor))
+    entry = robot.calibration.get(model)
+    if entry is not None:
+        factors = CalibrationFactors(
+            body_drag=draws.get("body_drag", entry.body_drag * one),
+            body_rotation=draws.get("body_rotation", entry.body_rotation * one),
+            channel_diameter=entry.fitted_to.channel_diameter * one,
+            body_diameter=entry.fitted_to.body_diameter * one,
+            body_length=entry.fitted_to.body_length * one,
+        )
+        batch = replace(batch, calibration={model: factors})
+    return batch
+
+
+def _drawn_axial(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples], size: int) -> Axial:
+    """Resistances of all draws, (draws, 4, 4), or (1, 4, 4) where they share it."""
+    batch = RobotBatch.of(robot)
+    if "wire_diameter" not in draws:
+        found = _with_coefficients(batch, model, draws)
+    elif model.closed_form:
+        found = _with_coefficients(batch.with_values({"tail.wire_diameter": draws["wire_diameter"]}), model, draws)
+    else:
+        wires = np.log(draws["wire_diameter"])
+        angle = (2.0 * np.arange(_WIRE_POINTS) + 1.0) * np.pi / (2.0 * _WIRE_POINTS)
+        nodes = 0.5 * (wires.min() + wires.max()) + 0.5 * (wires.max() - wires.min()) * np.cos(angle)
+        known = model.axial(batch.with_values({"tail.wire_diameter": np.exp(nodes)}))
+        fit = np.polynomial.chebyshev.chebfit(np.cos(angle), known.reshape(_WIRE_POINTS, 16), _WIRE_POINTS - 1)
+        at = (2.0 * wires - wires.min() - wires.max()) / (wires.max() - wires.min())
+        found = np.polynomial.chebyshev.chebval(at, fit).T.reshape(size, 4, 4)
+    if "viscosity" in draws:
+        found = found * (draws["viscosity"] / robot.fluid.viscosity)[:, None, None]
+    return found
+
+
+def _with_coefficients(batch: RobotBatch, model: SwimmerModel, draws: Mapping[str, Samples]) -> Axial:
+    """RFT is linear in both of its coefficients: what a factor adds is what doubling it adds, in proportion."""
+    found = model.axial(batch)
+    whole, own = found, batch.options.rft
+    for name in _COEFFICIENTS:
+        if name in draws:
+            value = getattr(own, name)
+            doubled = batch.options.model_copy(update={"rft": own.model_copy(update={name: 2.0 * value})})
+            more = model.axial(replace(batch, options=doubled)) - whole
+            found = found + (draws[name] / value - 1.0)[:, None, None] * more
+    return found
+
+
+class _Drawn(SwimmerModel):
+    """A model whose resistances are known beforehand, one for each draw."""
+
+    parts = ()
+
+    def __init__(self, model: SwimmerModel, axial: Axial) -> None:
+        self.name = model.name  # type: ignore[misc]
+        self._model, self._axial = model, axial
+
+    def domain(self, batch: RobotBatch) -> list[Any]:
+        return self._model.domain(batch)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Any:
+        return self._model.part_matrix(batch, part, phase)
+
+    def axial(self, batch: RobotBatch) -> Axial:  # noqa: ARG002 - one interface for all models
+        return self._axial
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Any:
+        return self._model.resistance(batch, phase)
+
+
+def _with_discrepancy(
+    swum: Swimming,
+    batch: RobotBatch,
+    posterior: PosteriorFile,
+    rng: np.random.Generator,
+    *,
+    own_drive: bool,
+    friction: str,
+) -> dict[str, Samples]:
+    """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
+    values = {f.name: getattr(swum, f.name) for f in fields(Swimming) if f.name != "valid"}
+    size = swum.forward_velocity.size
+    one = np.ones(size)
+
+    def off(name: str) -> Samples:
+        tau = posterior.discrepancy.get(name)
+        return one if tau is None else 1.0 + tau * rng.normal(size=size)
+
+    advance, turning, motor = off("advance"), off("turning"), off("motor_rate")
+    # A fixed joint turns body and tail alike, and a drive that prescribes the rate is not missed by the model.
+    turning = one if batch.joint == "fixed" else turning
+    pace = motor if own_drive and batch.drive == "dc-motor" else one
+    tail = values["tail_rotation_rate"] * pace
+    body = values["body_rotation_rate"] * turning * pace
+    speed = advance * pace
+    values |= {
+        "forward_velocity": values["forward_velocity"] * speed,
+        "advance_per_radian": values["advance_per_radian"] * advance,
+        "reynolds_number": values["reynolds_number"] * np.abs(speed),
+        "tail_reynolds_number": values["tail_reynolds_number"] * np.abs(pace),
+        "propulsive_power": values["propulsive_power"] * speed**2,
+        "tail_rotation_rate": tail,
+        "body_rotation_rate": body,
+        "motor_rotation_rate": tail - body,
+    }
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if batch.joint != "fixed":
+            values |= _torques_and_powers(swum, values, batch, pace, own_drive=own_drive, friction=friction)
+        return values | _over_speed(swum, values, speed)
+
+
+def _torques_and_powers(
+    swum: Swimming,
+    values: dict[str, Samples],
+    batch: RobotBatch,
+    pace: Samples,
+    *,
+    own_drive: bool,
+    friction: str,
+) -> dict[str, Samples]:
+    """Torques are linear in the rates, the current follows from (17), B_eff at a prescribed rate from (18)."""
+    tail, body, slip = (values[f"{name}_rotation_rate"] for name in ("tail", "body", "motor"))
+    drive = swum.drive_torque * pace
+    on_body = (swum.dissipated_power - swum.drive_torque * swum.tail_rotation_rate) / swum.body_rotation_rate
+    found = {
+        "drive_torque": drive,
+        "tail_torque": np.abs(drive),
+        "shaft_power": drive * slip,
+        "dissipated_power": np.where(body == 0.0, drive * tail, drive * tail + on_body * pace * body),
+    }
+    effective, motor = swum.effective_friction, batch.electrics
+    rotor = motor.rotor_friction if motor is not None else np.zeros(1)
+    if motor is not None and batch.drive == "dc-motor":
+        emf = motor.back_emf_constant * motor.polarity * slip
+        current = motor.polarity * steady_current(motor, emf, np.zeros(1))
+        voltage = battery_voltage(motor, current)
+        found |= {
+            "motor_current": current,
+            "battery_voltage": voltage,
+            "electrical_power": motor.duty * motor.polarity * current * voltage,
+            "battery_run_time": run_time(motor, current),
+        }
+        spare = motor.torque_constant * current - drive
+        if not own_drive and friction in ("rotor", "paper"):
+            effective = spare / slip
+        elif not own_drive:
+            found["motor_residual_torque"] = spare - (rotor * slip if friction == "body" else 0.0)
+    torques = friction_torques(friction_reading(friction), effective, rotor)
+    return found | {"effective_friction": effective, "friction_power": torques.power(body, tail)}
+
+
+def _over_speed(swum: Swimming, values: dict[str, Samples], speed: Samples) -> dict[str, Samples]:
+    """Efficiencies and the cost of transport: powers over powers, or over weight times speed."""
+    shaft, electrical = (values[name] / getattr(swum, name) for name in ("shaft_power", "electrical_power"))
+    spent = np.where(np.isnan(electrical), shaft, electrical)
+    return {
+        "hydrodynamic_efficiency": swum.hydrodynamic_efficiency * speed**2 / shaft,
+        "overall_efficiency": swum.overall_efficiency * speed**2 / electrical,
+        "cost_of_transport": swum.cost_of_transport * spent / np.abs(speed),
+    }

@@ -1,0 +1,366 @@
+"""One robot's predicted swimming, with everything that a reader of the number has to know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import calibrated_placement
+from spirillum.fitted.posterior_file import read_posterior
+from spirillum.fitted.warnings import fitted_of
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import check_placement, find_swimmer_model
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit, broken
+from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.band import Band, band_of
+from spirillum.swimming.drive_warnings import drive_warnings
+from spirillum.swimming.freedom import Motion, motion_of
+from spirillum.swimming.intervals import Intervals, intervals_of
+from spirillum.swimming.steady import (
+    calibrated_balance,
+    friction_reading,
+    requirements,
+    speed_difference,
+    swim,
+)
+from spirillum.units import KINDS, parse_option, show
+
+__all__ = ["Prediction", "accuracy_limits", "calibration_warnings", "checked_batch", "predict", "prepared"]
+
+_LARGEST_REYNOLDS = 0.1
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Steady swimming of one robot, SI, rates signed about +x.
+
+    The quantities are attributes (`prediction.forward_velocity`); NaN where one does not apply.
+    """
+
+    robot: Robot
+    """The robot."""
+    model: SwimmerModel
+    """The hydrodynamic model."""
+    friction: FrictionReading
+    """Reading of the friction."""
+    calibrated: bool
+    """Whether calibration factors were applied."""
+    batch: RobotBatch = field(repr=False)
+    """The robot in its place, as a batch of one."""
+    swimming: Swimming = field(repr=False)
+    """The quantities, as arrays of length one."""
+    error_estimate: float
+    """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
+    warnings: tuple[str, ...]
+    """What to be careful about, a sentence each."""
+    intervals: Intervals | None = field(default=None, repr=False)
+    """Intervals of a posterior; None without one."""
+    band: Band | None = field(default=None, repr=False)
+    """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
+    motion: Motion = "held"
+    """Lateral motion and tilt held, or released."""
+
+    def __getattr__(self, name: str) -> float:
+        """A quantity by name, as a float."""
+        if name.startswith("_") or name not in _QUANTITIES:
+            raise AttributeError(name)
+        return float(getattr(self.swimming, name)[0])
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Keys of the references that it rests on."""
+        return self.model.references
+
+    @cached_property
+    def placement(self) -> dict[str, Any]:
+        """Where the model places the robot; what a band goes over has `low`, `high` and `kind` too."""
+        found = self.model.placement_of(self.batch)
+        return found if self.band is None else self.band.placed(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum predict --json`."""
+        band = self.band
+        over = band or self.intervals
+        quantities = {
+            name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
+            for name, (unit, _) in _QUANTITIES.items()
+        }
+        content = {
+            "robot": self.robot.name,
+            "model": self.model.name,
+            "friction": self.friction,
+            "calibrated": self.calibrated,
+            "motion": self.motion,
+            **quantities,
+            "placement": self.placement,
+            **({"band": band.to_dict()} if band else {}),
+            "error_estimate": quantity(self.error_estimate, "1", statement=self.model.stated_error(self.robot.model)),
+            "references": list(self.references),
+        }
+        return envelope("prediction", content, self.warnings)
+
+
+_QUANTITIES: dict[str, tuple[str, str]] = {
+    f.name: (f.metadata["unit"], f.metadata["meaning"]) for f in fields(Swimming) if f.name != "valid"
+}
+_MORE = {
+    "reynolds_number": {"length": "body diameter"},
+    "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
+}
+
+
+def predict(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = "sbt",
+    tail_rate: str | float | None = None,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
+    band: bool = True,
+    motion: str = "held",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Prediction:
+    """Predict the steady swimming of one robot.
+
+    Where the answer depends on the robot's place in its channel and `placement` leaves its gap or its pitch open, the
+    answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and has a band over the places
+    that are possible, see `spirillum.swimming.band`.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        model: `sbt`, `rft`, `slender` or `tube`.
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
+            the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
+            the effective friction from (18).
+        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+        posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
+            95 % interval, the model's discrepancy included.
+        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
+            `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
+        tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
+        phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
+        band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
+            place alone.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`: released, without weight
+            and walls; the forward velocity is then that along the axis of the screw on which the robot moves.
+        progress: told what is being computed, how many places are done, and of how many.
+
+    Raises:
+        InputError: for wrong input, or a robot outside the model's domain.
+    """
+    drawn = None
+    robot = load(robot)
+    unset = robot.friction.effective is None
+    if posterior is not None:
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        drawn = read_posterior(posterior, model)
+        robot = drawn.central(robot)
+    ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
+    reading = friction_reading(friction or ready.friction.reading)
+    rate = _rate(tail_rate, batch.placement)
+    if rate is None and ready.drive is None:
+        raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
+
+    def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
+        rates = None if rate is None else np.array([rate])
+        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated, motion=motion)
+
+    tell = progress or (lambda _what, _done, _total: None)
+    if not chosen.closed_form:
+        tell(f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+    result = answer(batch)
+    if not result.valid[0]:
+        raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
+    warnings = [
+        *ready.warnings,
+        *(calibration_warnings(ready, chosen.name) if calibrated else ()),
+        *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
+        *drive_warnings(_without_fitted_friction(ready) if unset and rate else ready, chosen, reading, result, rate),
+    ]
+    warnings += _free_warnings(ready, motion)
+    applied = calibrated and chosen.name in ready.calibration
+    check = chosen.checked_by(ready.model)
+    error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
+    over = band_of(batch, chosen, result, answer, tell) if band else None
+    left_out = () if over is None else over.left_out
+    known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
+    fitted = fitted_of(calibration, drawn)
+    warnings += fitted.idle_warnings([ready], [chosen])
+    if rate is None:
+        warnings += [*fitted.tail_warnings(ready), *fitted.reading_warnings([reading])]
+        warnings += fitted.model_warnings([chosen.name], [reading])
+    warnings += fitted.origin_warnings([ready], [chosen])
+    return Prediction(
+        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
+    )
+
+
+def _without_fitted_friction(robot: Robot) -> Robot:
+    """The robot as its user knows it: nobody set the B_eff that a calibration brought."""
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
+
+
+def prepared(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    model: str,
+    calibration: str | Path | None = None,
+    accuracy: str | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    tolerance: float | None = None,
+    phases: int | None = None,
+) -> tuple[Robot, SwimmerModel, RobotBatch]:
+    """A loaded robot with its model and batch, in its place and inside the model's domain; arguments as `predict`.
+
+    Raises:
+        InputError: for wrong input, or a robot outside the model's domain.
+    """
+    ready = load(robot)
+    if calibration is not None:
+        ready = with_calibration(ready, calibration)
+        if not placement and find_swimmer_model(model).placed:
+            placement = calibrated_placement(ready, calibration)
+    if accuracy is not None:
+        ready = with_accuracy(ready, accuracy, model)
+    if tolerance is not None:
+        ready = with_tolerance(ready, tolerance, model)
+    if phases is not None:
+        ready = with_phases(ready, phases, model)
+    chosen = find_swimmer_model(model)
+    return ready, chosen, checked_batch(ready, chosen, Placement.of(placement))
+
+
+def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:
+    """The robot in its place, as a batch of one.
+
+    Raises:
+        InputError: if it is outside the model's domain, or placed for a model that does not compute the walls.
+    """
+    batch = RobotBatch.of(robot, placement)
+    check_placement(batch.placement, model)
+    outside = broken(requirements(batch, model))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}")
+    return batch
+
+
+def _rate(value: str | float | None, placement: Placement) -> float | None:
+    if value is None:
+        return None
+    rate = parse_option("tail-rate", value, KINDS["rate"])
+    if rate == 0 and not placement.flow:
+        raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
+    return rate
+
+
+def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
+    """What has to hold for the answer to be accurate; each broken one is a warning."""
+    inertia = "inertia is neglected (Stokes flow)"
+    flow = abs(batch.placement.flow or 0.0)
+    return [
+        *model.cautions(batch),
+        Limit.of(
+            "Reynolds number (imposed flow, body diameter)",
+            batch.density * flow * batch.body_diameter / batch.viscosity,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "flow-reynolds-number",
+        ),
+        Limit.of(
+            "Reynolds number (body diameter)",
+            result.reynolds_number,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "reynolds-number",
+        ),
+        Limit.of(
+            "Reynolds number (tail amplitude)",
+            result.tail_reynolds_number,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            inertia,
+            "tail-reynolds-number",
+        ),
+    ]
+
+
+def _why_not(
+    batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, rate: float | None, *, calibrated: bool
+) -> str:
+    if rate is not None:
+        slow = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x" if reading == "paper" else ""
+        return (
+            f"tail-rate = {rate:.4g} rad/s: motor and battery have no steady state there; allowed: a rate at which "
+            f"(17) has a root with a positive battery voltage{slow}"
+        )
+    if reading == "paper":
+        limit = calibrated_balance(batch, model, calibrated=calibrated).bb[0]
+        return (
+            f"friction.effective = {batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
+            f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
+        )
+    return f"model '{model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
+
+
+def calibration_warnings(robot: Robot, model: str) -> list[str]:
+    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
+
+    A model that computes the walls takes none.
+    """
+    if find_swimmer_model(model).placed:
+        return []
+    entry = robot.calibration.get(model)
+    if entry is None:
+        if robot.channel is None:  # nothing to stand for
+            return []
+        return [
+            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
+        ]
+    fitted = entry.fitted_to
+    channel = robot.channel.diameter if robot.channel else None
+    pairs = (
+        ("channel.diameter", channel, fitted.channel_diameter),
+        ("body.diameter", robot.body.diameter, fitted.body_diameter),
+        ("body.length", robot.body.length, fitted.body_length),
+    )
+    differing = [
+        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
+        for name, value, fit in pairs
+        if value is None or not np.isclose(value, fit, rtol=1e-6)
+    ]
+    if not differing:
+        return []
+    return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
+
+
+def _free_warnings(robot: Robot, motion: str) -> list[str]:
+    """What a free motion leaves out."""
+    if motion == "held" or robot.channel is None:
+        return []
+    return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]

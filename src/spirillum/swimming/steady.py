@@ -1,0 +1,260 @@
+"""Steady swimming of a batch of robots: resistance and drive to speed, rates, torques and powers."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import cast, get_args
+
+import numpy as np
+
+from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.closed.perrin import body_axial
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.robot import STANDARD_GRAVITY
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.balance import TorqueBalance, force_free
+from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
+from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of, released
+from spirillum.swimming.motor import battery_voltage, run_time
+
+__all__ = [
+    "Swimming",
+    "calibrated_balance",
+    "calibrated_resistance",
+    "friction_reading",
+    "requirements",
+    "speed_difference",
+    "swim",
+]
+
+_BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
+
+
+def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
+    """What every robot has to fulfil for this model to answer."""
+    return assembly_limits(batch) + model.domain(batch)
+
+
+def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> TorqueBalance:
+    """The force-free torque balance; a calibration factor f adds (f - 1) times the isolated body's drag."""
+    r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
+    return force_free(r, model.axial_load(batch))
+
+
+def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> Matrix12:
+    """R of both parts at phase 0 with the same factors, for a motion that is not held to the axis."""
+    return _with_factors(model.resistance(batch, np.zeros(1)), (0, 3), batch, model, calibrated=calibrated)
+
+
+def _with_factors(
+    r: Samples, places: tuple[int, int], batch: RobotBatch, model: SwimmerModel, *, calibrated: bool
+) -> Samples:
+    """R with calibration factors on the body's axial drag and rotation, whose places in R are given."""
+    factors = batch.calibration.get(model.name) if calibrated else None
+    if factors is None:
+        return r
+    size = np.broadcast_shapes(r.shape[:1], factors.body_drag.shape)
+    r = np.array(np.broadcast_to(r, (*size, *r.shape[1:])))
+    for place, factor, entry in zip(places, (factors.body_drag, factors.body_rotation), body_axial(batch), strict=True):
+        r[:, place, place] += (factor - 1.0) * entry
+    return r
+
+
+def swim(
+    batch: RobotBatch,
+    model: str | SwimmerModel = "sbt",
+    *,
+    tail_rate: PerRobot | None = None,
+    motor_rate: PerRobot | None = None,
+    friction: str | None = None,
+    calibrated: bool = True,
+    motion: str = "held",
+) -> Swimming:
+    """Steady swimming of every robot of a batch.
+
+    Args:
+        batch: the robots; a million is one call.
+        model: a hydrodynamic model, or its name.
+        tail_rate: prescribed lab rates of the tail, rad/s; without them the robots' drive decides. With a
+            DC-motor the current then follows from (17) and the effective friction from (18).
+        motor_rate: prescribed (observed) motor rates omega_m, rad/s, alone or together with `tail_rate`.
+        friction: reading of the friction; None: the robots' own.
+        calibrated: apply the robots' calibration factors for this model.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free` (released; without weight).
+
+    Returns:
+        One value for each robot; NaN and `valid = False` where a robot cannot be built or is outside the
+        model's domain.
+
+    Raises:
+        InputError: for an unknown model or reading, rates that do not match the batch, or robots whose drive
+            leaves the motion open.
+    """
+    chosen = find_swimmer_model(model) if isinstance(model, str) else model
+    if batch.joint == "fixed" and motor_rate is not None:
+        raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
+    tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
+    driven_freely = tail_rate is None and motor_rate is None
+    reading = friction_reading(friction or batch.friction)
+    lateral = motion_of(motion)
+    if lateral == "free":
+        _check_free(batch, chosen)
+    parts = [
+        _swim_block(block, chosen, tail[cut], motor[cut], reading, lateral, driven_freely, calibrated)
+        for cut, block in batch.blocks(_BLOCK)
+    ]
+    return Swimming(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Swimming)})
+
+
+def _check_free(batch: RobotBatch, model: SwimmerModel) -> None:
+    """Refuse a free motion that the torque balance about the motor axis does not decide.
+
+    Raises:
+        InputError: for a model that does not know all entries, or a drive that does not turn about the motor axis.
+    """
+    check_full(model)
+    if batch.drive == "magnetic":
+        raise InputError(
+            "motion = 'free' with drive.kind = 'magnetic': the field does not turn the robot about its own axis then; "
+            "allowed: motion 'held', or `magnetic-sweep` and `simulate` for the free robot"
+        )
+
+
+def speed_difference(check: Swimming, result: Swimming) -> PerRobot:
+    """Relative difference of the forward velocities: the error estimate of a model that `checked_by` another."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.abs(check.forward_velocity / result.forward_velocity - 1.0)
+
+
+def friction_reading(name: str) -> FrictionReading:
+    """The reading of that name.
+
+    Raises:
+        InputError: if there is none.
+    """
+    for reading in get_args(FrictionReading):
+        if name == reading:
+            return cast("FrictionReading", reading)
+    raise InputError(f"friction = {name!r}; allowed: {', '.join(get_args(FrictionReading))}")
+
+
+def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
+    """One rate for each robot; NaN where there is none."""
+    array = np.atleast_1d(np.asarray(np.nan if rate is None else rate, dtype=float))
+    if array.ndim != 1 or array.size not in (1, batch.size):
+        raise InputError(f"{name} has shape {array.shape}; allowed: one value, or {batch.size}, one for each robot")
+    return np.broadcast_to(array, (batch.size,))
+
+
+def _swim_block(
+    batch: RobotBatch,
+    model: SwimmerModel,
+    tail_rate: PerRobot,
+    motor_rate: PerRobot,
+    friction: FrictionReading,
+    motion: Motion,
+    driven_freely: bool,  # noqa: FBT001 - passed on by the one caller
+    calibrated: bool,  # noqa: FBT001
+) -> Swimming:
+    valid = batch.known & all_hold(requirements(batch, model))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        shared = None
+        if motion == "held":
+            balance = calibrated_balance(batch, model, calibrated=calibrated)
+        else:
+            balance, shared = released(calibrated_resistance(batch, model, calibrated=calibrated))
+        if batch.joint == "fixed":
+            state = one_piece(batch, balance, tail_rate)
+        elif driven_freely:
+            state = driven(batch, balance, friction)
+        else:
+            state = at_rate(batch, balance, tail_rate, motor_rate, friction)
+        screw = None if shared is None else Screw.of(shared, state.body_rate, state.tail_rate)
+        return _answer(batch, balance, state, screw, valid, model.mean_flow(batch))
+
+
+def _answer(
+    batch: RobotBatch,
+    s: TorqueBalance,
+    state: DriveState,
+    screw: Screw | None,
+    valid: Flags,
+    mean_flow: MeanFlow | None,
+) -> Swimming:
+    body_rate, tail_rate = state.body_rate, state.tail_rate
+    speed = s.speed(body_rate, tail_rate) if screw is None else screw.speed
+    slip = tail_rate - body_rate
+    load = s.rotor_load(body_rate, tail_rate)
+    dissipated = load * tail_rate + s.body_load(body_rate, tail_rate) * body_rate
+    if batch.joint == "fixed":
+        drive = load + s.body_load(body_rate, tail_rate)
+        # The mean power of a slipping robot is its mean torque times the rate of the field, not times its own.
+        from_field = ~np.isnan(state.driving_rate)
+        shaft = drive * np.where(from_field, state.driving_rate, tail_rate)
+        dissipated = np.where(from_field, shaft, dissipated)
+    else:
+        drive, shaft = load, load * slip
+    towing = body_axial(batch)[0] * speed**2
+    motor, current = batch.electrics, state.current
+    none: PerRobot = np.full(1, np.nan)
+    voltage = electrical = lasting = none
+    if motor is not None and batch.drive == "dc-motor":
+        voltage = battery_voltage(motor, current)
+        electrical = motor.duty * motor.polarity * current * voltage
+        lasting = run_time(motor, current)
+    values = {
+        "forward_velocity": speed,
+        "advance_per_radian": np.where(tail_rate == 0, np.nan, speed / tail_rate),
+        "tail_rotation_rate": tail_rate,
+        "body_rotation_rate": body_rate,
+        "motor_rotation_rate": slip,
+        "tail_torque": np.abs(load),
+        "drive_torque": drive,
+        "motor_current": current,
+        "battery_voltage": voltage,
+        "effective_friction": state.effective,
+        "motor_residual_torque": state.residual,
+        "electrical_power": electrical,
+        "shaft_power": shaft,
+        "friction_power": state.torques.power(body_rate, tail_rate),
+        "dissipated_power": dissipated,
+        "hydrodynamic_efficiency": towing / shaft,
+        "propulsive_power": towing,
+        "overall_efficiency": towing / electrical,
+        "cost_of_transport": np.where(np.isnan(electrical), shaft, electrical) / (_weight(batch) * np.abs(speed)),
+        "reynolds_number": batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity,
+        "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
+        "battery_run_time": lasting,
+        "wobble_angle": none if screw is None else screw.tilt,
+        "path_radius": none if screw is None else screw.radius,
+        "step_out_rate": state.step_out,
+        "phase_lag": state.lag,
+        "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
+    }
+    # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
+    moving = valid & np.isfinite(speed) & ~np.isinf(state.effective)
+    if motor is not None and batch.drive == "dc-motor" and batch.joint == "revolute":
+        moving = moving & np.isfinite(current)
+    shaped = {name: np.where(moving, value, np.nan) for name, value in values.items()}
+    size = batch.size
+    return Swimming(
+        **{name: np.array(np.broadcast_to(value, (size,))) for name, value in shaped.items()},
+        valid=np.array(np.broadcast_to(moving, (size,))),
+    )
+
+
+def _weight(batch: RobotBatch) -> PerRobot:
+    """Weight of the whole robot in vacuum, N; NaN where its masses are not known."""
+    wire = 0.25 * np.pi * batch.wire_diameter**2 * batch.arc_length
+    return STANDARD_GRAVITY * (batch.body_mass + batch.tail_density * wire)
+
+
+def _plug_velocity(mean_flow: MeanFlow, speed: PerRobot, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    """Mean velocity of the fluid through the channel, m/s, as `SwimmerModel.mean_flow` gives it per unit motion."""
+    per_speed = mean_flow[..., 0] + mean_flow[..., 2]
+    return per_speed * speed + mean_flow[..., 1] * body_rate + mean_flow[..., 3] * tail_rate + mean_flow[..., 4]

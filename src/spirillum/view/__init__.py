@@ -1,0 +1,1 @@
+"""Figures, three-dimensional pictures and films, annotated videos."""

@@ -1,0 +1,294 @@
+"""What was tracked, drawn over the frames: outline of the body, axis, stripe pointer, fitted wire, numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from queue import Queue
+from threading import Thread
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.formats.h264 import h264_writer
+from spirillum.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from spirillum.vision.camera.optics import BodyPose, Optics
+
+__all__ = ["Annotator", "Seen", "annotated_film"]
+
+_BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
+_INK = (255, 255, 255)
+_SHIFT = 4
+"""Lines are drawn at sixteenths of a pixel."""
+_TICKS = 90_000
+_QUALITY = {"crf": "23", "preset": "ultrafast"}
+_WAITING = 8
+
+
+class Seen(Protocol):
+    """What the tracker tells of a frame."""
+
+    @property
+    def time(self) -> float:
+        """Time in the video, s."""
+
+    @property
+    def pose(self) -> BodyPose | None:
+        """Where the body is; None where it was not seen."""
+
+    @property
+    def body_angle(self) -> float:
+        """Roll, rad; NaN where it was not read."""
+
+    @property
+    def tail_phase(self) -> float:
+        """Phase of the tail, rad; NaN where it was not read."""
+
+    @property
+    def optics(self) -> Optics:
+        """The camera."""
+
+
+class Annotator:
+    """Draws what was tracked over frames of one robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        """Prepare the outline and the wire.
+
+        Args:
+            robot: the robot.
+        """
+        from spirillum.robot.mesh import tail_line
+
+        self._cv2 = required("cv2", "an annotated video", "video")
+        body = robot.body
+        self._half, self._radius = 0.5 * body.length, 0.5 * body.diameter
+        self._outline = _outline_of(robot)
+        self._wire = np.asarray(tail_line(robot, fineness=0.6).points)
+        self._seal = robot.seal.length if robot.seal else 0.3 * body.length
+        self._first: float | None = None
+
+    def draw(self, image: np.ndarray, seen: Seen, words: tuple[str, ...] = ()) -> np.ndarray:
+        """A copy of a frame with what was tracked on it.
+
+        Args:
+            image: RGB bytes, (h, w, 3).
+            seen: what was tracked.
+            words: lines of text instead of those about this frame.
+        """
+        picture = np.ascontiguousarray(image).copy()
+        pose = seen.pose
+        if pose is None:
+            self._write(picture, words or (f"t = {seen.time:7.2f} s   robot not seen",))
+            return picture
+        from spirillum.vision.camera.optics import seen as pixels_of
+
+        def line(points: Samples, colour: tuple[int, int, int], *, closed: bool = False) -> None:
+            self._line(picture, pixels_of(points, pose, seen.optics), colour, closed=closed)
+
+        line(self._outline, _BODY, closed=True)
+        line(np.array([[-self._half, 0.0, 0.0], [self._half, 0.0, 0.0]]), _AXIS)
+        if math.isfinite(seen.tail_phase):
+            line(_turned(self._wire, seen.tail_phase), _WIRE)
+        if math.isfinite(seen.body_angle):
+            self._pointer(line, seen.body_angle)
+        x = self._along(seen)
+        angles = f"body {_degrees(seen.body_angle)}  tail {_degrees(seen.tail_phase)}"
+        self._dials(picture, seen)
+        self._write(picture, words or (f"t = {seen.time:7.2f} s   x = {1e3 * x:7.2f} mm", angles))
+        return picture
+
+    def _dials(self, picture: np.ndarray, seen: Seen) -> None:
+        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
+        unit = max(picture.shape[0] / 480.0, 0.6)
+        radius = 16.0 * unit
+        around = np.linspace(0.0, 2.0 * np.pi, 33)
+        for place, angle, colour in ((3.4, seen.body_angle, _POINTER), (1.2, seen.tail_phase, _WIRE)):
+            centre = np.array([picture.shape[1] - place * radius, 1.3 * radius])
+            circle = centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1)
+            self._line(picture, circle, colour, closed=True)
+            if math.isfinite(angle):
+                # From the rear +y is to the left; stripe 1 starts at +z, the wire at +y.
+                turned = angle if colour is _POINTER else angle - 0.5 * math.pi
+                tip = centre + radius * np.array([math.sin(turned), -math.cos(turned)])
+                self._line(picture, np.stack([centre, tip]), colour, closed=False)
+
+    def _pointer(self, line: Callable[..., None], angle: float) -> None:
+        """A line along the middle of stripe 1 where it faces the camera, and a clock hand on the body's end."""
+        rear = -self._half
+        reach = np.array([rear, rear + self._seal])
+        y, z = -self._radius * math.sin(angle), self._radius * math.cos(angle)
+        if z > 0:
+            line(np.stack([reach, np.full(2, y), np.full(2, z)], axis=1), _POINTER)
+        else:  # behind: two short pieces
+            for start in (0.0, 0.7):
+                part = rear + self._seal * np.array([start, start + 0.3])
+                line(np.stack([part, np.full(2, y), np.full(2, 0.0)], axis=1), _POINTER)
+
+    def _along(self, seen: Seen) -> float:
+        assert seen.pose is not None  # noqa: S101 - asked only where it was seen
+        if self._first is None:
+            self._first = seen.pose.x
+        return seen.pose.x - self._first
+
+    def _line(self, picture: np.ndarray, pixels: Samples, colour: tuple[int, int, int], *, closed: bool) -> None:
+        pixels = pixels[np.isfinite(pixels).all(axis=1)]
+        if len(pixels) < 2 or np.abs(pixels).max() > 1e5:
+            return
+        whole = np.round(pixels * 2**_SHIFT).astype(np.int32).reshape(-1, 1, 2)
+        self._cv2.polylines(picture, [whole], closed, colour, 1, self._cv2.LINE_AA, _SHIFT)
+
+    def _write(self, picture: np.ndarray, words: tuple[str, ...]) -> None:
+        unit = max(picture.shape[0] / 480.0, 0.6)
+        font, size = self._cv2.FONT_HERSHEY_SIMPLEX, 0.45 * unit
+        longest = max(self._cv2.getTextSize(text, font, size, 1)[0][0] for text in words)
+        ground = picture[: round((6 + 18 * len(words)) * unit), : round(longest + 16 * unit)]
+        ground //= 3  # dark behind the words
+        for row, text in enumerate(words):
+            place = (round(8 * unit), round((16 + 18 * row) * unit))
+            self._cv2.putText(picture, text, place, font, size, _INK, 1, self._cv2.LINE_AA)
+
+
+def _outline_of(robot: Robot) -> Samples:
+    """The body's outline in the plane of its axis across the line of sight, (k, 3)."""
+    half, radius = 0.5 * robot.body.length, 0.5 * robot.body.diameter
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 24)
+    if robot.body.shape in ("sphere", "spheroid"):
+        around = np.linspace(0.0, 2 * np.pi, 60)
+        edge = np.stack([half * np.cos(around), radius * np.sin(around)], axis=1)
+        return np.concatenate([edge, np.zeros((len(edge), 1))], axis=1)
+    depth = min(radius, half)
+
+    def end(kind: str | None, sign: float) -> Samples:
+        if kind == "hemisphere":
+            return np.stack([half - depth + depth * np.cos(angle), sign * radius * np.sin(angle)], axis=1)
+        return np.array([[half, -sign * radius], [half, sign * radius]])
+
+    front, rear = end(robot.body.front_end, 1.0), end(robot.body.rear_end, -1.0)
+    rear[:, 0] *= -1.0
+    edge = np.concatenate([front, rear])
+    return np.concatenate([edge, np.zeros((len(edge), 1))], axis=1)
+
+
+def _turned(points: Samples, angle: float) -> Samples:
+    cos, sin = math.cos(angle), math.sin(angle)
+    y, z = points[:, 1], points[:, 2]
+    return np.stack([points[:, 0], cos * y - sin * z, sin * y + cos * z], axis=1)
+
+
+def _degrees(angle: float) -> str:
+    return f"{math.degrees(angle) % 360.0:5.1f} deg" if math.isfinite(angle) else "  not read"
+
+
+@contextmanager
+def annotated_film(
+    path: Path, robot: Robot, words: dict[str, str], thumbnail: Callable[[bytes], None] | None = None
+) -> Iterator[Callable[[int, np.ndarray, Seen], None]]:
+    """A film of annotated frames at their true times, encoded by a thread of its own.
+
+    Args:
+        path: the file, `.mp4`.
+        robot: the robot.
+        words: title and comment of the film.
+        thumbnail: takes a frame as JPEG, when the film is complete.
+
+    Raises:
+        InputError: if a package is missing, or no encoder is there.
+    """
+    annotator = Annotator(robot)
+    writer = _Writer(path, words)
+    kept: list[np.ndarray] = []
+
+    def on_frame(index: int, image: np.ndarray, seen: Seen) -> None:
+        picture = annotator.draw(image, seen)
+        if seen.pose is not None and (not kept or index & (index - 1) == 0):
+            kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
+        writer.add(picture, seen.time)
+
+    try:
+        yield on_frame
+    finally:
+        writer.close()
+    writer.check()
+    if thumbnail is not None and kept:
+        thumbnail(_jpeg(kept[0]))
+
+
+def _jpeg(picture: np.ndarray) -> bytes:
+    cv2 = required("cv2", "an annotated video", "video")
+    good, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
+    return bytes(data) if good else b""
+
+
+class _Writer:
+    """Frames with times into H.264; the film starts with the first frame's time."""
+
+    def __init__(self, path: Path, words: dict[str, str]) -> None:
+        required("av", "an annotated video", "video")  # said here, before any frame is tracked
+        self._path, self._words = path, words
+        self._queue: Queue[tuple[np.ndarray, float] | None] = Queue(_WAITING)
+        self._error: BaseException | None = None
+        self._ended = False
+        self._thread = Thread(target=self._run, name="encoding", daemon=True)
+        self._thread.start()
+
+    def add(self, image: np.ndarray, time: float) -> None:
+        """Append a frame."""
+        self._queue.put((image, time))
+
+    def close(self) -> None:
+        """Write what is left."""
+        self._queue.put(None)
+        self._thread.join()
+
+    def check(self) -> None:
+        """Hand on what went wrong.
+
+        Raises:
+            InputError: if there is no encoder, or the film could not be written.
+        """
+        if self._error is not None:
+            raise self._error
+
+    def _run(self) -> None:
+        try:
+            self._encode()
+        except Exception as error:
+            self._error = error
+        while not self._ended:  # after an error, so that nobody waits for a place in the queue
+            self._next()
+
+    def _next(self) -> tuple[np.ndarray, float] | None:
+        item = self._queue.get()
+        self._ended = item is None
+        return item
+
+    def _encode(self) -> None:
+        item = self._next()
+        if item is None:
+            raise InputError(f"{self._path.name} has no frames; allowed: a video with at least one")
+        height, width = (even - even % 2 for even in item[0].shape[:2])
+        size, first, last = (width, height), item[1], -1
+        with h264_writer(
+            self._path,
+            size,
+            Fraction(30),
+            self._words,
+            quality=_QUALITY,
+            tick=Fraction(1, _TICKS),
+            threads=1,
+            instead="--no-annotated",
+            extra="video",
+        ) as film:
+            while item is not None:
+                last = max(last + 1, round((item[1] - first) * _TICKS))
+                film.add(item[0][:height, :width], last)
+                item = self._next()

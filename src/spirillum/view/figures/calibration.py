@@ -1,0 +1,291 @@
+"""Figures of a calibration: observed against predicted, residuals, the posterior, profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, MaxNLocator
+
+from spirillum.arrays import Samples
+from spirillum.units import Hz
+from spirillum.view.figures.evidence import spread
+from spirillum.view.figures.posterior import posterior_figure, profile_figure
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
+
+if TYPE_CHECKING:
+    from spirillum.calibration.experiment import Quantity
+    from spirillum.calibration.fit import Calibrated
+
+__all__ = ["calibration_figures", "observed_figure", "residual_figure"]
+
+_MOST_COLUMNS = 5
+_MOST_NAMES = 36
+_MOST_TICKS = 5
+_OBSERVED = COLOURS["black"]
+_NAMES: dict[Quantity, str] = {
+    "advance": r"speed per tail rate $U_x/\omega$",
+    "turning": r"body over tail rate $\Omega_x/\omega$",
+    "motor_rate": r"motor rate $\omega_m$",
+}
+
+
+def calibration_figures(found: Calibrated) -> dict[str, Figure]:
+    """All figures by name."""
+    from spirillum.calibration.identifiability import profiles
+
+    figures = {
+        f"observed-{diameter * 1e3:g}mm": observed_figure(found, place)
+        for place, diameter in enumerate(found.experiment.channels)
+    }
+    figures["residuals"] = residual_figure(found)
+    if found.posterior is not None:
+        figures["posterior"] = posterior_figure(found)
+    if found.least_squares is not None:
+        figures["profiles"] = profile_figure(found, profiles(found.problem, found.least_squares))
+    return figures
+
+
+def _source(found: Calibrated) -> str:
+    what = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
+    return f"{plain(found.experiment.source, 40)} ({what})"
+
+
+def _fit_words(found: Calibrated, channel: int | None = None) -> str:
+    """The fitted numbers that act, in one channel or in all, with their units; a name and its channel stay together."""
+    values = [
+        f"{plain(item.label)} {_with_unit(found.values[item.label].value, item.parameter.unit)}".replace(" ", "\u00a0")
+        for item in found.problem.coordinates
+        if channel is None or item.channel in (None, channel)
+    ]
+    return f"model {label_of_model(found.problem.model.name)}, method {found.method}: {', '.join(values)}"
+
+
+def _with_unit(value: float, unit: str) -> str:
+    if not unit:
+        return f"{value:.3g}"
+    scale = Scale.of(np.abs(np.array([value])), unit)
+    return f"{value / scale.factor:.3g} {scale.unit}"
+
+
+def observed_figure(found: Calibrated, channel: int) -> Figure:
+    """The panels a) to l) of the paper's Figs 5 and 6 for one channel: speed, motor rate, effective friction.
+
+    Args:
+        found: a calibration.
+        channel: place of the channel.
+    """
+    experiment = found.experiment
+    inside = experiment.channel == channel
+    amplitudes = np.unique(np.array([robot.tail.amplitude for robot in experiment.robots])[inside].round(9))
+    columns = [float(amplitudes[n]) for n in spread(amplitudes.size, _MOST_COLUMNS)]
+    rows = _rows(found)
+    waves = 1e3 * np.array([robot.tail.wavelength for robot in experiment.robots])[inside]
+    room = 0.06 * float(np.ptp(waves)) or 1.0
+    ends = (float(waves.min()) - room, float(waves.max()) + room)
+    model = found.problem.model.name
+    with styled():
+        look = look_of_model(model)
+        label = "synthetic" if experiment.synthetic else "observed"
+        handles = [
+            Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, label=label_of_model(model)),
+            Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label=f"{label}, 95 % interval of the mean"),
+        ]
+        notes = [_fit_words(found, channel)]
+        if any(np.any(np.isfinite(row["low"])) for row in rows):
+            notes.append("Shades: 95 % of a tail's own mean as the fit expects it, the model's discrepancy included.")
+        if found.friction:
+            notes.append(
+                f"$B_{{eff}}$ follows from (18) at the observed motor rate, friction reading '{found.reading}'."
+            )
+        if len(columns) < amplitudes.size:
+            notes.append(f"Drawn are {len(columns)} of {amplitudes.size} amplitudes.")
+        sheet = Sheet(
+            f"Channel of {experiment.channels[channel] * 1e3:g} mm: fitted model against {label} means",
+            _source(found),
+            len(rows),
+            len(columns),
+            notes=notes,
+            legend=handles,
+        )
+        figure, panels = sheet.draw()
+        for row, axes_row in zip(rows, panels, strict=True):
+            for amplitude, axes in zip(columns, axes_row, strict=True):
+                here = inside & np.array([abs(r.tail.amplitude - amplitude) < 1e-9 for r in experiment.robots])
+                _draw(axes, found, row, here)
+            axes_row[0].set_ylabel(row["label"])
+            for axes in axes_row:
+                axes.set_xlim(*ends)
+            _from_zero(axes_row[0], row, inside)
+        for amplitude, axes in zip(columns, panels[0], strict=True):
+            axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
+        for axes in panels[-1]:
+            axes.set_xlabel(r"wavelength $\lambda$ (mm)")
+        _alike_ticks(panels, np.unique(waves.round(6)))
+        return figure
+
+
+def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
+    """Start the axis at zero where all is of one sign; that of a left-handed robot's rates is negative."""
+    ends = np.concatenate([row[name][inside] for name in ("values", "low", "high", "seen")])
+    if np.all(row["positive"]):
+        axes.set_ylim(0.0, 1.08 * float(np.nanmax(ends)))
+    elif not np.any(row["positive"]):
+        axes.set_ylim(1.08 * float(np.nanmin(ends)), 0.0)
+
+
+def _alike_ticks(panels: Sequence[Sequence[Axes]], wavelengths: Samples) -> None:
+    """The same ticks everywhere: at the wavelengths themselves, if they are few."""
+    for axes in (panel for row in panels for panel in row):
+        few = len(wavelengths) <= _MOST_TICKS
+        axes.xaxis.set_major_locator(FixedLocator(list(wavelengths)) if few else MaxNLocator(4, integer=True))
+
+
+def _rows(found: Calibrated) -> list[dict[str, Any]]:
+    """What each row shows, in its unit: observed, half width, predicted with limits."""
+    experiment, rows = found.experiment, []
+    rate = np.where(experiment.by_motor, experiment.motor_rate.mean, experiment.tail_rate)
+    if "advance" in found.predicted:
+        values, low, high = (rate * column for column in found.predicted["advance"])
+        half = np.abs(rate) * _half_width(found, "advance")
+        scale = Scale.of(np.abs(values), "m/s")
+        rows.append(
+            _row(f"$U_x$ ({scale.unit})", scale.factor, rate * experiment.advance.mean, half, (values, low, high))
+        )
+    if "motor_rate" in found.predicted:
+        half = _half_width(found, "motor_rate")
+        rows.append(_row(r"$\omega_m$ (Hz)", Hz, experiment.motor_rate.mean, half, found.predicted["motor_rate"]))
+    elif "turning" in found.predicted:
+        values, low, high = (experiment.tail_rate * (1.0 - column) for column in found.predicted["turning"])
+        half = np.abs(experiment.tail_rate) * _half_width(found, "turning")
+        rows.append(_row(r"$\omega_m$ (Hz)", Hz, experiment.motor_rate.mean, half, (values, low, high)))
+    if found.friction:
+        middle = np.array([item.value for item in found.friction])
+        ends = (np.array([item.low for item in found.friction]), np.array([item.high for item in found.friction]))
+        scale = Scale.of(np.abs(middle), "N m s/rad")
+        unknown = np.full(middle.size, np.nan)
+        rows.append(_row(f"$B_{{eff}}$ ({scale.unit})", scale.factor, unknown, unknown, (middle, *ends)))
+    return rows
+
+
+def _row(label: str, factor: float, seen: Samples, half: Samples, predicted: tuple[Samples, ...]) -> dict[str, Any]:
+    values, low, high = (column / factor for column in predicted)
+    known = np.concatenate([values[np.isfinite(values)], (seen / factor)[np.isfinite(seen)]])
+    return {
+        "label": label,
+        "seen": seen / factor,
+        "half": half / factor,
+        "values": values,
+        "low": np.minimum(low, high),
+        "high": np.maximum(low, high),
+        "positive": known >= 0,
+    }
+
+
+def _half_width(found: Calibrated, name: Quantity) -> Samples:
+    """Half width of the 95 % interval of each observed mean."""
+    ratio = found.problem.ratio(name)
+    error = found.error.get(name, ratio.pooled_error)
+    half: Samples = 1.96 * np.nan_to_num(error) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+    return half
+
+
+def _draw(axes: Axes, found: Calibrated, row: dict[str, Any], here: np.ndarray) -> None:
+    look = look_of_model(found.problem.model.name)
+    x = np.array([robot.tail.wavelength for robot in found.experiment.robots])[here] * 1e3
+    order = np.argsort(x)
+    x = x[order]
+    values, low, high, seen, half = (row[name][here][order] for name in ("values", "low", "high", "seen", "half"))
+    known = np.isfinite(low)
+    if np.any(known):
+        axes.fill_between(x, low, high, where=known, color=look.colour, alpha=0.18, linewidth=0.0)
+        axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=0.18, linewidth=4.0)
+    axes.plot(x, values, color=look.colour, linestyle=look.line, marker=look.marker)
+    measured = np.isfinite(seen)
+    if np.any(measured):
+        axes.errorbar(
+            x[measured],
+            seen[measured],
+            yerr=half[measured],
+            fmt="D",
+            color=_OBSERVED,
+            markersize=4.0,
+            capsize=2.5,
+            elinewidth=1.0,
+            zorder=5,
+        )
+
+
+def residual_figure(found: Calibrated) -> Figure:
+    """Observed over predicted less one, robot by robot, with the errors of the means and the model's discrepancy."""
+    names = list(found.predicted)
+    experiment = found.experiment
+    with styled():
+        handles = [Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="95 % interval of the mean")]
+        if found.discrepancy:
+            patch = Line2D([], [], color=COLOURS["orange"], alpha=0.35, linewidth=7.0, label="discrepancy, two sigma")
+            handles.append(patch)
+        sheet = Sheet(
+            "What the fitted model leaves",
+            _source(found),
+            len(names),
+            1,
+            panel=(6.4, 1.5),
+            notes=[_fit_words(found), "Tails in each channel by wavelength, then amplitude."],
+            legend=handles,
+            tick_room=0.3,
+        )
+        figure, panels = sheet.draw()
+        order = sorted(range(experiment.size), key=lambda n: (*_place(found, n),))
+        edges = [n for n in range(1, len(order)) if experiment.channel[order[n]] != experiment.channel[order[n - 1]]]
+        for name, (axes,) in zip(names, panels, strict=True):
+            _draw_residuals(axes, found, name, order)
+            for edge in edges:
+                axes.axvline(edge - 0.5, color="#888888", linewidth=0.8)
+            axes.set_title(_NAMES[name], fontsize=9)
+            axes.set_ylabel("observed/model - 1 (%)")
+        last = panels[-1][0]
+        last.set_xlabel("tail: wavelength x amplitude (mm)")
+        shown = spread(len(order), _MOST_NAMES)
+        tails = [experiment.robots[order[n]].tail for n in shown]
+        names_of_tails = [f"{tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g}" for tail in tails]
+        last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=6)
+        last.tick_params(labelbottom=True)
+        for start, stop in zip([0, *edges], [*edges, len(order)], strict=True):
+            diameter = experiment.channels[int(experiment.channel[order[start]])] * 1e3
+            last.text(
+                (0.5 * (start + stop) - 0.5),
+                0.02,
+                f"{diameter:g} mm",
+                transform=last.get_xaxis_transform(),
+                ha="center",
+                size=8,
+            )
+        return figure
+
+
+def _place(found: Calibrated, n: int) -> tuple[int, float, float]:
+    robot = found.experiment.robots[n]
+    return int(found.experiment.channel[n]), robot.tail.wavelength, robot.tail.amplitude
+
+
+def _draw_residuals(axes: Axes, found: Calibrated, name: Quantity, order: list[int]) -> None:
+    ratio, values = found.problem.ratio(name), found.predicted[name][0]
+    left = 100.0 * (ratio.mean / values - 1.0)[order]
+    half = 100.0 * np.abs(_half_width(found, name) / values)[order]
+    x = np.arange(len(order))
+    if name in found.discrepancy:
+        width = 200.0 * found.discrepancy[name].value
+        axes.axhspan(-width, width, color=COLOURS["orange"], alpha=0.25, linewidth=0.0)
+    axes.axhline(0.0, color="#444444", linewidth=0.8)
+    seen = np.isfinite(left)
+    axes.errorbar(
+        x[seen], left[seen], yerr=half[seen], fmt="D", color=_OBSERVED, markersize=3.5, capsize=2.0, elinewidth=0.9
+    )
+    axes.set_xlim(-0.7, len(order) - 0.3)
+    axes.set_xticks([])

@@ -1,0 +1,175 @@
+"""Models side by side on one robot: what each predicts for every turn of the tail, and how far they are apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
+
+from spirillum.swimming.comparison import ModelComparison, estimated_error
+from spirillum.swimming.prediction import Prediction
+from spirillum.units import Hz
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import Scale, look_of_model, plain, styled
+
+__all__ = ["comparison_figure"]
+
+_LINE_HEIGHT = 0.42
+"""Height of one model in a panel, inches."""
+_ROOM = 1.42
+"""Width of a panel over its longest bar: room for the difference written beside it."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One quantity: its label, the SI unit that gets a prefix, and how a prediction gives it."""
+
+    name: str
+    symbol: str
+    unit: str
+    value: Callable[[Prediction], float]
+    estimated: bool = False
+    """Whether a model's estimate of its own error is of this quantity."""
+
+
+# Each is taken for a turn or a radian of the tail, so that models which differ in their rates can be compared.
+_PANELS = (
+    _Panel(
+        "advance per turn",
+        r"$2\pi U_x/|\omega|$",
+        "m",
+        lambda p: Hz * p.forward_velocity / abs(p.tail_rotation_rate),
+        estimated=True,
+    ),
+    _Panel("body counter-rotation", r"$-\Omega_x/\omega$", "1", lambda p: -p.body_rotation_rate / p.tail_rotation_rate),
+    _Panel("tail torque per rate", r"$T_h/|\omega|$", "N m s/rad", lambda p: p.tail_torque / abs(p.tail_rotation_rate)),
+    _Panel("hydrodynamic efficiency", r"$\eta$", "%", lambda p: 100.0 * p.hydrodynamic_efficiency),
+)
+
+
+def comparison_figure(comparison: ModelComparison) -> Figure:
+    """Four panels with a line for each model: advance, counter-rotation, torque and efficiency.
+
+    A dashed line marks the reference model, beside each other model stands its relative difference; a bar spans
+    the error that a model estimates of its own speed. A model without an answer keeps its line and says so.
+
+    Args:
+        comparison: what `spirillum.compare_models` returns.
+    """
+    with styled():
+        sheet = Sheet(
+            f"{plain(comparison.robot.name, 60)}: models side by side",
+            _conditions(comparison),
+            1,
+            len(_PANELS),
+            panel=(1.9, _LINE_HEIGHT * len(comparison.models) + 0.1),
+            notes=_notes(comparison),
+            tick_room=0.16,
+        )
+        figure, (panels,) = sheet.draw()
+        for axes, panel in zip(panels, _PANELS, strict=True):
+            _draw(axes, comparison, panel)
+        names = comparison.models
+        panels[0].set_yticks(range(len(names)), [_label(comparison, name) for name in names])
+        panels[0].set_ylim(len(names) - 0.45, -0.55)
+        return figure
+
+
+def _label(comparison: ModelComparison, name: str) -> str:
+    """A model's name, with a star where calibration factors are in its answer."""
+    answer = comparison.predictions.get(name)
+    return f"{name}*" if answer is not None and answer.calibrated else name
+
+
+def _conditions(comparison: ModelComparison) -> str:
+    """Tail rate where all models share one, else what drives them; friction."""
+    rates = np.array([answer.tail_rotation_rate for answer in comparison.predictions.values()]) / Hz
+    if np.ptp(rates) <= 1e-12 * np.max(np.abs(rates)):
+        driven = f"tail at {rates[0]:.4g} Hz"
+    else:
+        driven = f"own drive: tail at {rates.min():.3g} to {rates.max():.3g} Hz"
+    return f"{driven} · friction reading '{comparison.friction}' · computed, nothing is measured"
+
+
+def _notes(comparison: ModelComparison) -> list[str]:
+    found = [f"Percentages: difference from {comparison.reference} (dashed line)."]
+    errors = {name: estimated_error(answer) for name, answer in comparison.predictions.items()}
+    known = [f"{name} {_percent(error)}" for name, error in errors.items() if error is not None]
+    if known:
+        found.append(f"Bars in a): the error of the speed by the model's own refinement ({', '.join(known)}).")
+    silent = [name for name, error in errors.items() if error is None]
+    if silent:
+        found.append(
+            f"No bar: {', '.join(silent)}; {'their' if len(silent) > 1 else 'its'} error is known in words only."
+        )
+    calibrated = [name for name, answer in comparison.predictions.items() if answer.calibrated]
+    if calibrated:
+        found.append("*With calibration factors on the body's drag, which stand for the channel's walls.")
+    found += [f"No answer: {plain(why, 400)}" for why in comparison.refusals.values()]
+    return found
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _signed_percent(share: float) -> str:
+    digits = 1 if abs(share) < 0.0995 else 0
+    return f"{100 * share:+.{digits}f} %".replace("-", "−")
+
+
+def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
+    values = {name: panel.value(answer) for name, answer in comparison.predictions.items()}
+    scale = Scale(1.0, panel.unit) if panel.unit in ("1", "%") else Scale.of(np.array([*values.values()]), panel.unit)
+    reference = values[comparison.reference] / scale.factor
+    axes.axvline(reference, color="#555555", linewidth=0.8, linestyle=(0, (4, 2)), zorder=1)
+    axes.axvline(0.0, color="#444444", linewidth=0.7, zorder=1)
+    for place, name in enumerate(comparison.models):
+        value = values.get(name, math.nan) / scale.factor
+        if not math.isfinite(value):
+            axes.text(0.5, place, "no answer", transform=axes.get_yaxis_transform(), **_WORDS, ha="center")
+            continue
+        look = look_of_model(name)
+        axes.plot([0.0, value], [place, place], color=look.colour, linewidth=3.2, alpha=0.35, solid_capstyle="butt")
+        error = estimated_error(comparison.predictions[name]) if panel.estimated else None
+        if error is not None:
+            bar = abs(value) * error
+            axes.errorbar(value, place, xerr=bar, color="black", capsize=5, elinewidth=0.9, capthick=0.9, zorder=6)
+        axes.plot(value, place, color=look.colour, marker=look.marker, markersize=6.5, linestyle="none", zorder=5)
+        if name != comparison.reference and reference != 0:
+            axes.annotate(
+                _signed_percent(value / reference - 1.0),
+                (value * (1 + (error or 0.0)), place),
+                xytext=(6 if value >= 0 else -6, 0),
+                textcoords="offset points",
+                ha="left" if value >= 0 else "right",
+                va="center",
+                size=7.5,
+                color="#333333",
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
+                zorder=6,
+            )
+    _finish(axes, np.array([*values.values()]) / scale.factor)
+    unit = "" if scale.unit == "1" else f" ({scale.unit})"
+    axes.set_xlabel(f"{panel.name}\n{panel.symbol}{unit}")
+
+
+_WORDS: dict[str, Any] = {"va": "center", "size": 7.5, "color": "#777777", "style": "italic"}
+
+
+def _finish(axes: Axes, values: np.ndarray) -> None:
+    """Horizontal axis from zero, with room for words; models on lines of their own."""
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+    low, high = min(low, 0.0), max(high, 0.0)
+    span = (high - low) or 1.0
+    axes.set_xlim(low - (_ROOM - 1.0) * span * (low < 0), high + (_ROOM - 1.0) * span * (high > 0))
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:.4g}"))  # a bare 0: panels stand close to each other
+    axes.grid(visible=False, axis="y")

@@ -1,0 +1,243 @@
+"""What of a study's dataset goes into its figures, and what has to be said beside it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.studies.places import reference_place
+from spirillum.units import Hz
+from spirillum.view.figures.style import Scale, plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["NOTHING_MEASURED", "Shown", "spread"]
+
+NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
+LARGEST_RE = {"wide": 0.0058, "narrow": 0.0038}
+"""Re_max of the captions of the paper's Figs 5 and 6."""
+
+
+def spread(count: int, most: int) -> list[int]:
+    """At most `most` places out of `count`, evenly spread, first and last among them."""
+    if count <= most:
+        return list(range(count))
+    return sorted({int(place) for place in np.linspace(0, count - 1, most).round()})
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A study's dataset, or a part of it, as the figures read it."""
+
+    dataset: xr.Dataset
+    whole: xr.Dataset
+    """The dataset from which scales are taken, so that all figures of a study share them."""
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> Shown:
+        """All of a study."""
+        return cls(dataset, dataset)
+
+    def part(self, **places: int | Sequence[int]) -> Shown:
+        """A part of the study, by places along dimensions."""
+        return replace(self, dataset=self.dataset.isel(dict(places.items())))
+
+    @cached_property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models."""
+        return tuple(str(name) for name in self.whole["model"].values)
+
+    @cached_property
+    def readings(self) -> tuple[str, ...]:
+        """All readings of the friction."""
+        return tuple(str(name) for name in self.whole["friction"].values)
+
+    @cached_property
+    def robots(self) -> list[dict[str, Any]]:
+        """Settings of the robots, SI: one a channel of a grid, or one a robot of a list."""
+        settings = json.loads(self.whole.attrs.get("settings", "{}"))
+        found: list[dict[str, Any]] = settings.get("robots", [])
+        return found
+
+    @property
+    def grid(self) -> bool:
+        """Whether it is a grid of tails in channels, else a list of robots."""
+        return "channel" in self.whole.dims
+
+    @property
+    def observed(self) -> bool:
+        """Whether anything in it was measured."""
+        return "observed_forward_velocity" in self.whole
+
+    @property
+    def paper(self) -> bool:
+        """Whether it repeats the paper's study."""
+        return self.whole.attrs.get("claims") == "biorob2012"
+
+    @property
+    def source_line(self) -> str:
+        """The line of every figure that says what is measured in it."""
+        if not self.observed:
+            return NOTHING_MEASURED
+        name = plain(str(self.whole.attrs.get("observations", "an observations file")), 40)
+        return f"Observed: {name}, means with 95 % intervals. All else is computed."
+
+    @cached_property
+    def motor_driven(self) -> bool:
+        """Whether a DC-motor drives every robot, so that frictionless rates are upper bounds."""
+        drives = [robot.get("drive") or {} for robot in self.robots]
+        return bool(drives) and all(drive.get("kind") == "dc-motor" for drive in drives)
+
+    @property
+    def upper_bound(self) -> bool:
+        """Whether rates and speeds under the robots' own drive are upper bounds: a motor without contact friction."""
+        return self.motor_driven and self.friction_unset
+
+    @cached_property
+    def friction_unset(self) -> bool:
+        """Whether reading `rotor` holds the rotor's own B_m alone."""
+        return all((robot.get("friction") or {}).get("effective") is None for robot in self.robots)
+
+    @cached_property
+    def own_drive_readings(self) -> tuple[str, ...]:
+        """Readings shown for free swimming: without friction, and with friction in the joint."""
+        return tuple(name for name in ("none", "rotor") if name in self.readings) or self.readings[:1]
+
+    def reading_label(self, reading: str) -> str:
+        """Words for a reading of the friction in a legend."""
+        if reading == "none":
+            return "no contact friction (upper bound)" if self.motor_driven else "no friction"
+        if reading == "rotor" and self.upper_bound:
+            return "rotor friction $B_m$ only (upper bound)"
+        return f"friction reading '{reading}'"
+
+    @property
+    def at_rate_reading(self) -> str:
+        """Reading under which the models run at prescribed rates: `rotor`, which leaves their motion alone."""
+        return next((name for name in ("rotor", "none") if name in self.readings), self.readings[0])
+
+    @cached_property
+    def rotor_friction(self) -> float | None:
+        """B_m if all robots share one, N m s/rad."""
+        found = {(robot.get("motor") or {}).get("rotor_friction") for robot in self.robots}
+        value = found.pop() if len(found) == 1 else None
+        return float(value) if value else None
+
+    def values(self, name: str, **labels: str) -> Values:
+        """A quantity of this part for some model or reading, SI."""
+        found: Values = np.asarray(self.dataset[name].sel(labels).values, dtype=float)
+        return found
+
+    def scale(self, unit: str, *names: str, **labels: str | list[str]) -> Scale:
+        """One scale for some quantities all over the study."""
+        everything = [
+            np.asarray(
+                self.whole[name].sel({key: value for key, value in labels.items() if key in self.whole[name].dims})
+            )
+            for name in names
+            if name in self.whole
+        ]
+        return Scale.of(np.concatenate([np.ravel(item) for item in everything]), unit)
+
+    def advance_per_turn(self, model: str) -> Values:
+        """Forward velocity over the tail's rate, m/turn; without friction, where readings differ."""
+        return self.values("advance_per_radian", model=model, friction=self.own_drive_readings[0]) * Hz
+
+    @cached_property
+    def banded(self) -> tuple[str, ...]:
+        """Names of the models that have a band over the places that the placement leaves open."""
+        if "forward_velocity_low" not in self.whole:
+            return ()
+        known = self.whole["forward_velocity_low"]
+        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+
+    @cached_property
+    def with_intervals(self) -> tuple[str, ...]:
+        """Names of the models that have intervals of a posterior."""
+        if "forward_velocity_interval_low" not in self.whole:
+            return ()
+        known = self.whole["forward_velocity_interval_low"]
+        return tuple(name for name in self.models if bool(np.isfinite(known.sel(model=name)).any()))
+
+    def band(self, name: str, model: str) -> tuple[Values, Values]:
+        """Limits of a quantity of free swimming, of a posterior or over the open places, SI; NaN without them."""
+        reading = self.own_drive_readings[0]
+        if model in self.with_intervals:
+            named = {"model": model, "friction": self.own_drive_readings[-1]}
+            return self.values(f"{name}_interval_low", **named), self.values(f"{name}_interval_high", **named)
+        if model not in self.banded:
+            unknown = np.full_like(self.values(name, model=model, friction=reading), np.nan)
+            return unknown, unknown
+        low, high = (self.values(f"{name}_{end}", model=model, friction=reading) for end in ("low", "high"))
+        return low, high
+
+    @property
+    def place_words(self) -> str:
+        """Where robots lie for models that compute the walls, and what is shaded; empty without either."""
+        computed = [name for name in self.models if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
+        if not computed:
+            return self._interval_words()
+        where = f"{', '.join(computed)}: {reference_place(json.loads(self.whole.attrs.get('settings', '{}')))}."
+        return f"{where} {self._band_words()} {self._interval_words()}".strip()
+
+    def _interval_words(self) -> str:
+        if not self.with_intervals:
+            return ""
+        names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
+        return f"Shades: 95 % intervals of the posterior ({names}, friction reading '{reading}'), discrepancy included."
+
+    def _band_words(self) -> str:
+        if not self.banded:
+            return ""
+        gaps = np.asarray(self.whole["gap_at_place"].values, dtype=float)
+        pitches = np.degrees(np.asarray(self.whole["pitch_at_place"].values, dtype=float))
+        return (
+            f"Bands: the least to the largest value over gaps of {np.nanmin(gaps) * 1e3:.3g} to "
+            f"{np.nanmax(gaps) * 1e3:.3g} mm and pitches of {np.nanmin(pitches):.3g} to {np.nanmax(pitches):.3g} deg "
+            "(without friction), none of them likelier than another."
+        )
+
+    def observed_motor_rate(self) -> tuple[Values, Values]:
+        """Observed omega_m with the half width of its interval, rad/s; else tail less body rate.
+
+        The half widths of tail and body then add up: not too narrow, however the two are correlated.
+        """
+        rate, half = self.values("observed_motor_rate"), self.values("observed_motor_rate_ci95")
+        tail, body = (self.values(f"observed_{name}_rate") for name in ("tail", "body"))
+        halves = self.values("observed_tail_rate_ci95") + self.values("observed_body_rate_ci95")
+        seen = np.isfinite(rate)
+        return np.where(seen, rate, tail - body), np.where(seen, half, halves)
+
+    def unanswered(self) -> str:
+        """A sentence on robots of this part without an answer; empty if there are none."""
+        outside = self.dataset["outside"].sel(friction=list(self.own_drive_readings))
+        codes = np.asarray(outside.max("friction").values).ravel()
+        missing = Counter(int(code) for code in codes if code)
+        if not missing:
+            return ""
+        names = str(outside.attrs.get("flag_meanings", "")).split()
+        reasons = [
+            names[code].replace("-", " ") if code < len(names) else "other" for code, _ in missing.most_common(3)
+        ]
+        return (
+            f"Gaps: {missing.total()} of {codes.size} results (a robot with a model) have no answer "
+            f"({', '.join(reasons)}{', …' if len(missing) > 3 else ''})."
+        )
+
+    def paper_speed(self, place: int) -> tuple[float, float] | None:
+        """(Re_max, U) of the paper's caption for a channel; U = Re mu/(rho D_b), m/s."""
+        channel = str(self.whole["channel"].values[place])
+        if not self.paper or channel not in LARGEST_RE or place >= len(self.robots):
+            return None
+        fluid, body = self.robots[place]["fluid"], self.robots[place]["body"]
+        reynolds = LARGEST_RE[channel]
+        return reynolds, reynolds * fluid["viscosity"] / (fluid["density"] * body["diameter"])

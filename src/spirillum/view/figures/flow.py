@@ -1,0 +1,348 @@
+"""The flow around a robot on a plane: speed with streamlines, and pressure; in a tube the pressure along it too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize, SymLogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.ticker import NullLocator, StrMethodFormatter
+
+from spirillum.arrays import Values
+from spirillum.units import Hz
+from spirillum.view.figures.scene import HALO
+from spirillum.view.figures.section import draw_glass, draw_section
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spirillum.fields.flow import Flow
+
+__all__ = ["flow_figure"]
+
+_LEFT, _RIGHT, _HEAD, _FOOT, _X_LABEL, _GAP = 0.72, 0.95, 0.86, 0.52, 0.46, 0.3
+"""Margins of the figure, room below a panel, and room between panels, inches."""
+_LINE, _STRIP = 0.18, 1.1
+"""Height of a further line of words above the panels, and of the panel of the pressure along a tube, inches."""
+_WIDE, _SQUARE, _TALLEST = 6.6, 3.3, 4.2
+"""Width of a panel among stacked ones and of one beside another; largest height, inches."""
+_SPEED_DECADES = 3.0
+"""Largest range of the logarithmic colours: what is slower has the darkest one."""
+_PRESSURE_DECADES = 2.0
+"""Range of the pressure's logarithmic colours on each side; below it they are linear."""
+_LINES_PER_INCH = 0.36
+_LINES = "direction of the velocity's part in the plane"
+
+
+@dataclass(frozen=True)
+class _View:
+    """A plane's data as a panel shows them: rows upwards, lengths in a readable unit."""
+
+    plane: xr.Dataset
+    first: str
+    """Horizontal axis."""
+    second: str
+    """Vertical axis."""
+    across: str
+    """Axis across the plane."""
+    lengths: Scale
+    x: Values
+    y: Values
+    solid: Values
+
+    @classmethod
+    def of(cls, plane: xr.Dataset) -> _View:
+        first, second = (str(name) for name in plane["inside"].dims)
+        x, y = (np.asarray(plane[name].values, dtype=float) for name in (first, second))
+        lengths = Scale.of(np.array([0.1 * max(np.ptp(x), np.ptp(y))]), "m")  # mm for a robot of 10 cm
+        across = next(axis for axis in "xyz" if axis not in (first, second))
+        solid = np.asarray(plane["inside"].values, dtype=bool).T
+        return cls(plane, first, second, across, lengths, lengths(x), lengths(y), solid)
+
+    @property
+    def name(self) -> str:
+        """Such as `xz`."""
+        return self.first + self.second
+
+    @property
+    def offset(self) -> float:
+        """Place of the plane on the axis across it, m."""
+        return float(self.plane[self.across])
+
+    def values(self, name: str) -> Values:
+        """A variable, SI, rows upwards."""
+        found: Values = np.asarray(self.plane[name].values, dtype=float).T
+        return found
+
+    def continued(self, values: Values) -> Values:
+        """Values carried on into the solids, which are drawn above: no fringe of cells without colour around them."""
+        from scipy.ndimage import distance_transform_edt
+
+        if not self.solid.any() or self.solid.all():
+            return values
+        nearest = distance_transform_edt(self.solid, return_distances=False, return_indices=True)
+        carried: Values = values[tuple(nearest)]
+        return carried
+
+
+def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
+    """Two panels to scale: speed (logarithmic colours) with streamlines, and pressure (colours about zero).
+
+    In a tube a plane along it gets a third one: the pressure at the glass that the robot does not lie on.
+
+    Args:
+        flow: what `spirillum.flow` returns.
+        plane: what its `plane` returns.
+    """
+    view = _View.of(plane)
+    with styled():
+        words = list(_conditions(flow, view))
+        strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
+        figure, panels, bars = _panels(
+            view, _HEAD + _LINE * (len(words) - 2), _STRIP + _GAP + _X_LABEL if strip else 0.0
+        )
+        scale = 72.0 * figure.get_size_inches()[0] * panels[0].get_position().width / float(np.ptp(view.x))
+        unit = view.lengths.factor
+        for letter, axes in zip("ab", panels, strict=True):
+            axes.set_xlim(view.x[0], view.x[-1])
+            axes.set_ylim(view.y[0], view.y[-1])
+            axes.set_title(f"{letter})", loc="left", pad=3, weight="bold")
+            axes.set_xlabel(f"${view.first}$ ({view.lengths.unit})")
+            axes.set_ylabel(f"${view.second}$ ({view.lengths.unit})")
+            if flow.seat is not None:
+                draw_glass(axes, flow.seat, view.name, view.offset, unit)
+            drop = flow.prediction.batch.placement.tail_drop
+            draw_section(axes, flow.robot, view.name, view.offset, phase=flow.phase, unit=unit, points=scale, drop=drop)
+        _draw_speed(figure, panels[0], bars[0], view)
+        _draw_lines(figure, panels[0], view)
+        _draw_pressure(figure, panels[1], bars[1], view)
+        if flow.frame == "lab" and view.first == "x":
+            _draw_heading(panels[0], flow, view)
+        if strip:
+            _draw_strip(figure, panels[1], view)
+        _write_words(figure, flow, words, list(_notes(flow, view)))
+        return figure
+
+
+def _panels(view: _View, head: float, below: float) -> tuple[Figure, list[Axes], list[Axes]]:
+    """Figure, panels and the axes of their colour bars: stacked for a long plane, else side by side.
+
+    Args:
+        view: the plane.
+        head: room above the panels, inches.
+        below: room below them for another one, inches.
+    """
+    width, height = float(np.ptp(view.x)), float(np.ptp(view.y))
+    stacked = width > 1.25 * height
+    across = _WIDE if stacked else _SQUARE
+    share = min(1.0, _TALLEST / (across * height / width))
+    w, h = across * share, across * height / width * share
+    columns, rows = (1, 2) if stacked else (2, 1)
+    total_w = columns * (_LEFT + w + _RIGHT)
+    total_h = head + rows * (h + _X_LABEL) + (rows - 1) * _GAP + below + _FOOT
+    figure = new_figure(total_w, total_h)
+    panels, bars = [], []
+    for number in range(2):
+        column, row = (0, number) if stacked else (number, 0)
+        left = column * (_LEFT + w + _RIGHT) + _LEFT
+        bottom = total_h - head - (row + 1) * h - row * (_X_LABEL + _GAP)
+        panels.append(figure.add_axes((left / total_w, bottom / total_h, w / total_w, h / total_h)))
+        bars.append(figure.add_axes(((left + w + 0.1) / total_w, bottom / total_h, 0.13 / total_w, h / total_h)))
+        # Ticks are made when they are drawn, which a caller may do outside `styled`.
+        panels[-1].tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
+        panels[-1].grid(visible=False)
+    return figure, panels, bars
+
+
+def _draw_colours(axes: Axes, view: _View, values: Values, colours: str, norm: Normalize) -> AxesImage:
+    half_x, half_y = 0.5 * (view.x[1] - view.x[0]), 0.5 * (view.y[1] - view.y[0])
+    box = (view.x[0] - half_x, view.x[-1] + half_x, view.y[0] - half_y, view.y[-1] + half_y)
+    limits = axes.get_xlim(), axes.get_ylim()
+    image = axes.imshow(values, extent=box, origin="lower", cmap=colours, norm=norm, interpolation="bilinear")
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+    axes.set_aspect("equal")
+    return image
+
+
+def _draw_speed(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
+    speed = np.sqrt(sum(view.values(f"velocity_{axis}") ** 2 for axis in "xyz"))
+    known = speed[np.isfinite(speed)]
+    scale = Scale.of(known, "m/s")
+    highest = float(known.max()) / scale.factor if known.size and known.max() > 0 else 1.0
+    lowest = float(known.min()) / scale.factor if known.size else 0.0
+    floor = min(max(lowest, highest * 10.0**-_SPEED_DECADES), 0.5 * highest)
+    shown = np.maximum(view.continued(speed) / scale.factor, 0.1 * floor)  # a logarithm knows no zero
+    image = _draw_colours(axes, view, shown, "viridis", LogNorm(floor, highest))
+    _bar(figure, image, bar, f"speed ({scale.unit})", "min" if lowest < floor else "neither")
+    steps = _round_steps(floor, highest, (1.0, 2.0, 5.0))
+    bar.set_yticks(steps if steps.size >= 2 else [floor, highest])
+
+
+def _draw_pressure(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
+    pressure = view.values("pressure")
+    known = np.abs(pressure[np.isfinite(pressure)])
+    highest = float(known.max()) if known.size and known.max() > 0 else 1.0
+    scale = Scale.of(np.array([highest]), "Pa")
+    limit = highest / scale.factor
+    threshold = limit * 10.0**-_PRESSURE_DECADES
+    # It peaks at the wire: on a linear scale the body's pressure would have no colour.
+    norm = SymLogNorm(linthresh=threshold, vmin=-limit, vmax=limit, base=10)
+    image = _draw_colours(axes, view, view.continued(pressure) / scale.factor, "RdBu_r", norm)
+    _bar(figure, image, bar, f"pressure ({scale.unit})")
+    steps = _round_steps(threshold, limit, (1.0,))
+    bar.set_yticks([*(-steps[::-1]), 0.0, *steps])
+
+
+def _bar(figure: Figure, image: AxesImage, bar: Axes, label: str, extend: str = "neither") -> None:
+    colour_bar = figure.colorbar(image, cax=bar, extend=extend, format=StrMethodFormatter("{x:.3g}"))
+    colour_bar.set_label(label)
+    bar.yaxis.set_minor_locator(NullLocator())
+    bar.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
+
+
+def _round_steps(low: float, high: float, digits: tuple[float, ...]) -> Values:
+    """The numbers with one of these digits and zeros between two bounds."""
+    powers = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    steps: Values = np.sort(np.outer(10.0**powers, digits).ravel())
+    return steps[(steps >= low * (1 - 1e-9)) & (steps <= high * (1 + 1e-9))]
+
+
+def _draw_lines(figure: Figure, axes: Axes, view: _View) -> None:
+    """Streamlines of the velocity's part in the plane; they end at solids."""
+    parts = [view.values(f"velocity_{axis}") for axis in (view.first, view.second)]
+    u, v = (np.ma.array(part, mask=~np.isfinite(part)) for part in parts)
+    if min(u.shape) < 3 or u.mask.all():
+        return
+    place = axes.get_position()
+    width, height = figure.get_size_inches() * (place.width, place.height)
+    axes.streamplot(
+        view.x,
+        view.y,
+        u,
+        v,
+        density=(max(_LINES_PER_INCH * width, 0.3), max(_LINES_PER_INCH * height, 0.3)),
+        color="white",
+        linewidth=0.7,
+        arrowsize=0.7,
+        zorder=3,
+    )
+
+
+def _draw_heading(axes: Axes, flow: Flow, view: _View) -> None:
+    """An arrow before the nose, or behind the tail: where the robot swims."""
+    unit = view.lengths.factor
+    ahead = flow.prediction.forward_velocity >= 0
+    body, coupling, tail = flow.robot.body, flow.robot.coupling, flow.robot.tail
+    end = 0.5 * body.length if ahead else -0.5 * body.length - coupling.length - tail.length
+    sense, reach = (1.0 if ahead else -1.0), 0.35 * body.diameter
+    along = flow.heading[["xyz".index(view.first), "xyz".index(view.second)]]
+    start = np.array([end + sense * 0.2 * reach, 0.0]) / unit
+    stop = start + sense * 1.2 * reach / unit * along
+    axes.add_patch(
+        FancyArrowPatch(
+            (float(start[0]), float(start[1])),
+            (float(stop[0]), float(stop[1])),
+            arrowstyle="simple,head_length=0.5,head_width=0.55,tail_width=0.2",
+            mutation_scale=18,
+            facecolor=COLOURS["orange"],
+            edgecolor="white",
+            linewidth=0.7,
+            zorder=9,
+        )
+    )
+    x, y = 0.5 * (start + stop) + np.array([0.0, 0.28 * body.diameter / unit])
+    axes.text(x, y, "$U_x$", ha="center", va="center", size=9, color="black", path_effects=[HALO], zorder=10)
+
+
+def _at_glass(view: _View) -> tuple[Values, Values]:
+    """Places along the tube, and pressures (Pa) at the plane's uppermost points of the fluid there."""
+    pressure = view.values("pressure")
+    free = np.isfinite(pressure)
+    there = np.flatnonzero(free.any(axis=0))
+    upper = len(free) - 1 - np.argmax(free[::-1], axis=0)
+    return view.x[there], pressure[upper[there], there]
+
+
+def _draw_strip(figure: Figure, above: Axes, view: _View) -> None:
+    """The pressure along the tube, below a panel that shows the plane."""
+    x, pressure = _at_glass(view)
+    scale = Scale.of(pressure, "Pa")
+    place, height = above.get_position(), float(figure.get_size_inches()[1])
+    bottom = place.y0 - (_X_LABEL + _GAP + _STRIP) / height
+    axes = figure.add_axes((place.x0, bottom, place.width, _STRIP / height))
+    axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)
+    axes.axhline(0.0, color="#888888", linewidth=0.6)
+    axes.set_xlim(above.get_xlim())
+    axes.set_title("c)", loc="left", pad=3, weight="bold")
+    axes.set_xlabel(above.get_xlabel())
+    axes.set_ylabel(f"pressure ({scale.unit})")
+    axes.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
+    side = "upper glass" if view.second == "z" else "glass on the left"
+    axes.set_title(f"at the {side}", loc="right", pad=3, size=8, color="#333333")
+
+
+def _write_words(figure: Figure, flow: Flow, words: list[str], notes: list[str]) -> None:
+    width, height = figure.get_size_inches()
+    left = 0.15 / width
+    title = f"Flow around {plain(flow.robot.name, 50)}"
+    figure.text(left, 1 - 0.12 / height, title, va="top", size=11, weight="bold")
+    lines = "\n".join(words).replace("-", "−")
+    figure.text(left, 1 - 0.36 / height, lines, va="top", size=9, color="#333", linespacing=1.25)
+    for number, line in enumerate(notes):
+        figure.text(left, (0.40 - 0.17 * number) / height, line, va="top", size=8, color="#333")
+
+
+def _conditions(flow: Flow, view: _View) -> Iterator[str]:
+    motion, unit = flow.prediction, view.lengths
+    frame = "lab frame" if flow.frame == "lab" else "frame of the swimming robot"
+    where = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
+    yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
+    speed = Scale.of(np.array([motion.forward_velocity]), "m/s")
+    yield (
+        f"$U_x$ = {motion.forward_velocity / speed.factor:.4g} {speed.unit}, "
+        f"tail {motion.tail_rotation_rate / Hz:.4g} Hz, body {motion.body_rotation_rate / Hz:.4g} Hz"
+    )
+    if flow.seat is not None:
+        yield ", ".join(_place(flow, unit))
+
+
+def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
+    """Where in its tube the robot lies, and what the fluid is made to do."""
+    placement, motion = flow.prediction.placement, flow.prediction
+    yield f"gap {placement['gap']['value'] / lengths.factor:.4g} {lengths.unit}"
+    if flow.seat is not None and flow.seat.pitch:
+        yield f"pitch {np.degrees(flow.seat.pitch):.4g}°"
+    if "tail_drop" in placement:
+        yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
+    mean = Scale.of(np.array([motion.plug_velocity]), "m/s")
+    through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
+    if motion.batch.placement.flow is not None:
+        yield f"imposed mean flow {through}"
+    elif placement["ends"] == "closed":
+        yield "ends closed"
+    else:
+        yield f"ends open, mean flow {through}"
+
+
+def _notes(flow: Flow, view: _View) -> Iterator[str]:
+    oblique = flow.seat is not None and (view.name == "xy" or view.offset != 0)
+    lines = "velocity's part in the plane, ending at oblique glass" if oblique else _LINES
+    drawn = ["grey: robot where it is cut" if oblique else "grey: robot where the plane cuts it"]
+    if view.first == "x":
+        drawn.append("white band: tail")
+        drawn += ["dashed: its full outline"] if view.offset != 0 else []
+    yield f"Lines: {lines}; {', '.join(drawn)}."
+    held = ""
+    if flow.held_force > 0:
+        force = Scale.of(np.array([flow.held_force]), "N")
+        held = f" Held from moving sideways by {flow.held_force / force.factor:.2g} {force.unit}."
+    walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
+    yield f"{walls}{held} Computed, nothing is measured."

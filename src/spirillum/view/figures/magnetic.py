@@ -1,0 +1,104 @@
+"""A one-piece swimmer in a rotating field: speed, rate, wobble and phase lag against the rate of the field."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from spirillum.arrays import Samples
+from spirillum.units import Hz
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["magnetic_figure"]
+
+_SIZE = (9.0, 6.0)
+_HELD = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
+
+
+def magnetic_figure(dataset: xr.Dataset) -> Figure:
+    """Four panels over the rate of the field.
+
+    Args:
+        dataset: what `spirillum.magnetic_sweep` returns.
+    """
+    rate = dataset["field_rate"].values / Hz
+    speed = dataset["forward_velocity"].values
+    speeds = Scale.of(np.concatenate([speed, dataset["held_forward_velocity"].values]), "m/s")
+    with styled():
+        figure = new_figure(*_SIZE)
+        figure.text(0.012, 0.968, f"{plain(dataset.attrs['robot'])} in a rotating field", weight="bold", va="center")
+        figure.text(
+            0.012,
+            0.934,
+            f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
+            "computed, nothing is measured",
+            va="center",
+            size=8.0,
+            color="#555555",
+        )
+        panels = figure.subplots(2, 2, sharex=True).ravel()
+        figure.subplots_adjust(left=0.085, right=0.985, bottom=0.085, top=0.88, wspace=0.24, hspace=0.2)
+        fine, turning, lag = _held(dataset)
+        advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
+        panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
+        _points(panels[0], rate, speeds(speed), "blue")
+        panels[0].set_ylabel(f"forward velocity ({speeds.unit})")
+        panels[0].legend(loc="best")
+        panels[1].plot(fine, turning, **_HELD)
+        _points(panels[1], rate, dataset["tail_rotation_rate"].values / Hz, "vermillion")
+        panels[1].set_ylabel("rate of the robot (Hz)")
+        low, high = (np.rad2deg(dataset[f"{name}_wobble_angle"].values) for name in ("least", "largest"))
+        panels[2].fill_between(
+            rate, low, high, color=COLOURS["green"], alpha=0.25, linewidth=0, label="least to largest"
+        )
+        _points(panels[2], rate, np.rad2deg(dataset["wobble_angle"].values), "green")
+        panels[2].set_ylabel("wobble: robot's axis to field's (deg)")
+        panels[2].set_ylim(0.0, max(1.0, 1.05 * float(high.max())))
+        panels[2].legend(loc="best")
+        panels[3].plot(fine, np.rad2deg(lag), **_HELD)
+        _points(panels[3], rate, np.rad2deg(dataset["phase_lag"].values), "purple")
+        panels[3].set_ylabel("moment behind field (deg)")
+        panels[3].set_ylim(0.0, 95.0)
+        _step_out(panels, float(dataset["step_out_rate"]) / Hz * float(np.sign(rate[0])))
+        for letter, axes in zip("abcd", panels, strict=True):
+            axes.set_title(f"{letter})", loc="left", weight="bold")
+        for axes in panels[2:]:
+            axes.set_xlabel("rotation rate of the field (Hz)")
+        return figure
+
+
+def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
+    """Rates of the field and of the held robot, Hz, and its phase lag, rad: the closed form between the given rates."""
+    rates, step_out = dataset["field_rate"].values / Hz, float(dataset["step_out_rate"]) / Hz
+    sense = float(np.sign(rates[0]))
+    size = np.unique(np.append(np.linspace(0.0, np.abs(rates).max(), 801), min(step_out, np.abs(rates).max())))
+    follows = size <= step_out
+    slipping = size - np.sqrt(np.where(follows, 0.0, size**2 - step_out**2))
+    turning = np.where(follows, size, slipping)
+    return sense * size, sense * turning, np.where(follows, np.arcsin(np.minimum(size / step_out, 1.0)), np.nan)
+
+
+def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
+    axes.plot(x, y, color=COLOURS[colour], marker="o", markersize=3.5, linewidth=1.2, label="free")
+
+
+def _step_out(panels: Samples, rate: float) -> None:
+    """A line where the held robot steps out."""
+    for axes in panels:
+        axes.axvline(rate, color="#999999", linewidth=0.8)
+    panels[1].annotate(
+        "step-out, held",
+        (rate, 0.03),
+        xycoords=("data", "axes fraction"),
+        xytext=(-4, 0),
+        textcoords="offset points",
+        ha="right",
+        size=8.0,
+        color="#555555",
+    )

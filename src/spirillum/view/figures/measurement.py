@@ -1,0 +1,143 @@
+"""Figures of a measurement: the series of a trial with what is left of them, and the trials side by side."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from spirillum.arrays import Samples
+from spirillum.measurement.rates import Rate
+from spirillum.measurement.trials import RATE_NAMES, Trial
+from spirillum.units import Hz
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain
+
+if TYPE_CHECKING:
+    from spirillum.measurement.measure import Measurement
+
+__all__ = ["measurement_figures", "trial_figure", "trials_figure"]
+
+_MOST_POINTS = 4000
+_SERIES = (
+    ("forward_velocity", "position", "m"),
+    ("body_rotation_rate", "body's angle", "turn"),
+    ("tail_rotation_rate", "tail's phase", "turn"),
+)
+_TITLES = {
+    "forward_velocity": ("forward velocity", "m/s"),
+    "body_rotation_rate": ("body rotation rate", "Hz"),
+    "tail_rotation_rate": ("tail rotation rate", "Hz"),
+    "motor_rotation_rate": ("motor rotation rate", "Hz"),
+}
+
+
+def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
+    """The figures of a measurement by the names of their files."""
+    found = {}
+    if len(measurement.trials) > 1:
+        found["trials"] = Picture(
+            "The trials",
+            "Each trial with its own 95 % interval (where it is wider than the dot), and the mean over trials with "
+            "Student's interval (band), which for the velocity holds the shared uncertainty of the scale.",
+            "Speeds and rates of the trials with error bars, and the band of their mean",
+            lambda: trials_figure(measurement),
+        )
+    for trial in measurement.trials:
+        found[f"series-{trial.name}"] = Picture(
+            f"Series of {plain(trial.name)}",
+            "Left: what was seen on every frame (dots) and the fitted line. Right: dots less line; frames that were "
+            "left out are not shown.",
+            f"Position, body angle and tail phase of {plain(trial.name)} over time, with residuals",
+            lambda trial=trial: trial_figure(trial),  # type: ignore[misc]
+        )
+    return found
+
+
+def trial_figure(trial: Trial) -> Figure:
+    """Series of a trial with their lines, and what is left of them."""
+    figure = new_figure(7.2, 5.4)
+    panels = figure.subplots(3, 2, sharex=True, gridspec_kw={"width_ratios": (1.25, 1.0)})
+    track = trial.track
+    values = {
+        "forward_velocity": track.position[:, 0],
+        "body_rotation_rate": track.body_angle,
+        "tail_rotation_rate": track.tail_phase,
+    }
+    for (left, right), (name, words, unit) in zip(panels, _SERIES, strict=True):
+        _series(left, right, track.time, values[name], trial.fits[name], words, unit)
+        spoiled = trial.quantities[name].reason if not np.isfinite(trial.quantities[name].value) else ""
+        if spoiled:
+            left.text(0.02, 0.96, "not given: see the flags", transform=left.transAxes, va="top", color="#9c3d00")
+    for axes in panels[-1]:
+        axes.set_xlabel("time, s")
+    panels[0][0].set_title("seen, and fitted line", loc="left")
+    panels[0][1].set_title("what is left", loc="left")
+    _say_synthetic(figure, synthetic=trial.synthetic)
+    figure.align_ylabels()
+    figure.tight_layout()
+    return figure
+
+
+def _say_synthetic(figure: Figure, *, synthetic: bool) -> None:
+    """In the lower right corner, where a video says of itself that it is computed."""
+    if synthetic:
+        figure.text(0.99, 0.015, "synthetic", ha="right", va="bottom", size=8.0, color="#9c3d00")
+
+
+def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate, words: str, unit: str) -> None:
+    known = np.isfinite(values)
+    if not known.any():
+        for axes in (left, right):
+            axes.text(0.5, 0.5, "not seen", transform=axes.transAxes, ha="center", color="#777777")
+        left.set_ylabel(words)
+        return
+    values = values - values[known][0]
+    scale = Scale.of(values, "m") if unit == "m" else Scale(2 * np.pi, "turns")
+    few = slice(None, None, max(1, time.size // _MOST_POINTS))
+    left.plot(time[few], scale(values)[few], ".", color=COLOURS["sky"], markersize=2.5, rasterized=True)
+    left.set_ylabel(f"{words}, {scale.unit}")
+    if not rate.measured or rate.residual.size != time.size:
+        return
+    line = values - rate.residual
+    left.plot(time[known], scale(line)[known], "-", color=COLOURS["black"], linewidth=0.9)
+    if not np.isfinite(rate.low):  # a line through two readings leaves nothing but rounding
+        right.text(0.5, 0.5, "two readings", transform=right.transAxes, ha="center", color="#777777")
+        return
+    small = Scale.of(rate.residual, "m") if unit == "m" else Scale(np.pi / 180, "deg")
+    right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
+    right.axhline(0.0, color="#444444", linewidth=0.6)
+    right.set_ylabel(small.unit)
+
+
+def trials_figure(measurement: Measurement) -> Figure:
+    """Speeds and rates of all trials, with the mean over them."""
+    figure = new_figure(7.2, 2.7)
+    for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
+        title, unit = _TITLES[name]
+        items = [trial.quantities[name] for trial in measurement.trials]
+        values = np.array([item.value for item in items])
+        scale = Scale(Hz, "Hz") if unit == "Hz" else Scale.of(values, unit)
+        at = np.arange(1.0, len(items) + 1.0)
+        mean = measurement.summary.quantities[name]
+        if np.isfinite(mean.low):
+            axes.axhspan(mean.low / scale.factor, mean.high / scale.factor, color="#dddddd", zorder=0)
+        if np.isfinite(mean.value):
+            axes.axhline(mean.value / scale.factor, color="#444444", linewidth=0.8)
+        reach = np.array([[item.value - item.low for item in items], [item.high - item.value for item in items]])
+        reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
+        axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
+        axes.set_title(f"{title}, {scale.unit}", fontsize=8.0)
+        axes.set_xlim(0.4, len(items) + 0.6)
+        axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+        axes.set_xlabel("trial")
+        if not np.isfinite(values).any():
+            axes.set_yticks([])
+            axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color="#777777")
+    _say_synthetic(figure, synthetic=any(trial.synthetic for trial in measurement.trials))
+    figure.tight_layout()
+    return figure

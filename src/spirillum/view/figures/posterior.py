@@ -1,0 +1,161 @@
+"""Figures of what is known about fitted numbers: marginals and pairs of the posterior, profiles of the likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from spirillum.arrays import Samples
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import COLOURS, Scale, look_of_model, new_figure, plain, styled
+
+if TYPE_CHECKING:
+    from spirillum.calibration.fit import Calibrated
+    from spirillum.calibration.identifiability import Profile
+
+__all__ = ["posterior_figure", "profile_figure"]
+
+_CELL = 1.25
+_MOST = 9
+_LIMIT = 3.84
+"""Misfit at the limits of a 95 % interval: chi squared of one degree of freedom."""
+_BINS = 32
+
+
+def posterior_figure(found: Calibrated) -> Figure:
+    """Marginals on the diagonal, pairs below it; what is not drawn beyond the ninth number is said."""
+    posterior = found.posterior
+    assert posterior is not None  # noqa: S101 - drawn for a posterior only
+    every = {name: values.reshape(-1) for name, values in posterior.values().items()}
+    names = list(every)[:_MOST]
+    count = len(names)
+    colour = look_of_model(found.problem.model.name).colour
+    with styled():
+        room, head, foot = 0.85, 0.75, 0.75
+        size = room + _CELL * count + 0.15
+        figure = new_figure(max(size, 5.5), size - room + head + foot)
+        width, height = figure.get_size_inches()
+        figure.text(
+            0.15 / width, 1 - 0.12 / height, "Posterior of the fitted numbers", va="top", size=11, weight="bold"
+        )
+        synthetic = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
+        words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
+        words += "; contours hold 50 and 95 % of the draws" if count > 1 else ""
+        left_out = f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
+        figure.text(0.15 / width, 1 - 0.36 / height, words + left_out, va="top", size=9, color="#333")
+        for row, below in enumerate(names):
+            for column, name in enumerate(names[: row + 1]):
+                place = (
+                    (room + _CELL * column) / width,
+                    (foot + _CELL * (count - 1 - row)) / height,
+                    (_CELL - 0.1) / width,
+                    (_CELL - 0.1) / height,
+                )
+                axes = figure.add_axes(place)
+                if row == column:
+                    _marginal(axes, every[name], colour)
+                else:
+                    _pair(axes, every[name], every[below], colour)
+                _ticks(axes, left=column == 0 and row > 0, bottom=row == count - 1)
+                if row == count - 1:
+                    axes.set_xlabel(_label(name), fontsize=7)
+                if column == 0 and row > 0:
+                    axes.set_ylabel(_label(below), fontsize=7)
+        return figure
+
+
+def _label(name: str) -> str:
+    """A number's name on two lines."""
+    return name.replace("[", "\n[").replace("_", " ", 1).replace("_", "\n")
+
+
+def _window(values: Samples) -> tuple[float, float]:
+    low, high = np.quantile(values, [0.002, 0.998])
+    room = 0.05 * (high - low) or 0.01 * abs(high) or 1e-12
+    return float(low - room), float(high + room)
+
+
+def _marginal(axes: Axes, values: Samples, colour: str) -> None:
+    axes.hist(values, bins=_BINS, range=_window(values), color=colour, alpha=0.35, linewidth=0.0)
+    axes.hist(values, bins=_BINS, range=_window(values), color=colour, histtype="step", linewidth=1.0)
+    for quantile in np.quantile(values, [0.025, 0.975]):
+        axes.axvline(float(quantile), color="#444444", linewidth=0.8, linestyle=":")
+    axes.set_xlim(_window(values))
+    axes.set_yticks([])
+
+
+def _pair(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
+    """Regions that hold 95 and 50 % of the draws."""
+    window = (_window(x), _window(y))
+    counts, xs, ys = np.histogram2d(x, y, bins=_BINS, range=window)
+    smooth = counts
+    for axis in (0, 1):
+        smooth = 0.5 * smooth + 0.25 * (np.roll(smooth, 1, axis) + np.roll(smooth, -1, axis))
+    ranked = np.sort(smooth.ravel())[::-1]
+    share = np.cumsum(ranked) / ranked.sum()
+    levels = sorted({float(ranked[np.searchsorted(share, level)]) for level in (0.95, 0.5)})
+    if len(levels) == 2 and levels[0] > 0:
+        middle_x, middle_y = 0.5 * (xs[1:] + xs[:-1]), 0.5 * (ys[1:] + ys[:-1])
+        axes.contourf(
+            middle_x, middle_y, smooth.T, levels=[*levels, float(ranked[0]) * 1.01], colors=[colour] * 2, alpha=0.3
+        )
+        axes.contour(middle_x, middle_y, smooth.T, levels=levels, colors=colour, linewidths=0.8)
+    else:
+        axes.plot(x[::10], y[::10], ".", color=colour, markersize=1.0)
+    axes.set_xlim(window[0])
+    axes.set_ylim(window[1])
+
+
+def _ticks(axes: Axes, *, left: bool, bottom: bool) -> None:
+    axes.tick_params(labelleft=left, labelbottom=bottom, labelsize=6.5, length=2.0, width=0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
+    if axes.get_yticks().size:
+        axes.yaxis.set_major_locator(MaxNLocator(3, prune="both"))
+    for label in axes.get_xticklabels():
+        label.set_rotation(40)
+    axes.grid(visible=False)
+
+
+def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
+    """Least misfit against each number, all others fitted anew; the dotted line cuts out the 95 % interval."""
+    columns = min(len(profiles), 4)
+    rows = -(-len(profiles) // columns)
+    synthetic = " (synthetic)" if found.experiment.synthetic else ""
+    with styled():
+        sheet = Sheet(
+            "Profile likelihood",
+            f"{plain(found.experiment.source, 40)}{synthetic}, model {found.problem.model.name}: least chi squared "
+            "above the best fit",
+            rows,
+            columns,
+            panel=(1.72, 1.3),
+            notes=[
+                "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
+                "no limit there. The model's discrepancy is held; the wider intervals of the table do not hold it.",
+            ],
+            labelled_rows=frozenset(range(rows - 1)),
+        )
+        figure, panels = sheet.draw()
+        every = [axes for row in panels for axes in row]
+        units = {item.label: item.parameter.unit for item in found.problem.coordinates}
+        for axes, profile in zip(every, profiles, strict=False):
+            scale = Scale.of(np.abs(profile.values), units[profile.label]) if units[profile.label] else None
+            values, unit = (
+                (profile.values, "") if scale is None else (profile.values / scale.factor, f" ({scale.unit})")
+            )
+            axes.plot(values, profile.misfit, color=COLOURS["blue"], marker="o", markersize=2.5)
+            axes.axhline(_LIMIT, color="#444444", linewidth=0.8, linestyle=":")
+            axes.set_ylim(0.0, 3.2 * _LIMIT)
+            axes.set_xlabel(_label(profile.label).replace("\n", " ") + unit, fontsize=7.5)
+            axes.xaxis.set_major_locator(MaxNLocator(3))
+            axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
+        for axes in every[len(profiles) :]:
+            axes.remove()
+        for row in panels:
+            row[0].set_ylabel(r"$\Delta\chi^2$")
+        return figure

@@ -1,0 +1,219 @@
+"""A robot in its channel, drawn to scale from the side, with the dimensions of the paper's Fig. 1b."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
+
+from spirillum.robot.robot import Robot
+from spirillum.view.figures.dimensions import draw_dimensions
+from spirillum.view.figures.scene import FAINT, INK, PHASE, WIDTH, Scene, label, length_words
+from spirillum.view.figures.solids import Metal, body_profile, draw_solid, draw_wire
+from spirillum.view.figures.style import COLOURS, new_figure, plain, styled
+
+__all__ = ["robot_figure", "robot_words"]
+
+_BODY: Metal = ("#3f5b70", "#8fb0c6", "#f4fafd")
+_COUPLING: Metal = ("#5b5f63", "#a9afb4", "#f7f8f9")
+_COPPER: Metal = ("#4a2410", "#c2763a", "#ffd9b0")
+_FLUID, _GLASS, _GLASS_EDGE = "#eef5f9", "#cfe0ea", "#54788e"
+
+
+def robot_words(robot: Robot) -> str:
+    """What the picture shows, for those who cannot see it."""
+    body, tail, channel = robot.body, robot.tail, robot.channel
+    where = (
+        f"on the floor of a channel of {length_words(channel.diameter)} diameter" if channel else "without a channel"
+    )
+    towards = "right" if _sense(robot) > 0 else "left"
+    return (
+        f"A {body.shape} body of {length_words(body.diameter)} diameter and {length_words(body.length)} length, "
+        f"a {tail.handedness}-handed helical tail of {length_words(tail.length)} length, "
+        f"{length_words(tail.wavelength)} wavelength and {length_words(tail.amplitude)} amplitude behind it, {where}; "
+        f"side view to scale, swimming to the {towards}. Computed geometry, not a photograph."
+    )
+
+
+def _sense(robot: Robot) -> float:
+    """+1 where the drive makes the robot swim nose first, -1 where it swims tail first."""
+    drive, sign = robot.drive, 1.0
+    if drive is not None and drive.kind == "dc-motor" and robot.motor is not None:
+        sign = -1.0 if robot.motor.polarity == "reverse" else 1.0
+    elif drive is not None and (given := drive.rate or drive.torque or _field_rate(robot)):
+        sign = robot.hand * (1.0 if given > 0 else -1.0)
+    return sign
+
+
+def _field_rate(robot: Robot) -> float:
+    """Rotation rate of the field of a magnetic drive, rad/s; 0 for any other."""
+    return 0.0 if robot.magnetic is None else robot.magnetic.rotation_rate
+
+
+def robot_figure(robot: Robot) -> Figure:
+    """Side view of a robot in its channel, to scale: computed geometry with its dimensions.
+
+    Args:
+        robot: a loaded robot. Its nose is on the right, its body lies on the channel's floor; the view is along +y.
+    """
+    with styled():
+        scene = Scene.of(robot)
+        height = WIDTH * (scene.top - scene.bottom) / (scene.right - scene.left)
+        figure = new_figure(WIDTH, height)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_xlim(scene.left, scene.right)
+        axes.set_ylim(scene.bottom, scene.top)
+        axes.set_axis_off()
+        _draw_channel(axes, scene)
+        _draw_robot(axes, scene)
+        draw_dimensions(axes, scene)
+        _draw_motion(axes, scene)
+        _draw_frame(axes, scene)
+        return figure
+
+
+def _draw_channel(axes: Axes, s: Scene) -> None:
+    upper = s.ceiling if s.ceiling is not None else s.top - 0.055 * s.total
+    lower = s.floor if s.robot.channel is not None else s.floor - 0.03 * s.total
+    width = s.right - s.left
+    axes.add_patch(Rectangle((s.left, lower), width, upper - lower, facecolor=_FLUID, edgecolor="none", zorder=0))
+    if s.robot.channel is None:
+        return
+    walls = [(s.floor - s.wall, s.floor)] + ([(s.ceiling, s.ceiling)] if s.ceiling is not None else [])
+    for start, face in walls:
+        axes.add_patch(Rectangle((s.left, start), width, s.wall, facecolor=_GLASS, edgecolor="none", zorder=1))
+        axes.plot([s.left, s.right], [face, face], color=_GLASS_EDGE, linewidth=1.3, zorder=2)
+        shine = start + 0.55 * s.wall
+        axes.plot([s.left, s.right], [shine, shine], color="white", linewidth=1.6, alpha=0.8, zorder=1.5)
+
+
+def _draw_robot(axes: Axes, s: Scene) -> None:
+    robot, unit = s.robot, s.scale.factor
+    if robot.channel is not None:
+        shadow = 0.010 * s.total
+        for share in (1.0, 0.8, 0.6, 0.4):
+            ellipse = Ellipse(
+                (0.0, s.floor), 2.0 * s.nose * share, shadow * share, color="#24414f", alpha=0.16, zorder=2.5
+            )
+            axes.add_patch(ellipse)
+    axes.plot(
+        [s.tip - 0.02 * s.total, s.nose + 0.02 * s.total],
+        [0, 0],
+        color=FAINT,
+        linewidth=0.7,
+        dashes=(9, 3, 2, 3),
+        zorder=3,
+    )
+    draw_wire(axes, robot, _COPPER, phase=PHASE, unit=unit, points=s.points)
+    clearance = robot.coupling.clearance / unit
+    if robot.coupling.diameter > 0 and robot.coupling.length > 2 * robot.coupling.clearance:
+        radius = 0.5 * robot.coupling.diameter / unit
+        x = np.array([s.rear - clearance, s.rear - clearance, s.root + clearance, s.root + clearance])
+        draw_solid(axes, x, np.array([0.0, radius, radius, 0.0]), _COUPLING, order=7)
+    x, radii = body_profile(robot.body)
+    draw_solid(axes, x / unit, radii / unit, _BODY, order=8)
+
+
+def _turning(axes: Axes, s: Scene, x: float, reach: float, sense: float, text: str) -> None:
+    """An arrow around the motor axis on the side of the viewer; sense +1 goes down there, as a turn about +x does."""
+    start, end = (x, sense * reach), (x, -sense * reach)
+    curve = f"arc3,rad={-0.45 * sense:.3f}"
+    for colour, width, order in (("white", 3.6, 9.4), (COLOURS["vermillion"], 1.7, 9.5)):
+        axes.add_patch(
+            FancyArrowPatch(
+                start,
+                end,
+                connectionstyle=curve,
+                arrowstyle="-|>",
+                mutation_scale=11,
+                linewidth=width,
+                color=colour,
+                zorder=order,
+            )
+        )
+    label(axes, x, reach + 0.008 * s.total, text, va="bottom", color=COLOURS["vermillion"], weight="bold")
+
+
+def _draw_motion(axes: Axes, s: Scene) -> None:
+    sense = _sense(s.robot)
+    start, end = s.nose + 0.018 * s.total, s.nose + 0.095 * s.total
+    start, end = (start, end) if sense > 0 else (end, start)
+    axes.add_patch(
+        FancyArrowPatch(
+            (start, 0.0),
+            (end, 0.0),
+            arrowstyle="simple,head_length=0.55,head_width=0.6,tail_width=0.22",
+            mutation_scale=26,
+            facecolor=COLOURS["blue"],
+            edgecolor="white",
+            linewidth=0.8,
+            zorder=12,
+        )
+    )
+    label(axes, 0.5 * (start + end), 0.045 * s.total, "$U_x$", color=COLOURS["blue"], size=12)
+    turn = s.robot.hand * sense
+    radius = 0.5 * s.robot.body.diameter / s.scale.factor
+    if not s.stubby:
+        _turning(axes, s, 0.55 * s.nose, 0.62 * radius, -turn, "$\\Omega_x$")
+    wire = (s.robot.tail.amplitude + s.robot.tail.wire_diameter) / s.scale.factor
+    _turning(axes, s, s.root - 0.05 * s.total, wire + 0.012 * s.total, turn, "$\\omega$")
+
+
+def _draw_frame(axes: Axes, s: Scene) -> None:
+    axes.text(
+        s.left + 0.012 * s.total,
+        s.top - 0.012 * s.total,
+        plain(s.robot.name, 60),
+        va="top",
+        size=12,
+        weight="bold",
+        color=INK,
+    )
+    axes.text(
+        s.right - 0.012 * s.total,
+        s.top - 0.014 * s.total,
+        "computed geometry, to scale",
+        va="top",
+        ha="right",
+        size=10,
+        color=FAINT,
+    )
+    _compass(axes, s)
+    length, text = _round_length(0.16 * s.total * s.scale.factor)
+    end = s.right - 0.02 * s.total
+    start, z = end - length / s.scale.factor, s.bottom + 0.030 * s.total
+    axes.plot([start, end], [z, z], color=INK, linewidth=2.6, solid_capstyle="butt", zorder=12)
+    label(axes, 0.5 * (start + end), z + 0.022 * s.total, text)
+
+
+def _round_length(about: float) -> tuple[float, str]:
+    """A length of 1, 2 or 5 times a power of ten, m, not above `about`."""
+    power = 10.0 ** np.floor(np.log10(about))
+    length = float(next(m * power for m in (5.0, 2.0, 1.0) if m * power <= about * 1.0001))
+    return length, length_words(length)
+
+
+def _compass(axes: Axes, s: Scene) -> None:
+    x, z, size = s.left + 0.025 * s.total, s.bottom + 0.025 * s.total, 0.055 * s.total
+    for dx, dz, name in _directions(size):
+        axes.add_patch(
+            FancyArrowPatch(
+                (x, z),
+                (x + dx, z + dz),
+                arrowstyle="-|>",
+                mutation_scale=8,
+                linewidth=0.9,
+                color=INK,
+                shrinkA=0,
+                shrinkB=0,
+            )
+        )
+        label(axes, x + 1.22 * dx, z + 1.22 * dz, name)
+
+
+def _directions(size: float) -> Iterator[tuple[float, float, str]]:
+    yield size, 0.0, "$x$"
+    yield 0.0, size, "$z$"

@@ -1,0 +1,338 @@
+"""The rows of panels of a study's figures: what each draws, against amplitude, robot or assumed rate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from spirillum.arrays import Values
+from spirillum.units import Hz
+from spirillum.view.figures.evidence import Shown, spread
+from spirillum.view.figures.style import COLOURS, Look, Scale, label_of_model, look_of_model
+
+__all__ = [
+    "Row",
+    "amplitude_handles",
+    "band_handles",
+    "bound_row",
+    "draw_band",
+    "draw_curve",
+    "grid_rows",
+    "model_handles",
+    "robot_rows",
+]
+
+MOST_CURVES = 6
+"""Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
+FEW_CURVES = 2
+"""The same for more models."""
+MOST_LARGE_MARKS = 60
+"""Robots of a list whose marks have full size."""
+_AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
+_OBSERVED = COLOURS["black"]
+_SHADE = 0.25  # opacity of a band
+_OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
+"""Look of the rotor's own friction: no model is drawn so."""
+Draw = Callable[[Axes, Shown, Values], None]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of panels that share their vertical axis."""
+
+    label: str
+    """What is drawn, with its unit."""
+    draw: Draw
+    """Draws one panel: axes, part of the study, horizontal positions (amplitudes or robots)."""
+    across: Literal["tails", "rates"] = "tails"
+    """Horizontal axis: the tails (or robots), or the assumed motor rate."""
+    logarithmic: bool = False
+    """Whether the vertical axis is logarithmic."""
+    tells: str = ""
+    """What a reader has to know, a sentence for the note below the figure."""
+
+
+def grid_rows(shown: Shown) -> list[Row]:
+    """The three rows of the paper's Figs 5 and 6, as far as the study can draw them."""
+    if shown.observed:
+        return _observed_rows(shown)
+    rows = [_advance_row(shown), _own_rate_row(shown)]
+    if "effective_friction_at_assumed_rate" in shown.whole and "rotor" in shown.readings:
+        rows.append(_assumed_friction_row(shown))
+    return rows
+
+
+def robot_rows(shown: Shown) -> list[Row]:
+    """The rows for a list of robots."""
+    if shown.observed:
+        return _observed_rows(shown)
+    return [_advance_row(shown), _own_rate_row(shown), bound_row(shown)]
+
+
+def draw_curve(
+    axes: Axes, x: Values, y: Values, look: Look, *, hollow: bool = False, ring: bool = False, joined: bool = True
+) -> None:
+    """One line of marks: filled, hollow, or a ring around what may be the same value."""
+    axes.plot(
+        x,
+        y,
+        color=look.colour,
+        linestyle=look.line if joined else "none",
+        marker=look.marker,
+        markevery=max(x.size // 12, 1) if joined else 1,
+        markerfacecolor="none" if ring else "white" if hollow else look.colour,
+        markeredgecolor=look.colour,
+        markeredgewidth=1.0,
+        markersize=(7.5 if ring else 4.5) if joined or x.size <= MOST_LARGE_MARKS else 2.5,
+        linewidth=0.9 if hollow or ring else 1.4,
+        zorder=3 if hollow or ring else 4,
+    )
+
+
+def _advance_row(shown: Shown) -> Row:
+    everything = Shown.of(shown.whole)
+    scale = Scale.of(np.stack([everything.advance_per_turn(model) for model in shown.models]), "m/turn")
+
+    def draw(axes: Axes, part: Shown, x: Values) -> None:
+        for model in part.models:
+            low, high = part.band("advance_per_radian", model)
+            draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
+            draw_curve(axes, x, scale(part.advance_per_turn(model)), look_of_model(model), joined=part.grid)
+
+    return Row(f"advance per turn\n$U/(\\omega/2\\pi)$ ({scale.unit})", draw, tells=shown.place_words)
+
+
+def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, joined: bool) -> None:
+    """What lies between least and largest value: a shade along a curve, a bar behind a mark that stands alone."""
+    known = np.isfinite(low) & np.isfinite(high)
+    if not np.any(known):
+        return
+    if joined:
+        axes.fill_between(x, low, high, where=known, color=look.colour, alpha=_SHADE, linewidth=0.0, zorder=2)
+    axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=_SHADE, linewidth=4.0, zorder=2)
+
+
+def _own_drive(axes: Axes, part: Shown, x: Values, name: str, scale: Scale) -> None:
+    for model in part.models:
+        low, high = part.band(name, model)
+        draw_band(axes, x, scale(low), scale(high), look_of_model(model), joined=part.grid)
+        for number, reading in enumerate(part.own_drive_readings):
+            y = scale(part.values(name, model=model, friction=reading))
+            draw_curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
+
+
+def _own_rate_row(shown: Shown) -> Row:
+    what = "motor rate, upper bound" if shown.upper_bound else "motor rate, own drive"
+    hertz = Scale(Hz, "Hz")
+
+    def draw(axes: Axes, part: Shown, x: Values) -> None:
+        _own_drive(axes, part, x, "motor_rotation_rate", hertz)
+
+    tells = "Motor rates are upper bounds: no contact friction." if shown.upper_bound else ""
+    return Row(f"{what}\n$\\omega_m$ (Hz)", draw, tells=tells)
+
+
+def bound_row(shown: Shown) -> Row:
+    """Forward velocity with what friction is known to be there: an upper bound for a motor's robot."""
+    what = "forward velocity\nupper bound" if shown.upper_bound else "forward velocity\nown drive"
+    labels = {"friction": list(shown.own_drive_readings)}
+    scale = shown.scale("m/s", "forward_velocity", **labels)
+
+    def draw(axes: Axes, part: Shown, x: Values) -> None:
+        _own_drive(axes, part, x, "forward_velocity", scale)
+        if part.observed:
+            seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
+            _bars(axes, x, scale(seen), scale(half))
+
+    tells = "Speeds are upper bounds: no contact friction." if shown.upper_bound else ""
+    return Row(f"{what} $U_x$ ({scale.unit})", draw, tells=tells)
+
+
+def drawn_amplitudes(shown: Shown) -> list[int]:
+    """Places of the amplitudes that have a curve of their own."""
+    return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
+
+
+def _amplitude_look(number: int, count: int) -> tuple[str, str]:
+    """Colour (from dark to light, readable in grey) and marker of a curve."""
+    colour = mpl.colormaps["viridis"](0.82 * number / max(count - 1, 1))
+    return mpl.colors.to_hex(colour), _AMPLITUDE_MARKERS[number % len(_AMPLITUDE_MARKERS)]
+
+
+def _assumed_friction_row(shown: Shown) -> Row:
+    places = drawn_amplitudes(shown)
+    name = "effective_friction_at_assumed_rate"
+
+    def draw(axes: Axes, part: Shown, _x: Values) -> None:
+        rates = np.asarray(part.dataset["assumed_motor_rate"].values, dtype=float)
+        order = np.argsort(rates)
+        for number, place in enumerate(places):
+            colour, marker = _amplitude_look(number, len(places))
+            for model in part.models:
+                friction = part.part(amplitude=place).values(name, model=model, friction="rotor")[order]
+                axes.plot(
+                    rates[order] / Hz,
+                    np.where(friction > 0, friction, np.nan),
+                    color=colour,
+                    linestyle=look_of_model(model).line,
+                    linewidth=1.1,
+                    marker=marker,
+                    markersize=3.2,
+                    markevery=(number % 5, 5) if rates.size > 10 else 1,
+                )
+        margin = 0.05 * float(np.ptp(rates)) or 0.5 * abs(float(rates[0]))
+        axes.set_xlim((float(rates.min()) - margin) / Hz, (float(rates.max()) + margin) / Hz)
+        if part.rotor_friction is not None:
+            axes.axhline(part.rotor_friction, **_OWN)
+
+    tells = (
+        "The last row infers $B_{eff}$ from (18) at assumed motor rates (reading 'rotor'); a curve ends with the "
+        "assumed rates, or where the motor could not turn faster even without friction."
+    )
+    left = shown.whole.sizes["amplitude"] - len(places)
+    if left:
+        tells = f"{tells} Drawn are {len(places)} of {len(places) + left} amplitudes."
+    return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
+
+
+def _bars(axes: Axes, x: Values, y: Values, half: Values) -> None:
+    """Observed means with their 95 % intervals; a mean without an interval stands alone."""
+    seen = np.isfinite(y)
+    axes.errorbar(
+        x[seen],
+        y[seen],
+        yerr=np.nan_to_num(half[seen], nan=0.0),
+        fmt="D",
+        color=_OBSERVED,
+        markersize=4.2,
+        capsize=2.5,
+        elinewidth=1.0,
+        zorder=5,
+    )
+
+
+def _observed_rows(shown: Shown) -> list[Row]:
+    reading = shown.at_rate_reading
+    speed = shown.scale("m/s", "observed_forward_velocity", "forward_velocity_at_observed_rate", friction=[reading])
+    inferring = [name for name in ("rotor", "paper") if name in shown.readings]
+
+    def velocity(axes: Axes, part: Shown, x: Values) -> None:
+        for model in part.models:
+            y = part.values("forward_velocity_at_observed_rate", model=model, friction=reading)
+            draw_curve(axes, x, speed(y), look_of_model(model), joined=part.grid)
+        seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
+        _bars(axes, x, speed(seen), speed(half))
+
+    def rate(axes: Axes, part: Shown, x: Values) -> None:
+        seen, half = part.observed_motor_rate()
+        for model in part.models:
+            y = part.values("motor_rotation_rate_at_observed_rate", model=model, friction=reading)
+            draw_curve(axes, x, np.where(np.isfinite(seen), np.nan, y) / Hz, look_of_model(model), joined=False)
+        _bars(axes, x, seen / Hz, half / Hz)
+
+    rows = [
+        Row(
+            f"forward velocity\n$U_x$ ({speed.unit})", velocity, tells="Models run at the observed rates, tail by tail."
+        ),
+        Row(
+            "motor rate\n$\\omega_m$ (Hz)",
+            rate,
+            tells="Where tail and body alone were observed, the motor rate is their difference, trial by trial; "
+            "a model's motor rate stands only where the tail's rate alone was observed.",
+        ),
+    ]
+    if inferring:
+        rows.append(_inferred_friction_row(shown, inferring))
+    return rows
+
+
+def _inferred_friction_row(shown: Shown, inferring: Sequence[str]) -> Row:
+    name = "effective_friction_at_observed_rate"
+    scale = shown.scale("N m s/rad", name, friction=list(inferring))
+
+    def draw(axes: Axes, part: Shown, x: Values) -> None:
+        for model in part.models:
+            for number, reading in enumerate(inferring):
+                y = scale(part.values(name, model=model, friction=reading))
+                draw_curve(axes, x, y, look_of_model(model), ring=number > 0, joined=part.grid)
+
+    words = ", rings: ".join(f"'{reading}'" for reading in inferring)
+    tells = f"$B_{{eff}}$ follows from (18) at the observed rates. Friction reading of filled marks: {words}."
+    return Row(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
+
+
+def model_handles(shown: Shown, *, own_drive: bool) -> list[Line2D]:
+    """Legend entries for models, readings and observations.
+
+    Args:
+        shown: the study.
+        own_drive: whether filled and hollow marks tell the readings of free swimming apart.
+    """
+    readings = _reading_entries(shown) if own_drive else ()
+    return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
+
+
+def band_handles(shown: Shown) -> list[Line2D]:
+    """Legend entries for the models that have a band."""
+    return [
+        Line2D(
+            [], [], color=look_of_model(name).colour, alpha=_SHADE, linewidth=7.0, label=f"{label_of_model(name)}: band"
+        )
+        for name in shown.banded
+    ]
+
+
+def _model_entries(shown: Shown) -> Iterator[Line2D]:
+    for model in shown.models:
+        look = look_of_model(model)
+        line: Any = look.line if shown.grid else "none"
+        yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
+
+
+def _reading_entries(shown: Shown) -> Iterator[Line2D]:
+    for number, reading in enumerate(shown.own_drive_readings):
+        yield Line2D(
+            [],
+            [],
+            color="#555555",
+            linestyle="none",
+            marker="o",
+            markerfacecolor="white" if number else "#555555",
+            label=shown.reading_label(reading),
+        )
+
+
+def _observed_entries(shown: Shown) -> Iterator[Line2D]:
+    if shown.observed:
+        yield Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="observed, 95 % interval")
+
+
+def amplitude_handles(shown: Shown) -> list[Line2D]:
+    """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
+    places = drawn_amplitudes(shown)
+    amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)
+    scale = Scale.of(amplitudes, "m")
+    entries = []
+    for number, place in enumerate(places):
+        colour, marker = _amplitude_look(number, len(places))
+        label = f"$B_o$ = {amplitudes[place] / scale.factor:.3g} {scale.unit}"
+        entries.append(Line2D([], [], color=colour, marker=marker, markersize=3.2, linestyle="-", label=label))
+    for model in shown.models:
+        line = look_of_model(model).line
+        entries.append(Line2D([], [], color="#555555", linestyle=line, linewidth=1.1, label=label_of_model(model)))
+    if shown.rotor_friction is not None:
+        label = f"rotor friction $B_m$ = {_power_of_ten(shown.rotor_friction)}"
+        entries.append(Line2D([], [], **_OWN, label=label))
+    return entries
+
+
+def _power_of_ten(value: float) -> str:
+    """A positive number as a formula, one digit."""
+    digits, power = f"{value:.0e}".split("e")
+    return f"${digits}\\times10^{{{int(power)}}}$"

@@ -1,0 +1,172 @@
+"""Where everything stands in the side view of a robot, and the marks of a technical drawing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyArrowPatch
+from matplotlib.patheffects import withStroke
+
+from spirillum.arrays import Values
+from spirillum.robot.robot import Robot
+from spirillum.view.figures.solids import crests
+from spirillum.view.figures.style import Scale
+
+__all__ = ["FAINT", "HALO", "INK", "PHASE", "WIDTH", "Scene", "dimension_line", "label", "length_words", "thin_line"]
+
+WIDTH = 10.0
+"""Width of the picture, inches."""
+PHASE = 0.35 * np.pi
+"""Phase of the tail in the picture, rad."""
+INK = "#1d2b33"
+FAINT = "#6b7d88"
+HALO = withStroke(linewidth=2.4, foreground="white", alpha=0.85)
+"""A white rim that keeps text readable on any ground."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Places of everything, in the drawing's unit; the motor axis lies at z = 0."""
+
+    robot: Robot
+    scale: Scale
+    total: float
+    """Length of the robot, or twice its height if that is more: the measure of margins and text."""
+    nose: float
+    rear: float
+    root: float
+    tip: float
+    half_height: float
+    """Largest distance of the robot from the motor axis."""
+    floor: float
+    """Height of the floor, or of the robot's underside without a channel."""
+    ceiling: float | None
+    """Height of the upper wall where the picture reaches it."""
+    wall: float
+    """Thickness with which walls are drawn; the true one is unknown."""
+
+    @classmethod
+    def of(cls, robot: Robot) -> Scene:
+        """The scene of a robot."""
+        length = robot.body.length + robot.coupling.length + robot.tail.length
+        scale = Scale.of(np.array([length]), "m")
+        total, nose = length / scale.factor, 0.5 * robot.body.length / scale.factor
+        root = -nose - robot.coupling.length / scale.factor
+        radius = 0.5 * robot.body.diameter / scale.factor
+        tail = (robot.tail.amplitude + 0.5 * robot.tail.wire_diameter) / scale.factor
+        coupling = 0.5 * robot.coupling.diameter / scale.factor if robot.coupling.length > 0 else 0.0
+        half_height = max(radius, tail, coupling)
+        total = max(total, 4.0 * half_height)
+        ceiling = None
+        if robot.channel is not None:
+            height = robot.channel.diameter / scale.factor - radius
+            ceiling = height if height <= half_height + 0.5 * total else None
+        return cls(
+            robot=robot,
+            scale=scale,
+            total=total,
+            nose=nose,
+            rear=-nose,
+            root=root,
+            tip=root - robot.tail.length / scale.factor,
+            half_height=half_height,
+            floor=-radius if robot.channel is not None else -half_height,
+            ceiling=ceiling,
+            wall=0.018 * total,
+        )
+
+    @property
+    def _slack(self) -> float:
+        """Additional margin on both sides of a robot that is short for its height."""
+        return 0.5 * (self.total - (self.nose - self.tip))
+
+    @property
+    def left(self) -> float:
+        """Left edge of the picture."""
+        return self.tip - 0.185 * self.total - self._slack
+
+    @property
+    def right(self) -> float:
+        """Right edge of the picture."""
+        return self.nose + 0.265 * self.total + self._slack
+
+    @property
+    def top(self) -> float:
+        """Upper edge of the picture."""
+        upper = self.half_height + 0.16 * self.total if self.ceiling is None else self.ceiling + self.wall
+        return upper + 0.055 * self.total
+
+    @property
+    def bottom(self) -> float:
+        """Lower edge of the picture."""
+        return min(self.floor, -self.half_height) - self.wall - 0.165 * self.total
+
+    @property
+    def lines_at(self) -> float:
+        """Height of the row of axial dimensions."""
+        return min(self.floor, -self.half_height) - self.wall - 0.055 * self.total
+
+    @property
+    def tail_top(self) -> float:
+        """Height of the wire's highest points, thickness included."""
+        return (self.robot.tail.amplitude + 0.5 * self.robot.tail.wire_diameter) / self.scale.factor
+
+    @cached_property
+    def crests(self) -> Values:
+        """Places of the wire's highest points, from root to tip."""
+        return crests(self.robot, PHASE, self.scale.factor)
+
+    @property
+    def shows_wavelength(self) -> bool:
+        """Whether two crests and room above them let the wavelength be drawn."""
+        room = np.inf if self.ceiling is None else self.ceiling
+        return self.crests.size >= 2 and self.tail_top + 0.08 * self.total < room
+
+    @property
+    def shows_wire(self) -> bool:
+        """Whether there is room below the tail for the wire's diameter."""
+        return self.robot.channel is None or self.tail_top + 0.05 * self.total < -self.floor
+
+    @property
+    def stubby(self) -> bool:
+        """Whether the body is too short for words on it."""
+        return 2.0 * self.nose < 0.26 * self.total
+
+    @property
+    def points(self) -> float:
+        """Typographic points in one drawing unit."""
+        return 72.0 * WIDTH / (self.right - self.left)
+
+    def words(self, symbol: str, value: float) -> str:
+        """``symbol = value unit`` of an SI length."""
+        scale = Scale.of(np.array([value]), "m")
+        return f"${symbol}$ = {value / scale.factor:.4g} {scale.unit}"
+
+
+def dimension_line(axes: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """A dimension line with an arrowhead at both ends."""
+    axes.add_patch(
+        FancyArrowPatch(
+            start, end, arrowstyle="<|-|>", mutation_scale=7, linewidth=0.8, color=INK, shrinkA=0, shrinkB=0, zorder=12
+        )
+    )
+
+
+def thin_line(axes: Axes, xs: tuple[float, float], zs: tuple[float, float]) -> None:
+    """An extension line of a dimension."""
+    axes.plot(xs, zs, color=FAINT, linewidth=0.6, zorder=11)
+
+
+def label(axes: Axes, x: float, z: float, text: str, **more: str | float) -> None:
+    """Text that stays readable on any ground."""
+    options: dict[str, str | float] = {"ha": "center", "va": "center", "size": 10, "color": INK, **more}
+    axes.text(x, z, text, zorder=13, path_effects=[HALO], **options)  # type: ignore[arg-type]
+
+
+def length_words(value: float) -> str:
+    """An SI length in a readable unit."""
+    scale = Scale.of(np.array([value]), "m")
+    return f"{value / scale.factor:.4g} {scale.unit}"

@@ -1,0 +1,161 @@
+"""A robot cut by a plane: its solids filled where they are cut, outlined where they lie beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path
+
+from spirillum.arrays import Values
+from spirillum.fluid.tube.wall import Seat
+from spirillum.robot.outline import Outline, body_outline, solid_outlines
+from spirillum.robot.robot import Robot
+from spirillum.view.figures.solids import wire_line
+
+__all__ = ["draw_glass", "draw_section"]
+
+_GLASS, _RIM = "#dfe9f1", "#5d7486"
+_FILL, _EDGE, _BEYOND = "#a3a8ac", "#22292e", "#4a5258"
+_SAMPLES = np.linspace(0.0, 1.0, 400)
+_CELLS_PER_RADIUS = 6.0
+_MOST_CELLS = 400_000
+
+
+def draw_section(
+    axes: Axes,
+    robot: Robot,
+    plane: str,
+    offset: float,
+    *,
+    phase: float,
+    unit: float,
+    points: float,
+    drop: float = 0.0,
+) -> None:
+    """Draw the robot on a plane, on whose axes the panel stands.
+
+    Args:
+        axes: the panel, in `unit`.
+        robot: the robot.
+        plane: `xz`, `xy` or `yz`, horizontal axis first.
+        offset: place of the plane on the axis across it, m.
+        phase: phase of the tail, rad.
+        unit: length of one drawing unit, m.
+        points: typographic points in one drawing unit.
+        drop: distance by which the tail's axis is lowered, m.
+    """
+    line = wire_line(robot, phase, 1.0) - np.array([0.0, 0.0, drop])
+    across = next(number for number, axis in enumerate("xyz") if axis not in plane)
+    along = [number for number in range(3) if number != across]
+    if plane != "yz":
+        # The tail's silhouette, in true thickness; it does not hide the flow.
+        width = robot.tail.wire_diameter / unit * points
+        axes.plot(
+            *line[:, along].T / unit, color="white", linewidth=width, alpha=0.35, solid_capstyle="round", zorder=4
+        )
+    for outline in _outlines(robot):
+        if (cut := _cut(outline, plane, 0.0)) is not None and offset != 0.0 and plane != "yz":
+            axes.add_patch(
+                Polygon(cut / unit, closed=True, fill=False, edgecolor=_BEYOND, linewidth=0.7, linestyle="--", zorder=5)
+            )
+        if (cut := _cut(outline, plane, offset)) is not None:
+            axes.add_patch(Polygon(cut / unit, closed=True, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=7))
+    _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
+
+
+def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -> None:
+    """Draw the glass of a tube, cut by a plane, over all that lies beyond its wall.
+
+    Args:
+        axes: the panel, in `unit`, its limits set.
+        seat: the tube, and where in it the robot lies.
+        plane: `xz`, `xy` or `yz`, horizontal axis first.
+        offset: place of the plane on the axis across it, m.
+        unit: length of one drawing unit, m.
+    """
+    wall = _bore(seat, plane, offset, np.array(axes.get_xlim()) * unit) / unit
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    frame = np.array([[left, low], [right, low], [right, high], [left, high], [left, low]])
+    # A path with a hole: the bore runs against the frame.
+    codes = [[Path.MOVETO, *[Path.LINETO] * (len(line) - 1)] for line in (frame, wall)]
+    glass = Path(np.concatenate([frame, wall]), np.concatenate(codes))
+    axes.add_patch(PathPatch(glass, facecolor=_GLASS, edgecolor="none", zorder=5.5))
+    axes.add_patch(Polygon(wall, closed=True, fill=False, edgecolor=_RIM, linewidth=1.0, zorder=5.6))
+
+
+def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
+    """Corners of the bore's section, clockwise, m, (n, 2); it is carried on beyond both ends of the panel."""
+    cos, sin = np.cos(seat.pitch), np.sin(seat.pitch)
+    if plane == "yz":
+        angle = -2.0 * np.pi * _SAMPLES
+        height = (seat.offset - offset * sin) / cos
+        return np.column_stack([seat.radius * np.cos(angle), height + seat.radius / cos * np.sin(angle)])
+    x = ends.mean() + 0.55 * np.ptp(ends) * np.linspace(-1.0, 1.0, 800)
+    if plane == "xz":
+        middle = (seat.offset - x * sin) / cos
+        half = np.full(x.size, np.sqrt(max(seat.radius**2 - offset**2, 0.0)) / cos)
+    else:
+        middle = np.zeros(x.size)
+        half = np.sqrt(np.maximum(seat.radius**2 - (x * sin + offset * cos - seat.offset) ** 2, 0.0))
+    upper, lower = np.column_stack([x, middle + half]), np.column_stack([x, middle - half])
+    return np.concatenate([upper, lower[::-1]])
+
+
+def _outlines(robot: Robot) -> Iterable[Outline]:
+    body, coupling = robot.body, robot.coupling
+    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
+    return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance).values()
+
+
+def _cut(outline: Outline, plane: str, offset: float) -> Values | None:
+    """Corners of a solid of revolution's section, m, (n, 2); None where the plane misses it."""
+    if plane == "yz":
+        radius = np.fmax.reduce([piece.radius(np.array(offset)) for piece in outline.pieces])
+        if not radius > 0:
+            return None
+        angle = 2.0 * np.pi * _SAMPLES
+        return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    x, rho = (np.concatenate(part) for part in zip(*(piece.points(_SAMPLES) for piece in outline.pieces), strict=True))
+    met = rho > abs(offset)
+    if not met.any():
+        return None
+    height = np.sqrt(rho[met] ** 2 - offset**2)
+    x = x[met]
+    return np.column_stack([np.concatenate([x, x[::-1]]), np.concatenate([height, -height[::-1]])])
+
+
+def _draw_wire_cut(
+    axes: Axes, robot: Robot, line: Values, order: tuple[int, int, int], offset: float, unit: float
+) -> None:
+    """The wire's section: where the distance from its centreline is less than its radius."""
+    from scipy.spatial import cKDTree
+
+    radius = 0.5 * robot.tail.wire_diameter
+    line = _denser(line, radius / _CELLS_PER_RADIUS)
+    if np.min(np.abs(line[:, order[2]] - offset)) > radius and np.ptp(np.sign(line[:, order[2]] - offset)) == 0:
+        return
+    near = line[np.abs(line[:, order[2]] - offset) < 2.0 * radius] if order[2] == 0 else line
+    sides = [(near[:, axis].min() - 1.5 * radius, near[:, axis].max() + 1.5 * radius) for axis in order[:2]]
+    cell = radius / _CELLS_PER_RADIUS
+    cell *= max(1.0, np.sqrt(np.prod([(high - low) / cell for low, high in sides]) / _MOST_CELLS))
+    first, second = (np.arange(low, high + cell, cell) for low, high in sides)
+    grid = np.empty((first.size, second.size, 3))
+    grid[..., order[0]], grid[..., order[1]], grid[..., order[2]] = first[:, None], second[None, :], offset
+    distance, _ = cKDTree(line).query(grid.reshape(-1, 3), distance_upper_bound=4.0 * radius)
+    depth = radius - np.minimum(distance, 3.0 * radius).reshape(first.size, second.size)
+    if not depth.max() > 0:
+        return
+    places = (first / unit, second / unit, depth.T)
+    axes.contourf(*places, levels=[0.0, 2.0 * radius], colors=[_FILL], zorder=6)
+    axes.contour(*places, levels=[0.0], colors=[_EDGE], linewidths=0.8, zorder=6.1)
+
+
+def _denser(line: Values, spacing: float) -> Values:
+    """Points along a line so close that their distance and the line's are the same to the eye."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    count = int(np.clip(along[-1] / spacing, line.shape[0], _MOST_CELLS))
+    places = np.linspace(0.0, along[-1], count)
+    return np.stack([np.interp(places, along, line[:, axis]) for axis in range(3)], axis=-1)

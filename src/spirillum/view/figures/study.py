@@ -1,0 +1,318 @@
+"""Figures of a study: the panels of the paper's Figs 5 and 6, the upper bound of the speed, lists of robots."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator
+
+from spirillum.view.figures.drop import drop_picture
+from spirillum.view.figures.evidence import Shown, spread
+from spirillum.view.figures.picture import Picture, head_column, tail_axis
+from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import Scale, plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Picture", "study_figures"]
+
+MOST_COLUMNS = 6
+"""Wavelengths of one figure."""
+MOST_FIGURES = 4
+"""Figures of the channels of one study."""
+MOST_CHANNELS = 4
+"""Channels of the figure of the upper bound."""
+MOST_TAILS = 200
+"""Amplitudes of one panel."""
+MOST_ROBOTS = 2000
+"""Listed robots of one panel."""
+NAMED_ROBOTS = 60
+"""Listed robots that are named; more are numbered."""
+_TICK_LETTER = 0.066
+"""Width of a letter of a tick label, inches."""
+_DASHED = (0, (4.0, 2.0))
+_PAPER_FIGURES = {"wide": ("fig5-wide", "Fig. 5"), "narrow": ("fig6-narrow", "Fig. 6")}
+
+
+def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
+    """The figures of a study by file name (lower-case letters, digits and hyphens).
+
+    Args:
+        dataset: what `spirillum.study` returns.
+
+    Returns:
+        For the paper's study `fig5-wide` and `fig6-narrow`, for other channels `channel-<name>`, with
+        `-part1`, `-part2` where wavelengths need several figures; `bound` with the speeds at the upper bound; for
+        the paper's study `drop` with the loss of speed in the narrow channel.
+        For a list of robots `robots`.
+    """
+    shown = Shown.of(dataset)
+    if not shown.grid:
+        return {"robots": _robots_picture(shown)}
+    found: dict[str, Picture] = {}
+    channels = spread(dataset.sizes["channel"], MOST_FIGURES)
+    pages = _pages(dataset.sizes["wavelength"], max(MOST_FIGURES // len(channels), 1))
+    for channel in channels:
+        for number, wavelengths in enumerate(pages):
+            ending = f"-part{number + 1}" if len(pages) > 1 else ""
+            name = _free_name(_file_name(shown, channel) + ending, found)
+            part = f" · part {number + 1} of {len(pages)}" if len(pages) > 1 else ""
+            left_out = _left_out(shown, sum(map(len, pages)), len(channels))
+            found[name] = _channel_picture(shown, channel, wavelengths, part, left_out)
+    found[_free_name("bound", found)] = _bound_picture(shown)
+    drop = drop_picture(shown)
+    return found if drop is None else {**found, "drop": drop}
+
+
+def _pages(count: int, most: int) -> list[list[int]]:
+    """Places of the wavelengths on each figure, as even as can be."""
+    places = spread(count, most * MOST_COLUMNS)
+    pages = -(-len(places) // MOST_COLUMNS)
+    return [list(map(int, page)) for page in np.array_split(places, pages)]
+
+
+def _file_name(shown: Shown, channel: int) -> str:
+    name = str(shown.whole["channel"].values[channel])
+    if shown.paper and name in _PAPER_FIGURES:
+        return _PAPER_FIGURES[name][0]
+    return f"channel-{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')[:60] or 'unnamed'}"
+
+
+def _free_name(name: str, taken: dict[str, Picture]) -> str:
+    number, free = 2, name
+    while free in taken:
+        free = f"{name}-{number}"
+        number += 1
+    return free
+
+
+def _channel_title(shown: Shown, channel: int) -> str:
+    name = plain(str(shown.whole["channel"].values[channel]), 40)
+    diameter = np.asarray(shown.whole["channel_diameter"].values, dtype=float)[[channel]]
+    if not np.isfinite(diameter[0]):
+        return f"{name}: no channel"
+    scale = Scale.of(diameter, "m")
+    return f"{name[:1].upper()}{name[1:]} channel, $D_{{ch}}$ = {diameter[0] / scale.factor:.4g} {scale.unit}"
+
+
+def _left_out(shown: Shown, wavelengths: int, channels: int) -> str:
+    """A sentence on what the figures leave out; empty if nothing."""
+    sizes = shown.whole.sizes
+    parts = []
+    if wavelengths < sizes["wavelength"]:
+        parts.append(f"{wavelengths} of {sizes['wavelength']} wavelengths")
+    if sizes["amplitude"] > MOST_TAILS:
+        parts.append(f"{MOST_TAILS} of {sizes['amplitude']} amplitudes")
+    if channels < sizes["channel"]:
+        parts.append(f"{channels} of {sizes['channel']} channels")
+    return f"Shown: {', '.join(parts)}; the dataset holds all." if parts else ""
+
+
+def _channel_picture(shown: Shown, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:
+    name = str(shown.whole["channel"].values[channel])
+    title = _channel_title(shown, channel)
+    if shown.paper and name in _PAPER_FIGURES:
+        title = f"{title} · laid out as {_PAPER_FIGURES[name][1]} of the paper"
+    title = f"{title}{page}"
+    rows = grid_rows(shown)
+    what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
+    amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
+    part = shown.part(channel=channel, wavelength=wavelengths)
+    notes = [row.tells for row in rows if row.tells]
+    notes += [part.unanswered(), left_out]
+    draw = partial(_draw_channel, shown, channel, wavelengths, amplitudes, title, rows, [n for n in notes if n])
+    caption = " ".join([shown.source_line, *(note for note in notes if note)])
+    alternative = (
+        f"{len(rows) * len(wavelengths)} panels, one column for each of {len(wavelengths)} wavelengths, against "
+        f"the wave amplitude. Rows: {what}. {shown.source_line}"
+    )
+    return Picture.of(title, caption, alternative, draw)
+
+
+def _draw_channel(
+    shown: Shown,
+    channel: int,
+    wavelengths: list[int],
+    amplitudes: list[int],
+    title: str,
+    rows: Sequence[Row],
+    notes: Sequence[str],
+) -> Figure:
+    rates = [number for number, row in enumerate(rows) if row.across == "rates"]
+    sheet = Sheet(
+        title,
+        shown.source_line,
+        len(rows),
+        len(wavelengths),
+        notes=notes,
+        legend=model_handles(shown, own_drive=not shown.observed),
+        labelled_rows=frozenset(number - 1 for number in rates),
+        legends_above={number: amplitude_handles(shown) for number in rates},
+    )
+    figure, panels = sheet.draw()
+    scale = Scale.of(np.asarray(shown.whole["amplitude"].values, dtype=float), "m")
+    for number, row in enumerate(rows):
+        for axes, wavelength in zip(panels[number], wavelengths, strict=True):
+            part = shown.part(channel=channel, wavelength=wavelength)
+            x = scale(np.asarray(shown.whole["amplitude"].values, dtype=float)[amplitudes])
+            row.draw(axes, part if row.across == "rates" else part.part(amplitude=amplitudes), x)
+            if row.across == "tails":
+                tail_axis(axes, x)
+            labelled = number == len(rows) - 1 or number in sheet.labelled_rows
+            axes.tick_params(labelbottom=labelled)
+            if labelled:
+                rate = row.across == "rates"
+                axes.set_xlabel("assumed $\\omega_m$ (Hz)" if rate else f"wave amplitude $B_o$ ({scale.unit})")
+            if number == 0:
+                head_column(axes, shown, wavelength)
+        _finish_row(panels[number], row)
+    return figure
+
+
+def _finish_row(panels: Sequence[Axes], row: Row) -> None:
+    """Vertical axis of a row: shared, from zero where everything is positive."""
+    panels[0].set_ylabel(row.label)
+    heights = [
+        np.asarray(line.get_ydata(), dtype=float)[np.isfinite(np.asarray(line.get_xdata(), dtype=float))]
+        for axes in panels
+        for line in axes.get_lines()
+    ]
+    values = np.concatenate([np.ravel(h) for h in heights]) if heights else np.empty(0)
+    values = values[np.isfinite(values)]
+    if not values.size:
+        panels[0].set_ylim(0.0, 1.0)
+        return
+    if row.logarithmic:
+        panels[0].set_yscale("log")
+        low, high = 0.6 * float(values.min()), 1.6 * float(values.max())
+        stretch = max(np.sqrt(12.0 * low / high), 1.0)  # more than a decade, so that two powers of ten are labelled
+        panels[0].set_ylim(low / stretch, high * stretch)
+        panels[0].yaxis.set_major_locator(LogLocator(numticks=6))
+        return
+    panels[0].yaxis.set_major_locator(MaxNLocator(5))
+    if float(values.min()) >= 0.0:
+        low, high = panels[0].get_ylim()
+        panels[0].set_ylim(0.0, max(high, 1.08 * float(values.max()), low + 1e-300))
+
+
+def _bound_picture(shown: Shown) -> Picture:
+    channels = spread(shown.whole.sizes["channel"], MOST_CHANNELS)
+    wavelengths = spread(shown.whole.sizes["wavelength"], MOST_COLUMNS)
+    bound = shown.upper_bound
+    title = "Forward velocity without contact friction: an upper bound" if bound else "Forward velocity, own drive"
+    notes = []
+    if bound:
+        notes.append(
+            "The motor turns as fast as it can against the fluid alone (filled) or with the rotor's own friction "
+            "(hollow); contact with the channel slows a real robot down."
+            if shown.friction_unset
+            else "The motor turns against the fluid alone (filled) or with the robot file's friction (hollow)."
+        )
+    if any(shown.paper_speed(channel) for channel in channels):
+        notes.append(
+            "Dashed black: the speed behind the paper's largest Reynolds number if its length is the body's diameter "
+            "(the paper does not say), $U = Re\\,\\mu/(\\rho D_b)$."
+        )
+    part = shown.part(channel=channels, wavelength=wavelengths)
+    notes += [
+        note
+        for note in (shown.place_words, part.unanswered(), _left_out(shown, len(wavelengths), len(channels)))
+        if note
+    ]
+    alternative = (
+        f"{len(channels) * len(wavelengths)} panels, a row for each channel and a column for each wavelength: forward "
+        f"velocity against wave amplitude{' as an upper bound' if bound else ''}. {shown.source_line}"
+    )
+    draw = partial(_draw_bound, shown, channels, wavelengths, title, notes)
+    return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
+
+
+def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title: str, notes: Sequence[str]) -> Figure:
+    speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
+    legend = [*model_handles(shown, own_drive=True), *_paper_entry(shown, channels, speed_scale)]
+    sheet = Sheet(title, shown.source_line, len(channels), len(wavelengths), notes=notes, legend=legend)
+    figure, panels = sheet.draw()
+    amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
+    values = np.asarray(shown.whole["amplitude"].values, dtype=float)
+    scale = Scale.of(values, "m")
+    x = scale(values[amplitudes])
+    row = bound_row(shown)
+    what = "upper bound" if shown.upper_bound else "own drive"
+    for number, channel in enumerate(channels):
+        name = plain(str(shown.whole["channel"].values[channel]), 24)
+        for axes, wavelength in zip(panels[number], wavelengths, strict=True):
+            row.draw(axes, shown.part(channel=channel, wavelength=wavelength, amplitude=amplitudes), x)
+            tail_axis(axes, x)
+            last = number == len(channels) - 1
+            axes.tick_params(labelbottom=last)
+            if last:
+                axes.set_xlabel(f"wave amplitude $B_o$ ({scale.unit})")
+            if number == 0:
+                head_column(axes, shown, wavelength)
+            speed = shown.paper_speed(channel)
+            if speed is not None:
+                axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)
+        _finish_row(panels[number], Row(f"{name}: {what}\n$U_x$ ({speed_scale.unit})", row.draw))
+    return figure
+
+
+def _paper_entry(shown: Shown, channels: Sequence[int], scale: Scale) -> list[Line2D]:
+    """Legend entry of the speeds behind the paper's largest Reynolds numbers."""
+    found = {channel: shown.paper_speed(channel) for channel in channels}
+    words = [
+        f"{plain(str(shown.whole['channel'].values[channel]), 24)} {speed[1] / scale.factor:.2f}"
+        for channel, speed in found.items()
+        if speed is not None
+    ]
+    if not words:
+        return []
+    label = f"paper's $Re_{{max}}$ if on $D_b$: {', '.join(words)} {scale.unit}"
+    return [Line2D([], [], color="black", linestyle=_DASHED, linewidth=1.0, label=label)]
+
+
+def _robots_picture(shown: Shown) -> Picture:
+    count = shown.whole.sizes["robot"]
+    places = spread(count, MOST_ROBOTS)
+    rows = robot_rows(shown)
+    title = f"{plain(str(shown.whole.attrs.get('title', 'Robots')), 60)} · {count} robots"
+    notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
+    notes.append(shown.unanswered())
+    if len(places) < count:
+        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
+    notes = [note for note in notes if note]
+    what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
+    alternative = f"{len(rows)} panels with a point for each of {len(places)} robots: {what}. {shown.source_line}"
+    draw = partial(_draw_robots, shown, places, title, rows, notes)
+    return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
+
+
+def _draw_robots(shown: Shown, places: list[int], title: str, rows: Sequence[Row], notes: Sequence[str]) -> Figure:
+    names = [plain(str(name), 28) for name in shown.whole["robot"].values[places]]
+    named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
+    width = min(max(0.45 * len(names), 5.0), 9.0)
+    upright = _TICK_LETTER * longest * len(names) < width
+    room = _TICK_LETTER * longest if named and not upright else 0.0
+    legend = model_handles(shown, own_drive=not shown.observed)
+    sheet = Sheet(title, shown.source_line, len(rows), 1, (width, 1.6), notes=notes, legend=legend, tick_room=room)
+    figure, panels = sheet.draw()
+    x = np.asarray(places, dtype=float)
+    for number, (row, (axes,)) in enumerate(zip(rows, panels, strict=True)):
+        row.draw(axes, shown.part(robot=places), x)
+        axes.set_xlim(-0.6, shown.whole.sizes["robot"] - 0.4)
+        last = number == len(rows) - 1
+        if named:
+            axes.set_xticks(x, names if last else [""] * len(names), rotation=0 if upright else 90)
+        axes.tick_params(labelbottom=last)
+        if last and not named:
+            axes.set_xlabel("place of the robot in the list, from 0")
+        _finish_row([axes], row)
+    return figure

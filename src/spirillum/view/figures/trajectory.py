@@ -1,0 +1,300 @@
+"""A run in time: its path from the side and from above, gap, rates, current, powers and energies over one time axis."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.units import Hz
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["trajectory_figure"]
+
+_WIDTH, _PATHS, _PANEL, _HEAD, _FOOT = 9.0, 1.75, 1.35, 0.78, 0.52
+"""Width of the figure; heights of the paths, of a panel over time, above and below them, inches."""
+_LEFT, _RIGHT, _BETWEEN, _BELOW, _GAP = 0.80, 0.20, 0.85, 0.55, 0.16
+"""Margins, and room between panels for labels, inches."""
+_MOST_EVENTS = 12
+_DECADES = 5
+"""Range of a logarithmic axis."""
+_SPREAD = 30.0
+"""Ratio of the largest values of two lines above which their axis is logarithmic."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """Lines over time with one unit."""
+
+    label: str
+    unit: str
+    """SI unit; `Hz` and `deg` are shown without a prefix."""
+    lines: tuple[tuple[str, str], ...]
+    """Variable, and its words in the legend."""
+    logarithmic: bool = False
+    """Whether a logarithmic axis may be used."""
+
+
+_PANELS = (
+    _Panel("gap to the wall", "m", (("wall_gap", ""),)),
+    _Panel("velocity $U_x$", "m/s", (("forward_velocity", ""),)),
+    _Panel(
+        "rate", "Hz", (("tail_rotation_rate", "tail"), ("body_rotation_rate", "body"), ("motor_rotation_rate", "motor"))
+    ),
+    _Panel("angle", "deg", (("pitch", "pitch"), ("yaw", "yaw"))),
+    _Panel("wobble angle", "deg", (("wobble_angle", ""),)),
+    _Panel("phase lag", "deg", (("phase_lag", ""),)),
+    _Panel("motor current", "A", (("motor_current", ""),)),
+    _Panel(
+        "power",
+        "W",
+        (
+            ("electrical_power", "electrical"),
+            ("shaft_power", "shaft"),
+            ("friction_power", "friction"),
+            ("dissipated_power", "in the fluid"),
+        ),
+        logarithmic=True,
+    ),
+    _Panel(
+        "energy",
+        "J",
+        (
+            ("electrical_energy", "electrical"),
+            ("drive_energy", "drive"),
+            ("friction_energy", "friction"),
+            ("dissipated_energy", "in the fluid"),
+        ),
+        logarithmic=True,
+    ),
+)
+_COLOUR_OF = {
+    "tail": COLOURS["blue"],
+    "body": COLOURS["orange"],
+    "motor": COLOURS["green"],
+    "pitch": COLOURS["blue"],
+    "yaw": COLOURS["vermillion"],
+    "electrical": COLOURS["black"],
+    "shaft": COLOURS["blue"],
+    "drive": COLOURS["blue"],
+    "friction": COLOURS["vermillion"],
+    "in the fluid": COLOURS["green"],
+}
+_LINE_OF: dict[str, Any] = {
+    "body": "--",
+    "motor": (0, (1, 1.2)),
+    "yaw": "--",
+    "shaft": "--",
+    "drive": "--",
+    "friction": (0, (1, 1.2)),
+    "in the fluid": "-.",
+}
+
+
+def trajectory_figure(dataset: xr.Dataset) -> Figure:
+    """A run in time. Panels without data are left out; events are numbered on the time axes and named below.
+
+    Args:
+        dataset: what `spirillum.simulate` returns: a free run, a magnetic one, or an axial one.
+
+    Raises:
+        InputError: if it has less than two samples of time, or no variable that a panel shows.
+    """
+    time = _time_of(dataset)
+    path = _path_of(dataset, time)
+    shown = [panel for panel in _PANELS if any(True for _ in _lines(dataset, panel, time))]
+    if path is None and not shown:
+        raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
+    events = _events_of(dataset, time)
+    with styled():
+        notes = _event_words(events)
+        rows = -(-len(shown) // 2)
+        top = _PATHS + _BELOW + 0.1 if path is not None else 0.0
+        height = _HEAD + top + rows * _PANEL + _GAP * max(rows - 1, 0) + _FOOT + 0.17 * len(notes)
+        figure = new_figure(_WIDTH, height)
+        _write_words(figure, dataset, notes)
+        letters = iter("abcdefghijklmnop")
+        half = 0.5 * (_WIDTH - _LEFT - _RIGHT - _BETWEEN)
+        if path is not None:
+            for column, (name, across) in enumerate((("side", 2), ("from above", 1))):
+                box = (_LEFT + column * (half + _BETWEEN), height - _HEAD - _PATHS, half, _PATHS)
+                _draw_path(_axes(figure, box), path, across, name, next(letters))
+        first: Axes | None = None
+        for number, panel in enumerate(shown):
+            row, column = number // 2, number % 2
+            bottom = height - _HEAD - top - (row + 1) * _PANEL - _GAP * row
+            axes = _axes(figure, (_LEFT + column * (half + _BETWEEN), bottom + 0.1, half, _PANEL - 0.1), share=first)
+            first = first or axes
+            _draw_panel(axes, dataset, panel, time, next(letters))
+            _mark_events(axes, events, numbered=row == 0)
+            last = number + 2 >= len(shown)
+            axes.tick_params(labelbottom=last)
+            if last:
+                axes.set_xlabel("time (s)")
+        if first is not None:
+            first.set_xlim(float(time[0]), float(time[-1]))
+        return figure
+
+
+def _axes(figure: Figure, box: tuple[float, float, float, float], share: Axes | None = None) -> Axes:
+    """Axes in inches from the lower left corner."""
+    width, height = figure.get_size_inches()
+    place = (box[0] / width, box[1] / height, box[2] / width, box[3] / height)
+    return figure.add_axes(place, sharex=share)
+
+
+def _time_of(dataset: xr.Dataset) -> Samples:
+    time = np.asarray(dataset["time"].values, dtype=float) if "time" in dataset.variables else np.zeros(0)
+    if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
+        raise InputError(f"the run has {time.size} samples of time; allowed: at least 2, increasing")
+    return time
+
+
+def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
+    """(n, 3) places of the body's mid-length, m; None where the run has a distance only."""
+    if "position" not in dataset or dataset["position"].ndim != 2:
+        return None
+    values = np.asarray(dataset["position"].transpose("time", ...).values, dtype=float)
+    return values if values.shape == (time.size, 3) and np.any(np.isfinite(values)) else None
+
+
+def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> Iterator[tuple[str, Samples]]:
+    """Words and values of the lines of a panel that the run has, in units of the panel before its prefix."""
+    factor = {"Hz": Hz, "deg": float(np.radians(1.0))}.get(panel.unit, 1.0)
+    for name, words in panel.lines:
+        if name in dataset and dataset[name].dims == ("time",):
+            values = np.asarray(dataset[name].values, dtype=float) / factor
+            if values.size == time.size and np.any(np.isfinite(values)):
+                yield words, values
+
+
+def _draw_path(axes: Axes, path: Samples, across: int, name: str, letter: str) -> None:
+    lengths = Scale.of(np.ptp(path[np.isfinite(path).all(axis=1)], axis=0), "m")
+    x, y = lengths(path[:, 0]), lengths(path[:, across])
+    axes.plot(x, y, color=COLOURS["blue"])
+    axes.plot(x[:1], y[:1], marker="o", color="white", markeredgecolor=COLOURS["blue"], linestyle="none")
+    axes.plot(x[-1:], y[-1:], marker="o", color=COLOURS["blue"], linestyle="none")
+    axes.set_xlabel(f"$x$ ({lengths.unit})")
+    axes.set_ylabel(f"${'xyz'[across]}$ ({lengths.unit})")
+    _widen(axes, x, y)
+    axes.set_title(f"{letter})", loc="left", pad=3, weight="bold")
+    axes.set_title(f"path, {name}; scales differ", loc="right", pad=3, size=8, color="#555555")
+
+
+def _widen(axes: Axes, x: Samples, y: Samples) -> None:
+    """Keep rounding from filling an axis across which nothing moves."""
+    reach = float(np.nanmax(x) - np.nanmin(x))
+    low, high = float(np.nanmin(y)), float(np.nanmax(y))
+    if high - low < 1e-6 * max(reach, abs(low)) or high == low:
+        room = 0.1 * max(reach, abs(low), 1e-9)
+        axes.set_ylim(low - room, high + room)
+
+
+def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, letter: str) -> None:
+    lines = list(_lines(dataset, panel, time))
+    values = np.concatenate([line for _, line in lines])
+    scale = Scale(1.0, panel.unit) if panel.unit in ("Hz", "deg") else Scale.of(values, panel.unit)
+    largest = [float(np.nanmax(np.abs(line))) for _, line in lines]
+    steep = panel.logarithmic and min(largest) > 0 and max(largest) > _SPREAD * min(largest)
+    for words, line in lines:
+        drawn = np.where(line > 0, line, np.nan) if steep else line
+        axes.plot(
+            time,
+            scale(drawn),
+            color=_COLOUR_OF.get(words, COLOURS["blue"]),
+            linestyle=_LINE_OF.get(words, "-"),
+            label=words or None,
+        )
+    if steep:
+        top = max(largest) / scale.factor
+        axes.set_yscale("log")
+        axes.set_ylim(max(0.1 * min(largest) / scale.factor, top * 10.0**-_DECADES), 3.0 * top)
+    elif panel.lines[0][0] == "wall_gap":
+        axes.set_ylim(bottom=min(0.0, float(np.nanmin(values)) / scale.factor))
+    axes.set_ylabel(f"{panel.label} ({scale.unit})")
+    axes.set_title(f"{letter})", loc="left", pad=2, size=8.5, weight="bold")
+    if any(words for words, _ in lines):
+        axes.legend(loc="upper right", ncols=4, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2)
+        _make_room(axes)
+
+
+def _make_room(axes: Axes) -> None:
+    """Room above the lines for the legend."""
+    low, high = axes.get_ylim()
+    if axes.get_yscale() == "log":
+        axes.set_ylim(low, high * (high / low) ** 0.22)
+    else:
+        axes.set_ylim(low, high + 0.28 * (high - low))
+
+
+def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
+    """Times within the run, and what happened then; what it begins with is no event in it."""
+    try:
+        listed = json.loads(str(dataset.attrs.get("events", "[]")))
+        found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
+    except (ValueError, TypeError, KeyError):
+        return []  # they are notes on a picture; a run without them can still be drawn
+    return sorted(event for event in found if time[0] < event[0] <= time[-1])
+
+
+def _event_words(events: list[tuple[float, str]]) -> list[str]:
+    """The events by number, a few to a line."""
+    words = [f"{number}: {what} ({when:.4g} s)" for number, (when, what) in enumerate(events[:_MOST_EVENTS], 1)]
+    if len(events) > _MOST_EVENTS:
+        words.append(f"and {len(events) - _MOST_EVENTS} more")
+    lines: list[str] = []
+    for word in words:
+        if lines and len(lines[-1]) + len(word) < 130:
+            lines[-1] += f" · {word}"
+        else:
+            lines.append(word)
+    return lines
+
+
+def _mark_events(axes: Axes, events: list[tuple[float, str]], *, numbered: bool) -> None:
+    for number, (when, _) in enumerate(events, 1):
+        axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
+        if numbered and number <= _MOST_EVENTS:
+            level = 1.02 + 0.09 * _crowded(events, number - 1)
+            axes.text(
+                when, level, str(number), transform=axes.get_xaxis_transform(), ha="center", size=7, color="#555555"
+            )
+
+
+def _crowded(events: list[tuple[float, str]], place: int) -> int:
+    """0 or 1: every other one of events close to each other stands higher."""
+    span = max(events[-1][0] - events[0][0], 1e-300)
+    near = [later[0] - earlier[0] < 0.02 * span for earlier, later in pairwise(events[: place + 1])]
+    level = 0
+    for close in near:
+        level = 1 - level if close else 0
+    return level
+
+
+def _write_words(figure: Figure, dataset: xr.Dataset, notes: list[str]) -> None:
+    height = float(figure.get_size_inches()[1])
+    attrs = dataset.attrs
+    figure.text(
+        0.012,
+        1 - 0.16 / height,
+        f"{plain(str(attrs.get('robot', 'a robot')), 50)}: a run in time",
+        weight="bold",
+        va="top",
+        size=11,
+    )
+    facts = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
+    line = " · ".join([*facts, "computed, nothing is measured"])
+    figure.text(0.012, 1 - 0.40 / height, line, va="top", size=8.0, color="#555555")
+    for number, note in enumerate(reversed(notes)):
+        figure.text(0.012, (0.10 + 0.17 * number) / height, note, size=7.5, color="#333333")

@@ -1,0 +1,278 @@
+"""A film of a run: the robot moves as the run's dataset says, seen by a camera that stands still or goes along."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.dynamics.poses import Pose, Poses, poses_of
+from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.errors import InputError
+from spirillum.files import output_target, whole_file
+from spirillum.robot.robot import Robot
+from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
+from spirillum.view.scene3d.encode import FILMS, film_writer
+from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from spirillum.view.scene3d.scene import DrawnRobot, Scene
+
+__all__ = ["CAMERAS", "Film", "film"]
+
+CAMERAS = ("auto", "fixed", "follow")
+"""What the camera does; `auto`: it goes along where the robot swims further than half of its length."""
+_MOST_FRAMES = 20_000
+_SLOWEST, _FASTEST = 1e-6, 1e4
+_LARGEST_TURN = 0.25
+"""Largest part of a turn of the tail between two frames at which its sense can still be seen."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film that was written."""
+
+    path: Path
+    robot: Robot
+    model: str
+    frames: int
+    size: tuple[int, int]
+    fps: int
+    speed: float
+    """Time of the run over time of the film."""
+    follows: bool
+    """Whether the camera goes along with the robot."""
+    turn_per_frame: float
+    """Largest part of a turn of the tail between two frames."""
+    warnings: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """Length of the film, s."""
+        return self.frames / self.fps
+
+    def to_dict(self) -> dict[str, Any]:
+        """The film's facts, as ``film --json`` prints them."""
+        content = {
+            "robot": self.robot.name,
+            "model": self.model,
+            "file": str(self.path),
+            "frames": self.frames,
+            "width": self.size[0],
+            "height": self.size[1],
+            "frames_per_second": self.fps,
+            "speed": self.speed,
+            "camera": "follow" if self.follows else "fixed",
+            "duration": quantity(self.duration, "s"),
+            "tail_turn_per_frame": quantity(2.0 * np.pi * self.turn_per_frame, "rad"),
+        }
+        return envelope("film", content, self.warnings)
+
+
+def film(
+    dataset: xr.Dataset | str | Path,
+    path: str | Path,
+    *,
+    view: str = "perspective",
+    size: str | tuple[int, int] = (1280, 720),
+    fps: int = 30,
+    speed: float | None = None,
+    camera: str = "auto",
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Film:
+    """Film a run.
+
+    Args:
+        dataset: what `spirillum.simulate` returns, or the file with it.
+        path: file to write, `.mp4` or `.gif`.
+        view: `perspective`, or to scale `side`, `top`, `front`, `rear`.
+        size: width and height in pixels, even numbers, or ``"1280x720"``.
+        fps: frames a second, 1 to 120 (a GIF: to 50).
+        speed: time of the run over time of the film: 0.5 is slow motion. None: 1, or as slow as it takes to see how
+            the tail turns.
+        camera: `fixed`, `follow`, or `auto`: it goes along where the robot swims further than half of its length.
+        progress: told what is done, how many frames are done, and how many there are.
+
+    Returns:
+        What was written, with a warning where the frames are too few to see the sense of the tail's rotation.
+
+    Raises:
+        InputError: for wrong input, a run that cannot be shown, or a machine that cannot draw.
+    """
+    target = output_target(path, FILMS, "run.mp4")
+    seen_from, pixels = checked_view(view), _even(checked_size(size))
+    _check_pace(fps, 1.0 if speed is None else speed, target.suffix)
+    if camera not in CAMERAS:
+        raise InputError(f"camera = {str(camera)[:40]!r}; allowed: {', '.join(CAMERAS)}")
+    if isinstance(dataset, (str, Path)):
+        dataset = open_run(dataset)
+    robot = robot_of(dataset)
+    from spirillum.view.scene3d.scene import DrawnRobot, level_height
+
+    solids = DrawnRobot.of(robot)
+    poses = poses_of(dataset, level_height(solids))
+    speed = _clear_speed(poses, fps) if speed is None else float(speed)
+    times = _frame_times(poses, fps, speed)
+    follows = camera == "follow" or (camera == "auto" and poses.travelled > 0.5 * solids.length)
+    turn, warnings = _aliasing(poses, times, speed)
+    model = str(dataset.attrs.get("model", ""))[:60]
+    words = {"title": robot.name, "comment": "computed motion and geometry, drawn by spirillum"}
+    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset))
+    tell = progress or (lambda _what, _done, _total: None)
+    with whole_file(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
+        with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
+            for number, image in enumerate(images):
+                tell("film", number, times.size)
+                writer.add(image)
+        tell("film: writing", times.size, times.size)
+    return Film(target, robot, model, times.size, pixels, fps, speed, follows, turn, warnings)
+
+
+class _Shots:
+    """The frames of a film: what is seen, from where."""
+
+    def __init__(
+        self,
+        solids: DrawnRobot,
+        poses: Poses,
+        view: View,
+        size: tuple[int, int],
+        *,
+        follows: bool,
+        middle: float | None,
+    ) -> None:
+        self._solids, self._poses, self._view, self._size, self._follows = solids, poses, view, size, follows
+        in_glass = solids.robot.channel is not None
+        self._free = np.array([1.0, 0.0, 0.0]) if in_glass else np.ones(3)
+        """Directions in which the camera goes along: in a channel along its axis."""
+        x, beyond = poses.position[:, 0], 1.5 * solids.length if follows else 0.0
+        self._glass = glass_around(solids, float(x.min()) - beyond, float(x.max()) + beyond, middle)
+        self._camera, self._rows = self._framed()
+
+    def _framed(self) -> tuple[Camera, int | None]:
+        """The camera of the first frame, and the rows about the middle in which all frames have all that is drawn."""
+        several = [self._poses.at(float(time)) for time in np.linspace(self._poses.time[0], self._poses.time[-1], 60)]
+        glass = self._glass
+        if self._follows:
+            start = several[0].position
+            several = [pose._replace(position=pose.position - self._free * (pose.position - start)) for pose in several]
+            glass = glass_around(self._solids, float(start[0]), float(start[0]))
+        points = np.concatenate([shown_points(self._solids, pose, glass) for pose in several])
+        camera = fitted(self._view, points, self._size, Margins())
+        if self._follows and self._glass is not None:
+            points = np.concatenate([points, shown_points(self._solids, several[0], self._glass)])
+        height = camera.pixels(points, self._size)[:, 1] - 0.5 * self._size[1]
+        rows = 2 * int(np.ceil(np.abs(height).max()) + 4)
+        return camera, rows if self._glass is not None and rows < self._size[1] else None
+
+    def images(self, times: Samples, line: str, speed: float) -> Generator[np.ndarray]:
+        """The frames at times of the run."""
+        from spirillum.view.scene3d.overlay import Stamp, blended_into, scale_bar, words_on
+        from spirillum.view.scene3d.scene import Scene
+
+        first = self._poses.at(float(times[0]))
+        bar = scale_bar(self._camera, self._size, first.position)
+        lines = [text for text in (line, "computed motion and geometry") if text]
+        words = blended_into(words_on(self._size, self._camera, bar, self._solids.robot.name, lines))
+        stamp = Stamp(self._size, times, speed)
+        with Scene(self._solids, self._size, glass=self._glass, rows=self._rows, quick=True) as scene:
+            if self._glass is None:
+                self._add_grid(scene)
+            for time in times:
+                pose = self._poses.at(float(time))
+                scene.place(pose)
+                scene.look(self._camera_at(pose, first))
+                image = words(scene.image())
+                stamp.write(image, float(time))
+                yield image
+
+    def _camera_at(self, pose: Pose, first: Pose) -> Camera:
+        if not self._follows:
+            return self._camera
+        return self._camera.moved((pose.position - first.position) * self._free)
+
+    def _add_grid(self, scene: Scene) -> None:
+        corners = self._solids.corners(self._poses.at(float(self._poses.time[0]))) - self._poses.position[0]
+        places = self._poses.position
+        scene.add_grid(self._view, places.min(axis=0) + corners.min(axis=0), places.max(axis=0) + corners.max(axis=0))
+
+
+def _channel_middle(dataset: xr.Dataset) -> float | None:
+    """Where the run says that the channel's middle is, m."""
+    try:
+        middle = float(dataset.attrs.get("channel_middle", np.nan))
+    except (TypeError, ValueError):
+        return None  # it decides only how far the glass is drawn
+    return middle if np.isfinite(middle) else None
+
+
+def _even(size: tuple[int, int]) -> tuple[int, int]:
+    if size[0] % 2 or size[1] % 2:
+        raise InputError(f"size = {size[0]}x{size[1]}; allowed: even numbers, as films want them")
+    return size
+
+
+def _check_pace(fps: int, speed: float, suffix: str) -> None:
+    most = 50 if suffix == ".gif" else 120
+    if isinstance(fps, bool) or int(fps) != fps or not 1 <= fps <= most:
+        raise InputError(f"fps = {fps}; allowed: a whole number of frames a second from 1 to {most} for {suffix}")
+    if not _SLOWEST <= speed <= _FASTEST:
+        raise InputError(f"speed = {speed}; allowed: {_SLOWEST:g} to {_FASTEST:g} seconds of the run a second of film")
+
+
+def _frame_times(poses: Poses, fps: int, speed: float) -> Samples:
+    """Times of the run at the frames, from its start to its end."""
+    count = int(np.floor(poses.duration / speed * fps * (1.0 + 1e-12))) + 1
+    if count > _MOST_FRAMES:
+        raise InputError(
+            f"speed = {speed:g} makes {count} frames of {poses.duration:.4g} s; allowed: at most {_MOST_FRAMES}, "
+            f"here a speed of {_round_up(poses.duration * fps / _MOST_FRAMES):g} or more"
+        )
+    if count < 2:
+        raise InputError(
+            f"speed = {speed:g} makes one frame of {poses.duration:.4g} s; allowed: a speed of "
+            f"{_round_down(poses.duration * fps / 30):g} or less"
+        )
+    return np.asarray(poses.time[0] + np.arange(count) * (speed / fps), dtype=float)
+
+
+def _clear_speed(poses: Poses, fps: int) -> float:
+    """Real time, or the largest slower speed of 1, 2 or 5 times a power of ten at which the tail's turning is seen."""
+    rate = float(np.abs(np.diff(poses.tail_angle) / np.diff(poses.time)).max()) / (2.0 * np.pi)
+    if rate <= _LARGEST_TURN * fps:
+        return 1.0
+    return max(_round_down(_LARGEST_TURN * fps / rate), _SLOWEST)
+
+
+def _aliasing(poses: Poses, times: Samples, speed: float) -> tuple[float, tuple[str, ...]]:
+    """Largest part of a turn between two frames, and a warning where it is too much."""
+    angle = np.interp(times, poses.time, poses.tail_angle)
+    turn = float(np.abs(np.diff(angle)).max()) / (2.0 * np.pi)
+    if turn <= _LARGEST_TURN:
+        return turn, ()
+    slower = _round_down(speed * _LARGEST_TURN / turn)
+    sentence = (
+        f"the tail turns by up to {turn:.2g} turns from frame to frame, so that it may seem to stand still or turn "
+        f"backwards; a speed of {slower:g} shows it as it turns"
+    )
+    return turn, (sentence,)
+
+
+def _round_down(value: float) -> float:
+    """The number of 1, 2 or 5 times a power of ten at or below a value."""
+    from spirillum.view.scene3d.glass import ruler_steps
+
+    return ruler_steps(value)
+
+
+def _round_up(value: float) -> float:
+    """The number of 1, 2 or 5 times a power of ten at or above a value."""
+    return next(step for step in (_round_down(value) * factor for factor in (1.0, 2.0, 2.5, 5.0)) if step >= value)

@@ -1,0 +1,215 @@
+"""A picture of a robot in three dimensions, off-screen or in a window."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.dynamics.poses import Pose
+from spirillum.errors import InputError
+from spirillum.files import output_target, whole_file
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_option
+from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
+
+if TYPE_CHECKING:
+    from spirillum.view.scene3d.scene import DrawnRobot
+
+__all__ = ["LARGEST", "SMALLEST", "Picture3D", "checked_size", "glass_around", "show"]
+
+SMALLEST, LARGEST = 64, 4096
+"""Allowed widths and heights of a picture, pixels."""
+_FINER = 2
+"""Pixels drawn for each pixel of a picture, along width and height."""
+_MOST_FINER = 5_000_000
+"""Pixels of a picture above which no finer ones are drawn: they would take gigabytes."""
+
+
+@dataclass(frozen=True)
+class Picture3D:
+    """A picture of a robot."""
+
+    robot: Robot
+    view: View
+    phase: float
+    """Phase of the tail, rad."""
+    pixels: np.ndarray
+    """(height, width, 3) the picture, sRGB bytes."""
+    camera: Camera
+    """Where it is seen from: `camera.pixels(points, size)` says where points of the lab are in the picture."""
+    pose: Pose
+    """Where the robot lies: its body's mid-length, attitude, and the angle of its tail."""
+    path: Path | None
+    """The file that was written."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The picture's facts, as ``show --json`` prints them."""
+        height, width = self.pixels.shape[:2]
+        content = {
+            "robot": self.robot.name,
+            "file": None if self.path is None else str(self.path),
+            "view": self.view,
+            "phase": quantity(self.phase, "rad"),
+            "width": width,
+            "height": height,
+        }
+        return envelope("show", content, self.robot.warnings)
+
+
+def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
+    """Width and height in pixels from ``1600x900`` or a pair.
+
+    Raises:
+        InputError: if it is neither, or out of range.
+    """
+    allowed = f"WIDTHxHEIGHT in pixels, {SMALLEST} to {LARGEST} each, for example 1600x900"
+    if isinstance(size, str):
+        found = re.fullmatch(r"(\d{1,6})[xX×](\d{1,6})", size.strip())
+        if found is None:
+            raise InputError(f"size = {size[:40]!r}; allowed: {allowed}")
+        width, height = int(found[1]), int(found[2])
+    else:
+        width, height = (int(value) for value in size)
+    if not all(SMALLEST <= value <= LARGEST for value in (width, height)):
+        raise InputError(f"size = {width}x{height}; allowed: {allowed}")
+    return width, height
+
+
+def show(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    path: str | Path | None = None,
+    *,
+    view: str = "perspective",
+    phase: str | float = 0.0,
+    size: str | tuple[int, int] = (1600, 900),
+    channel: bool = True,
+    window: bool = False,
+) -> Picture3D:
+    """Draw a robot lying level on its channel's floor: computed geometry in three dimensions.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        path: PNG file to write; None: none.
+        view: `perspective`, or to scale `side`, `top`, `front`, `rear`.
+        phase: phase of the tail, with its unit (``"90 deg"``) or a float in rad.
+        size: width and height in pixels, or ``"1600x900"``.
+        channel: draw the channel around the robot, where it has one.
+        window: show it in a window too, until that is closed.
+
+    Returns:
+        The picture.
+
+    Raises:
+        InputError: for wrong input, a target that cannot be written, or a machine that cannot draw.
+    """
+    target = None if path is None else output_target(path, {".png": "a picture"}, "robot.png")
+    seen_from = checked_view(view)
+    turned = parse_option("phase", phase, KINDS["angle"])
+    pixels = checked_size(size)
+    loaded = load(robot)
+    from spirillum.view.scene3d.overlay import blended_into, scale_bar, words_on
+    from spirillum.view.scene3d.scene import DrawnRobot, Scene, resting
+
+    solids = DrawnRobot.of(loaded, fineness=2.0)
+    pose = resting(solids, turned)
+    glass = glass_around(solids, pose.position[0], pose.position[0]) if channel else None
+    camera = fitted(seen_from, shown_points(solids, pose, glass), pixels, Margins())
+    if window:
+        with Scene(solids, pixels, glass=glass, live=True) as scene:
+            scene.place(pose)
+            scene.look(camera)
+            scene.plotter.show(title=f"spirillum: {loaded.name}", auto_close=False)
+    finer = _FINER if pixels[0] * pixels[1] <= _MOST_FINER else 1
+    with Scene(solids, (finer * pixels[0], finer * pixels[1]), glass=glass) as scene:
+        scene.place(pose)
+        scene.look(camera)
+        image = _averaged(scene.image(), finer)
+    bar = scale_bar(camera, pixels, pose.position)
+    image = blended_into(words_on(pixels, camera, bar, loaded.name, _lines(loaded, camera, glass)))(image)
+    if target is not None:
+        _write_png(image, target, loaded, seen_from)
+    return Picture3D(loaded, seen_from, turned, image, camera, pose, target)
+
+
+def glass_around(
+    solids: DrawnRobot, rearmost: float, foremost: float, middle: float | None = None
+) -> tuple[float, float] | None:
+    """Ends of the piece of channel around a robot, x in m; None without a channel, or where it has left it.
+
+    Args:
+        solids: the robot's pieces.
+        rearmost: smallest x of the body's mid-length that is shown.
+        foremost: largest one.
+        middle: x of the channel's middle: its own ends are then not passed. None: where they are is not known.
+    """
+    if solids.robot.channel is None:
+        return None
+    x = np.concatenate([piece.vertices[:, 0] for piece in solids.pieces])
+    spare = 0.16 * solids.length
+    start, end = rearmost + float(x.min()) - spare, foremost + float(x.max()) + spare
+    length = solids.robot.channel.length
+    if middle is None or length is None:
+        return start, end
+    start, end = max(start, middle - 0.5 * length), min(end, middle + 0.5 * length)
+    return (start, end) if start < end else None
+
+
+def shown_points(solids: DrawnRobot, pose: Pose, glass: tuple[float, float] | None) -> Samples:
+    """(n, 3) points that a picture has to hold: the robot at any angle of its tail, and the ends of the glass, m."""
+    from spirillum.view.scene3d.glass import WALL
+
+    corners = solids.corners(pose)
+    channel = solids.robot.channel
+    if glass is None or channel is None:
+        return corners
+    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    radius = 0.5 * channel.diameter * (1.0 + WALL)
+    ring = np.stack([np.zeros(48), radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    return np.concatenate([corners, *(ring + np.array([end, 0.0, 0.0]) for end in glass)])
+
+
+def _averaged(image: np.ndarray, finer: int) -> np.ndarray:
+    """One pixel from each square of finer ones."""
+    height, width = image.shape[0] // finer, image.shape[1] // finer
+    squares = image.reshape(height, finer, width, finer, 3).astype(np.uint16)
+    return np.asarray((squares.sum(axis=(1, 3)) + finer * finer // 2) // (finer * finer), dtype=np.uint8)
+
+
+def _lines(robot: Robot, camera: Camera, glass: tuple[float, float] | None) -> list[str]:
+    from spirillum.view.figures.scene import length_words
+
+    lines = ["computed geometry" + (", to scale" if camera.parallel else "")]
+    if glass is not None and robot.channel is not None:
+        lines.append(f"a piece of its channel of {length_words(robot.channel.diameter)} inner diameter")
+    return lines
+
+
+def _words(robot: Robot, view: View) -> str:
+    """What the picture shows, for those who cannot see it."""
+    from spirillum.view.figures.scene import length_words
+
+    body, tail = robot.body, robot.tail
+    return (
+        f"{robot.name}, {view} view: a {body.shape} body of {length_words(body.diameter)} diameter and "
+        f"{length_words(body.length)} length, a {tail.handedness}-handed helical tail of {length_words(tail.length)} "
+        f"length, {length_words(tail.wavelength)} wavelength and {length_words(tail.amplitude)} amplitude behind it. "
+        "Computed geometry, not a photograph."
+    )
+
+
+def _write_png(image: np.ndarray, path: Path, robot: Robot, view: View) -> None:
+    from PIL import Image, PngImagePlugin
+
+    facts = PngImagePlugin.PngInfo()
+    facts.add_itxt("Title", robot.name)
+    facts.add_itxt("Description", _words(robot, view))
+    with whole_file(path) as temporary:
+        Image.fromarray(image).save(temporary, format="png", optimize=True, pnginfo=facts)

@@ -1,0 +1,146 @@
+"""What lies beside a virtual trial: its setup, as an experimenter would know it, and the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.answer import as_json, envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.virtual.trajectory import Way
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["SYNTHETIC", "names_beside", "rate_quantities", "setup_text", "truth_dataset", "truth_text"]
+
+SYNTHETIC = "synthetic: a computed robot seen by a virtual camera, not a measurement"
+_UNITS = {
+    "forward_velocity": "m/s",
+    "body_rotation_rate": "rad/s",
+    "tail_rotation_rate": "rad/s",
+    "motor_rotation_rate": "rad/s",
+}
+
+
+def _mm(value: float) -> str:
+    return f'"{1e3 * value:.9g} mm"'
+
+
+def setup_text(
+    robot_file: str,
+    *,
+    view: str,
+    direction: str,
+    eye: float,
+    surface: float,
+    index: float,
+    spacing: float,
+    axis: float,
+    axis_uncertainty: float = 0.0,
+    fps: float | None = None,
+) -> str:
+    """A setup file.
+
+    Args:
+        robot_file: preset or robot file beside it.
+        view: `top` or `side`.
+        direction: `right` or `left`.
+        eye: height of the lens, m.
+        surface: height of the oil's surface, m.
+        index: of the oil.
+        spacing: of the ruler's lines, m.
+        axis: height of the robot's axis, m.
+        axis_uncertainty: its standard uncertainty, m.
+        fps: frames a second of a folder of pictures; None: a video has its own times.
+    """
+    lines = [
+        f"# {SYNTHETIC}",
+        "[camera]",
+        f'view = "{view}"',
+        f"height = {_mm(eye)}",
+        *([] if fps is None else [f"frames_per_second = {fps!r}"]),
+        "",
+        "[tank]",
+        f"surface = {_mm(surface)}",
+        f"index = {index!r}",
+        "",
+        "[markers]",
+        f"spacing = {_mm(spacing)}",
+        'height = "0 mm"',
+        "",
+        "[robot]",
+        f'file = "{robot_file}"',
+        f"axis_height = {_mm(axis)}",
+        *([f"axis_height_uncertainty = {_mm(axis_uncertainty)}"] if axis_uncertainty > 0 else []),
+        f'direction = "{direction}"',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def rate_quantities(rates: Mapping[str, float]) -> dict[str, Any]:
+    """Forward velocity and rates as quantities of an answer.
+
+    Args:
+        rates: by name, SI.
+    """
+    return {name: quantity(value, _UNITS[name]) for name, value in rates.items()}
+
+
+def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
+    """The truth of a trial, JSON.
+
+    Args:
+        rates: forward velocity and rates, SI.
+        content: what else belongs to it.
+    """
+    return as_json(envelope("truth", {"synthetic": True, **rate_quantities(rates), **content}, (SYNTHETIC,))) + "\n"
+
+
+def truth_dataset(way: Way, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]) -> xr.Dataset:
+    """The truth on every frame of the video.
+
+    Args:
+        way: where the robot is.
+        times: of the frames that are in the video, s, (n,).
+        numbers: of those frames, counted as recorded, (n,).
+        attributes: of the dataset.
+    """
+    import xarray as xr
+
+    series = way.series(times)
+    about = {
+        "x": ("m", "the body's mid-length along the channel, from below the lens"),
+        "y": ("m", "the body's mid-length across, y = z x x with z towards the camera"),
+        "z": ("m", "height of the body's mid-length above the reference plane"),
+        "heading": ("rad", "angle of the motor axis to x in the plane of the picture, about +z"),
+        "body_angle": ("rad", "angle of the body about +x, unwrapped; the first stripe is on +z at 0"),
+        "tail_phase": ("rad", "phase of the tail about +x, unwrapped"),
+    }
+    variables = {
+        name: ("frame", series[name], {"units": unit, "long_name": text}) for name, (unit, text) in about.items()
+    }
+    time = ("frame", times, {"units": "s", "long_name": "time in the video, at the middle of the exposure"})
+    dataset = xr.Dataset(variables, {"frame": numbers, "time": time}, dict(attributes))
+    if not all(math.isfinite(float(dataset[name].sum())) for name in about):
+        raise ValueError("the truth is not finite")
+    return dataset
+
+
+def names_beside(path: Path, setup: Path | None = None) -> dict[str, Path]:
+    """Files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`.
+
+    Args:
+        path: the video or the folder.
+        setup: another setup file; the robot's file is then beside that.
+    """
+    stem = path.stem if path.suffix else path.name
+    ends = {"setup": "setup.toml", "json": "truth.json", "nc": "truth.nc", "robot": "robot.toml"}
+    found = {name: path.parent / f"{stem}.{end}" for name, end in ends.items()}
+    if setup is not None:
+        found |= {"setup": setup, "robot": setup.parent / "robot.toml"}
+    return found

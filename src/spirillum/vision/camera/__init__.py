@@ -1,0 +1,1 @@
+"""The camera: optics through the oil's surface, ruler, lens, scale."""

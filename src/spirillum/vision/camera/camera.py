@@ -1,0 +1,103 @@
+"""The camera of a video: which part of the picture counts, what is looked at first, and the scale."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.vision.camera.checkerboard import lens_of
+from spirillum.vision.camera.ruler import lines_in, still_picture
+from spirillum.vision.camera.scale import Sight, fitted_camera, given_camera
+from spirillum.vision.setup import Setup
+from spirillum.vision.video.frames import Frame, Video, open_video
+
+__all__ = ["bounds_of", "opened", "samples_of", "scale_of", "sight_of"]
+
+_SAMPLES = 24
+"""Frames from which scale and looks are learnt."""
+_GOLDEN = 0.618034
+_UNKNOWN = 10.0
+"""How much of a film of unknown length is learnt from, s."""
+
+
+def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[Sight, Video]:
+    """Only the camera and the scale of a video.
+
+    Args:
+        video: the film or folder.
+        setup: its setup.
+        folder: folder of the setup file, where a checkerboard's pictures lie.
+
+    Raises:
+        InputError: if the video cannot be read, or no ruler is found in it.
+    """
+    video = opened(video, setup)
+    frames = samples_of(video, setup)
+    return sight_of(video, setup, still_picture([frame.image for frame in frames]), folder), video
+
+
+def opened(video: str | Path | Video, setup: Setup) -> Video:
+    """The video of a path; what is open already stays so."""
+    return video if isinstance(video, Video) else open_video(video, setup.camera.frames_per_second)
+
+
+def samples_of(video: Video, setup: Setup) -> list[Frame]:
+    """Some frames, spread unevenly over what is to be measured: else all could show the robot at the same angles.
+
+    Raises:
+        InputError: if it begins after the video's end, or nothing can be decoded.
+    """
+    end = setup.end
+    if video.duration:
+        if setup.start >= video.duration:
+            raise InputError(
+                f"start = {setup.start:g} s, but {video.name} ends at {video.duration:.4g} s; allowed: a start before "
+                "its end"
+            )
+        end = video.duration if end is None else min(end, video.duration)
+    elif end is None:
+        end = setup.start + _UNKNOWN
+    count = np.arange(_SAMPLES)
+    shares = (count + (_GOLDEN * count) % 1.0) / _SAMPLES
+    return video.samples((setup.start + (end - setup.start) * shares).tolist())
+
+
+def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:
+    """Part of the picture to look at: left, top, right, bottom.
+
+    Raises:
+        InputError: if it is not in the picture.
+    """
+    width, height = video.size
+    region = setup.region
+    if region is None:
+        return 0, 0, width, height
+    right, bottom = region.left + region.width, region.top + region.height
+    if right > width or bottom > height:
+        raise InputError(
+            f"region reaches to column {right} and row {bottom}; allowed: inside the picture of {width} x {height} "
+            "pixels"
+        )
+    return region.left, region.top, right, bottom
+
+
+def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) -> Sight:
+    """The camera of a video, from what stands still in it, (h, w, 3).
+
+    Raises:
+        InputError: if a ruler is wanted and not found.
+    """
+    board = setup.camera.checkerboard
+    lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size)
+    if setup.markers.spacing is None:
+        return given_camera(setup, video.size, lens)
+    lines = lines_in(still, bounds_of(setup, video))
+    if lines is None:
+        raise InputError(
+            f"{video.name} shows no ruler: no equally spaced lines across the direction of swimming were found; "
+            "allowed: a ruler and a channel along the rows of the picture, or markers.length_per_pixel"
+        )
+    return fitted_camera(setup, video.size, lines, lens)

@@ -1,0 +1,155 @@
+"""Where a point in the tank appears in the picture, and what point a pixel shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.snell import pixels_of_points, points_of_pixels
+from spirillum.vision.setup import Setup
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+__all__ = ["BodyPose", "Optics", "optics_of", "placed", "places_seen_by", "seen"]
+
+
+class BodyPose(NamedTuple):
+    """Where the body's mid-length is in the camera's frame, at the height of the robot's axis."""
+
+    x: float
+    """m, from below the lens."""
+    y: float
+    """m."""
+    heading: float
+    """Angle of the motor axis to the x axis about +z, rad."""
+
+
+@dataclass(frozen=True)
+class Optics:
+    """A camera with a pinhole lens above a flat surface that refracts.
+
+    The frame has x along the channel towards the nose, z from the reference plane towards the camera, y = z x x; the
+    lens stands at (0, 0, height). Pixels (u right, v down) have their centres at whole numbers. Without tilts the
+    camera looks along -z with x to the right, or to the left for `leftward`. It is turned by `rotation` about its line
+    of sight, then by `tilt_y` about y, then by `tilt_x` about x.
+    """
+
+    size: tuple[int, int]
+    """Width and height of the picture, pixels."""
+    focal: float
+    """Focal length, pixels."""
+    height: float
+    """Height of the lens above the reference plane, m."""
+    axis_height: float
+    """Height of the robot's axis above the reference plane, m."""
+    surface: float | None = None
+    """Height of the surface, m; None: nothing refracts."""
+    index: float = 1.0
+    """Refractive index below the surface over that above."""
+    centre: tuple[float, float] | None = None
+    """Pixel of the line of sight; None: the middle of the picture."""
+    tilt_x: float = 0.0
+    """rad."""
+    tilt_y: float = 0.0
+    """rad."""
+    rotation: float = 0.0
+    """rad."""
+    k1: float = 0.0
+    """Radial distortion: distances r = tan(angle) from the line of sight become r (1 + k1 r^2 + k2 r^4)."""
+    k2: float = 0.0
+    """The same, next order."""
+    leftward: bool = False
+    """Whether x points to the left in the picture."""
+
+    @cached_property
+    def numbers(self) -> Samples:
+        """Everything as one row for the compiled loops."""
+        turn = self.rotation + (np.pi if self.leftward else 0.0)
+        (c_x, s_x), (c_y, s_y), (c_z, s_z) = ((np.cos(a), np.sin(a)) for a in (self.tilt_x, self.tilt_y, turn))
+        about_x = np.array([[1.0, 0.0, 0.0], [0.0, c_x, -s_x], [0.0, s_x, c_x]])
+        about_y = np.array([[c_y, 0.0, s_y], [0.0, 1.0, 0.0], [-s_y, 0.0, c_y]])
+        about_z = np.array([[c_z, -s_z, 0.0], [s_z, c_z, 0.0], [0.0, 0.0, 1.0]])
+        axes = (about_x @ about_y @ about_z).T  # rows: right, up and backwards of the camera
+        u, v = self.middle if self.centre is None else self.centre
+        refracts = self.surface is not None and self.index != 1.0
+        surface, index = (self.surface, self.index) if refracts else (-1e30, 1.0)
+        head = [self.focal, u, v, self.k1, self.k2, self.height, surface, index]
+        return np.concatenate([np.array(head, dtype=float), axes.ravel()])
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Middle of the picture, pixels."""
+        return 0.5 * (self.size[0] - 1.0), 0.5 * (self.size[1] - 1.0)
+
+    def pixels(self, points: Samples) -> Samples:
+        """Pixels (k, 2) at which points (k, 3), m, appear; NaN behind the camera."""
+        points = np.ascontiguousarray(points, dtype=float)
+        found = np.empty((len(points), 2))
+        pixels_of_points(points, self.numbers, found)
+        return found
+
+    def points(self, pixels: Samples, height: float) -> Samples:
+        """Points (k, 3), m, at a height that pixels (k, 2) show; NaN where a line of sight does not get there."""
+        pixels = np.ascontiguousarray(pixels, dtype=float)
+        found = np.empty((len(pixels), 3))
+        points_of_pixels(pixels, float(height), self.numbers, found)
+        return found
+
+    @cached_property
+    def origin(self) -> Samples:
+        """What the middle of the picture shows at the height of the axis: the origin of a track, m, (3,)."""
+        return np.asarray(self.points(np.array([self.middle]), self.axis_height)[0])
+
+    @cached_property
+    def length_per_pixel(self) -> float:
+        """Length along x that a pixel shows at the height of the axis in the middle of the picture, m."""
+        step = 1e-3 * self.height
+        ends = self.origin + np.array([[-step, 0.0, 0.0], [step, 0.0, 0.0]])
+        return float(2.0 * step / np.linalg.norm(np.diff(self.pixels(ends), axis=0)))
+
+    def moved(self, changes: Mapping[str, float]) -> Self:
+        """The same camera with other numbers."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
+    """The camera of a setup, upright and without distortion.
+
+    Args:
+        setup: the setup.
+        size: width and height of the picture, pixels.
+        focal: focal length, pixels.
+    """
+    return Optics(
+        size=size,
+        focal=focal,
+        height=setup.camera.height,
+        axis_height=setup.robot.axis_height,
+        surface=setup.tank.surface,
+        index=setup.tank.index,
+        leftward=setup.robot.direction == "left",
+    )
+
+
+def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
+    """Points (k, 3) of the body's frame in the camera's frame, m."""
+    cos, sin = np.cos(pose.heading), np.sin(pose.heading)
+    turned: Samples = points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turned += np.array([pose.x, pose.y, axis_height])
+    return turned
+
+
+def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
+    """Pixels (k, 2) of points (k, 3) of the body's frame, m."""
+    return optics.pixels(placed(points, pose, optics.axis_height))
+
+
+def places_seen_by(one: Optics, other: Optics, places: Samples) -> Samples:
+    """Places (n, 2) that one camera shows where another one shows these, (n, 2), all at the height of the axis, m."""
+    points = np.column_stack([places, np.full(len(places), other.axis_height)])
+    return np.asarray(one.points(other.pixels(points), one.axis_height)[:, :2])

@@ -1,0 +1,1 @@
+"""The robot on every frame: outline, stripes, tail, and flags."""

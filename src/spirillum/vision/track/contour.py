@@ -1,0 +1,274 @@
+"""Where a body's edges appear: its silhouette, and where its seal begins, on the plane through its axis.
+
+A line of sight that touches the body goes on to the horizontal plane through the motor axis. Where it meets that plane,
+in the frame of the body, depends only on where the lens stands in that frame: not on tilts, focal length or lens. So
+the apparent edges are computed once, exactly, for some places of the lens, and interpolated by polynomials.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from spirillum.arrays import Samples
+from spirillum.kernels.contours import edge_places, edge_points
+from spirillum.robot.links import outlines_of
+from spirillum.robot.outline import Line, Outline
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.optics import BodyPose, Optics, placed
+
+__all__ = ["GROUPS", "Contour", "contour_of"]
+
+GROUPS = ("front", "rear", "left", "right", "seal")
+"""Kinds of edges: front and rear end, the sides at +y and -y, and where the seal begins."""
+
+_TRUSTED = {
+    "front": 0.04,
+    "rear": 0.06,
+    "side": 0.04,
+    "striped side": 0.3,
+    "coupling": 0.15,
+    "seal": 0.03,
+    "bare rear": 0.5,
+}
+"""What places of edges are never known better than, pixels."""
+_ORDERS = 7, 4
+"""Orders of the polynomials along and across."""
+_NODES = 8, 5
+_AROUND, _PER_TURN = 128, 144
+"""Points around the axis, and along an arc that goes all the way round, from which a silhouette is made."""
+_WIDE = 0.9
+"""Half width of the ends that is used, over the body's radius."""
+_SEEN_ARC = 1.0
+"""Angle from the top up to which the seal's edge is used, rad."""
+
+
+@dataclass(frozen=True)
+class Contour:
+    """Apparent edge points of a body as functions of the lens's place in the body's frame."""
+
+    group: np.ndarray = field(repr=False)
+    """Index into `GROUPS` of each point, (n,)."""
+    normals: Samples = field(repr=False)
+    """Outward directions on the plane in the body's frame, about at right angles to the edge, (n, 2)."""
+    floor: Samples = field(repr=False)
+    """What places of points are never known better than, pixels: looks change, most where stripes pass, (n,)."""
+    _factors: Samples = field(repr=False)
+    """Polynomials of the points, and of those of a flat end's lower rim, (a, b, 4, n)."""
+    _reach: Samples = field(repr=False)
+
+    def points(self, pose: BodyPose) -> Samples:
+        """The edge points on the plane through the axis, in the body's frame, m, (n, 2)."""
+        out = np.empty((len(self.group), 2))
+        edge_points(np.array(pose, dtype=float), self._factors, self.normals, self._reach, out)
+        return out
+
+    def places(self, pose: BodyPose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
+        """Where the edges are in the picture.
+
+        Returns:
+            pixels (n, 2), unit normals in the picture (n, 2), pixels per m along them (n,), and the change of the
+            distance along each normal with (x, y, heading), pixels per m and per rad (n, 3).
+        """
+        count = len(self.group)
+        pixels, directions, size, slopes = (
+            np.empty((count, 2)),
+            np.empty((count, 2)),
+            np.empty(count),
+            np.empty((count, 3)),
+        )
+        edge_places(
+            np.array(pose, dtype=float),
+            self._factors,
+            self.normals,
+            self._reach,
+            optics.axis_height,
+            optics.numbers,
+            pixels,
+            directions,
+            size,
+            slopes,
+        )
+        return pixels, directions, size, slopes
+
+
+def contour_of(robot: Robot, optics: Optics) -> Contour:
+    """The apparent edges of a robot's body.
+
+    Args:
+        robot: the robot.
+        optics: the camera.
+    """
+    outlines = {name: outline for name, outline in outlines_of(robot).items() if name in ("body", "coupling")}
+    outline, radius = outlines["body"], 0.5 * robot.body.diameter
+    spacing = 1.2 * optics.length_per_pixel
+    reach = _reach(robot, optics)
+    upright = Optics(optics.size, 1.0, optics.height, optics.axis_height, optics.surface, optics.index)
+
+    def on_plane(points: Samples, x: float, y: float) -> Samples:
+        moved = placed(points, BodyPose(-x, -y, 0.0), optics.axis_height)
+        found = upright.points(upright.pixels(moved), optics.axis_height)[:, :2]
+        return np.asarray(found + np.array([x, y]))
+
+    seal = _seal(robot, radius, max(spacing, 1.8 * radius / 80))
+    striped = len(seal) > 0
+    wide = np.arange(-_WIDE * radius, _WIDE * radius, max(spacing, 1.8 * radius / 80))
+    behind = wide[np.abs(wide) > 0.5 * robot.coupling.diameter + 1e-3]
+    sides = _sides(robot, outlines, spacing)
+    kinds = [("front", wide.size), ("rear", behind.size)]
+    for beside in ("left", "right"):
+        kinds += [(beside, stations.size) for _, _, stations in sides]
+    kinds.append(("seal", len(seal)))
+    count = sum(size for _, size in kinds)
+    nodes = [np.cos(np.pi * (np.arange(count) + 0.5) / count) for count in _NODES]
+    surfaces = {name: _surface(outline) for name, outline in outlines.items()}
+    found = np.empty((*_NODES, 2, count, 2))
+    for i, a in enumerate(nodes[0] * reach[0]):
+        for j, b in enumerate(nodes[1] * reach[1]):
+            hulls = {name: _hull(on_plane(surface, a, b)) for name, surface in surfaces.items()}
+            for level, sign in enumerate((1.0, -1.0)):
+                parts = []
+                for flat, stations, outward in ((_flat(outline, 0), wide, 1.0), (_flat(outline, -1), behind, -1.0)):
+                    if flat is None:
+                        parts.append(np.stack([_chain(hulls["body"], stations, outward, 1), stations], axis=1))
+                    else:  # where stripes end is seen from above, also when the flat end itself is in view
+                        upper = 1.0 if striped and outward < 0.0 else sign
+                        parts.append(_rim(flat, stations, upper, on_plane, a, b))
+                for outward in (1.0, -1.0):
+                    parts += [
+                        np.stack([stations, _chain(hulls[part], stations, outward, 0)], axis=1)
+                        for part, _, stations in sides
+                    ]
+                parts.append(on_plane(seal, a, b))
+                found[i, j, level] = np.concatenate(parts)
+    basis = np.einsum(
+        "ia,jb->ijab", chebyshev.chebvander(nodes[0], _ORDERS[0]), chebyshev.chebvander(nodes[1], _ORDERS[1])
+    ).reshape(_NODES[0] * _NODES[1], -1)
+    found = np.moveaxis(found, -1, -2)
+    factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0]
+    factors = np.ascontiguousarray(factors).reshape(*(order + 1 for order in _ORDERS), 4, count)
+    group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
+    # The near and the far rim of a flat end without stripes look alike, and move otherwise.
+    rear = "rear" if striped or _flat(outline, -1) is None else "bare rear"
+    trusted = [_TRUSTED[name] for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
+    floor = np.repeat(trusted, [size for _, size in kinds])
+    middle = found[_NODES[0] // 2, _NODES[1] // 2, 0].T
+    return Contour(group, _normals(middle, group), floor, factors, np.array(reach))
+
+
+def _reach(robot: Robot, optics: Optics) -> tuple[float, float]:
+    """How far from the body the lens can stand, along and across, m."""
+    width, height = optics.size
+    corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+    view = np.nanmax(np.abs(optics.points(corners, optics.axis_height)[:, :2]), axis=0)
+    far = float(np.hypot(*view)) * 0.3
+    return float(view[0] + robot.body.length + far), float(view[1] + 0.5 * robot.body.length + far)
+
+
+def _surface(outline: Outline) -> Samples:
+    """Points all over a solid of revolution, (k, 3), m."""
+    pieces = []
+    for piece in outline.pieces:
+        turn = 0.0 if isinstance(piece, Line) else abs(piece.angles[1] - piece.angles[0])
+        pieces.append(piece.points(np.linspace(0.0, 1.0, 2 + int(_PER_TURN * turn / (2.0 * np.pi)))))
+    x, rho = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    around = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)[:, None]
+    rings = np.broadcast_arrays(x[None, :], rho * np.cos(around), rho * np.sin(around))
+    return np.stack(rings, axis=-1).reshape(-1, 3)
+
+
+def _flat(outline: Outline, end: int) -> tuple[float, float] | None:
+    """Place along the axis and radius of a flat end's sharp rim; None if the end is round."""
+    piece = outline.pieces[end]
+    if isinstance(piece, Line) and piece.start[0] == piece.end[0] and outline.corners and outline.corners[end]:
+        return piece.start[0], max(piece.start[1], piece.end[1])
+    return None
+
+
+def _rim(flat: tuple[float, float], stations: Samples, sign: float, on_plane, a: float, b: float) -> Samples:  # type: ignore[no-untyped-def]
+    """A sharp rim above (sign 1) or below the axis."""
+    height = np.sqrt(flat[1] ** 2 - stations**2)
+    return np.asarray(on_plane(np.stack([np.full(stations.size, flat[0]), stations, sign * height], axis=1), a, b))
+
+
+def _sides(robot: Robot, outlines: dict[str, Outline], spacing: float) -> list[tuple[str, str, Samples]]:
+    """Part, kind and x of the edge points along the sides of body and coupling."""
+    found = []
+    half, seal = 0.5 * robot.body.length, robot.seal
+    low, high = _straight(outlines["body"])
+    if seal is not None and seal.stripes and low < seal.length - half:
+        middle, gap = seal.length - half, 0.05 * robot.body.length
+        found.append(("body", "striped side", _stations(low + 0.5 * gap, middle - 0.5 * gap, spacing)))
+        low = middle + gap
+    found.append(("body", "side", _stations(low, max(high - 0.03 * robot.body.length, low), spacing)))
+    if "coupling" in outlines and robot.coupling.diameter > 0.15 * robot.body.diameter:
+        low, high = _straight(outlines["coupling"])
+        inset = 0.15 * (high - low)
+        found.append(("coupling", "coupling", _stations(low + inset, high - inset, spacing)))
+    return found
+
+
+def _stations(low: float, high: float, spacing: float) -> Samples:
+    """Places along a stretch, not closer than a pixel nor more than sixty."""
+    if high <= low:
+        return np.empty(0)
+    return np.arange(low, high, max(spacing, (high - low) / 60))
+
+
+def _straight(outline: Outline) -> tuple[float, float]:
+    """Between which x a solid's sides run straight, or about so."""
+    widest = (
+        max(max(piece.start[1], piece.end[1]) for piece in outline.pieces if isinstance(piece, Line))
+        if any(isinstance(piece, Line) for piece in outline.pieces)
+        else 0.0
+    )
+    for piece in outline.pieces:
+        if isinstance(piece, Line) and piece.start[1] == piece.end[1] == widest and piece.start[0] != piece.end[0]:
+            return min(piece.start[0], piece.end[0]), max(piece.start[0], piece.end[0])
+    tips = [float(piece.points(np.full(1, t))[0][0]) for piece in outline.pieces for t in (0.0, 1.0)]
+    return 0.5 * min(tips), 0.5 * max(tips)
+
+
+def _seal(robot: Robot, radius: float, spacing: float) -> Samples:
+    """The visible front edge of the seal, (k, 3), m."""
+    if robot.seal is None or not robot.seal.stripes:
+        return np.empty((0, 3))
+    place = np.arange(-_SEEN_ARC, _SEEN_ARC, spacing / radius)
+    front = np.full(place.size, robot.seal.length - 0.5 * robot.body.length)
+    return np.stack([front, radius * np.sin(place), radius * np.cos(place)], axis=1)
+
+
+def _hull(points: Samples) -> Samples:
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def _chain(hull: Samples, stations: Samples, outward: float, along: int) -> Samples:
+    """Outermost coordinate of a convex polygon at stations of the other coordinate (`along`: 0 for x, 1 for y)."""
+    other = 1 - along
+    ends = int(np.argmin(hull[:, along])), int(np.argmax(hull[:, along]))
+    walks = []
+    for first, last in (ends, ends[::-1]):
+        count = (last - first) % len(hull)
+        walks.append(hull[(first + np.arange(count + 1)) % len(hull)])
+    heights = [walk[np.argsort(walk[:, along], kind="stable")] for walk in walks]
+    values = [np.interp(stations, walk[:, along], walk[:, other]) for walk in heights]
+    return np.asarray(np.maximum(*values) if outward > 0 else np.minimum(*values))
+
+
+def _normals(points: Samples, group: np.ndarray) -> Samples:
+    """Directions at right angles to the edges, outward; for the seal forward."""
+    normals = np.zeros_like(points)
+    for index, outward in enumerate(((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 0.0))):
+        inside = group == index
+        if GROUPS[index] in ("rear", "seal", "left", "right") or inside.sum() < 3:
+            normals[inside] = outward
+            continue
+        along = np.gradient(points[inside], axis=0)
+        turned = np.stack([along[:, 1], -along[:, 0]], axis=1)
+        turned *= np.sign(turned @ np.array(outward))[:, None]
+        normals[inside] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return normals

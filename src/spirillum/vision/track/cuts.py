@@ -1,0 +1,151 @@
+"""Films whose times do not fit what they show.
+
+Where a piece is missing though the times go on evenly, place, body and tail jump on the same frame. Where the times
+jump though nothing is missing, they go on as if no time had passed.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from spirillum.arrays import Samples
+from spirillum.vision.track.track import Flag
+from spirillum.vision.track.warnings import EVERYTHING
+
+__all__ = ["cuts_in", "jumps_of_time"]
+
+_AROUND = 8
+"""Frames before and after, through which the lines go that do not meet at a jump."""
+_CLEAR = 8.0
+"""Jump over the standard deviation of what is found elsewhere."""
+_PLACE, _ANGLE = 1.0, 0.12
+"""Least jump of the place, pixels, and of an angle, rad."""
+_GAP = 3.0
+"""Times between frames over the usual one, from which on a gap is honest and no line goes across."""
+_LONG = 30
+"""Readings before and after a gap, through which the lines go that tell whether time has passed."""
+_TOGETHER = 0.5
+"""Share of the least jump below which lines meet."""
+_UNSEEN = 20
+"""Frames without the robot over which lines go on, as it may be lost where it jumps."""
+
+
+def cuts_in(
+    time: Samples, x: Samples, body_angle: Samples, tail_phase: Samples, length_per_pixel: float
+) -> tuple[Flag, ...]:
+    """Moments at which two of place, body and tail jump together, as in no liquid this viscous.
+
+    Args:
+        time: s, (n,).
+        x: place along the channel, m, (n,); NaN where it is not known, as below.
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        length_per_pixel: m.
+    """
+    if time.size < 2:
+        return ()
+    usual = float(np.median(np.diff(time)))
+    jumps = [_jump(time, x, _PLACE * length_per_pixel, usual)]
+    jumps += [_jump(time, angle, _ANGLE, usual) for angle in (body_angle, tail_phase)]
+    moments = sorted(moment for moment in jumps if moment is not None)
+    for one, other in pairwise(moments):
+        if other - one < _GAP * usual:
+            sentence = (
+                f"robot, body and tail jump at {one:.2f} s while the times of the frames go on evenly: a piece of the "
+                "video is missing there; nothing is given (start and end of the setup choose a part of the video)"
+            )
+            return (Flag("video-is-cut", sentence, EVERYTHING),)
+    return ()
+
+
+def jumps_of_time(
+    time: Samples, x: Samples, body_angle: Samples, tail_phase: Samples, length_per_pixel: float, period: float
+) -> tuple[Flag, ...]:
+    """A jump of the time stamps over which place, body and tail go on as if no time had passed.
+
+    Args:
+        time: s, (n,).
+        x: place along the channel, m, (n,); NaN where it is not known, as below.
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        length_per_pixel: m.
+        period: of the stripes, rad.
+    """
+    if time.size < 2:
+        return ()
+    steps = np.diff(time)
+    usual, gap = float(np.median(steps)), int(np.argmax(steps))
+    if not steps[gap] > _GAP * usual:
+        return ()
+    closed = np.where(np.arange(time.size) > gap, time - (steps[gap] - usual), time)
+    series = (
+        (x, _PLACE * length_per_pixel, math.inf),
+        (body_angle, _ANGLE, period),
+        (tail_phase, _ANGLE, 2.0 * math.pi),
+    )
+    true, even = ([_miss(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
+    if sum(one > 1.0 for one in true) < 2 or not max(even) < _TOGETHER:
+        return ()
+    sentence = (
+        f"the times of the frames jump by {steps[gap]:.2f} s at {time[gap]:.2f} s, but body and tail go on as if no "
+        "time had passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
+    )
+    return (Flag("times-do-not-fit", sentence, EVERYTHING),)
+
+
+def _miss(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
+    """How far two lines miss each other in the middle of a gap after frame `gap`, over what says that they do.
+
+    That is `least` where they end half a frame before and after it, and more the farther they have to go; whole
+    periods are not known.
+    """
+    middle, far, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, []
+    for part in (slice(None, gap + 1), slice(gap + 1, None)):
+        known = np.flatnonzero(np.isfinite(values[part]))
+        known = known[-_LONG:] if part.start is None else known[:_LONG]
+        if known.size < _AROUND:
+            return 0.0
+        t, v = time[part][known], values[part][known]
+        spans = t - t.mean()
+        slope = float(spans @ v / (spans @ spans))
+        reached.append(float(v.mean()) + slope * (middle - float(t.mean())))
+        far += 0.5 * ((middle - float(t.mean())) / (0.5 * float(np.ptp(t)))) ** 2
+    return float(abs(math.remainder(reached[1] - reached[0], period)) / (least * max(1.0, math.sqrt(far))))
+
+
+def _jump(time: Samples, values: Samples, least: float, usual: float) -> float | None:
+    """When a series jumps most, s; None if it nowhere does."""
+    known = np.isfinite(values)
+    t, v = time[known], values[known]
+    if t.size < 4 * _AROUND:
+        return None
+    windows_t, windows_v = sliding_window_view(t, _AROUND), sliding_window_view(v, _AROUND)
+    middle_t, middle_v = windows_t.mean(axis=1), windows_v.mean(axis=1)
+    spans = windows_t - middle_t[:, None]
+    squares = np.sum(spans**2, axis=1)
+    slopes = np.sum(spans * windows_v, axis=1) / squares
+    splits = 0.5 * (t[_AROUND:-_AROUND] + t[_AROUND - 1 : -_AROUND - 1])
+    before, after = slice(None, splits.size), slice(_AROUND, _AROUND + splits.size)
+    far = [splits - middle_t[part] for part in (before, after)]
+    reached = [middle_v[part] + slopes[part] * away for part, away in zip((before, after), far, strict=True)]
+    # In units of what two lines miss each other by that end half a frame before and after the split.
+    unsure = sum(1.0 / _AROUND + away**2 / squares[part] for part, away in zip((before, after), far, strict=True))
+    steps = (reached[1] - reached[0]) / np.sqrt(unsure / np.min(unsure))
+    longest = sliding_window_view(np.diff(t), 2 * _AROUND - 1).max(axis=1)[: splits.size]
+    steps = np.where(_even(time, t, usual) & (longest < _UNSEEN * usual), steps, 0.0)
+    if not steps.any():
+        return None
+    spread = 1.4826 * float(np.median(np.abs(steps[steps != 0.0])))
+    largest = int(np.argmax(np.abs(steps)))
+    return float(splits[largest]) if abs(steps[largest]) > max(least, _CLEAR * spread) else None
+
+
+def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:
+    """Splits of the known frames at `t` about which the times of all frames go on evenly, (len(t) - 2 _AROUND,)."""
+    gaps = np.concatenate([[0], np.cumsum(np.diff(time) > _GAP * usual)])
+    place = np.searchsorted(time, t)
+    return np.asarray(gaps[place[2 * _AROUND - 1 : -1]] == gaps[place[: -2 * _AROUND]])

@@ -1,0 +1,182 @@
+"""The first look at a video: whether the robot is there, where, and what its edges look like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.vision.camera.optics import BodyPose, places_seen_by
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.search import Candidate, close_places, most_likely, refined
+from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
+from spirillum.vision.track.track import Flag
+from spirillum.vision.track.warnings import FULL_VIEW, rivals_in, turned_flags
+from spirillum.vision.video.frames import Frame
+
+__all__ = ["Start", "first_look", "on_the_way"]
+
+_THREADS = 2
+_SEARCHED = 8
+"""How many of the frames are searched for the robot without knowing anything."""
+_CLEAR = 1.6
+"""How much clearer the robot's edges are than those of anything else: score over that of the third best place."""
+_OFTEN = 0.25
+"""Share of the frames on which it has to be as clear as that."""
+_FAINT = 0.4
+"""Score of a robot over that on its best frames, below which it is not learnt from: it is partly out of view."""
+_WHOLE = 4
+"""Frames in full view that are enough to learn stripes and tail from."""
+_AGAIN = 3
+"""How often a body is learnt again at the size and place at which its outline lies."""
+_ALLOWED = "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the first look has told."""
+
+    body: BodyFinder = field(repr=False)
+    """The body, which has learnt, in front of a camera that shows it as large as it looks."""
+    size: float
+    """How large it looks, over the body that was looked for."""
+    seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
+    """Frames on which the robot was found, 8-bit RGB, and where."""
+    path: list[tuple[float, BodyPose]]
+    """When it was where."""
+    score: float
+    """How clear its edges usually are, grey per pixel."""
+    clearness: float
+    """How clearly it stands out: `spirillum.vision.track.size.clearness`."""
+    rivals: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
+    """Frames on which something else stands out as clearly, and where."""
+    flags: tuple[Flag, ...]
+
+    def expected(self, time: float) -> BodyPose:
+        """Where it should be at a time."""
+        return on_the_way(self.path, time)
+
+    def as_clear(self, score: float) -> bool:
+        """Whether edges are as clear as a robot's."""
+        return score > _FAINT * self.score
+
+
+class _Learnt(NamedTuple):
+    """Where the body is on the frames that it was learnt from."""
+
+    frames: list[Frame]
+    poses: list[BodyPose]
+    score: float
+    """How clear its edges usually are, grey per pixel."""
+    whole: list[bool]
+    """Whether it is in full view."""
+
+    @property
+    def typical(self) -> BodyPose:
+        """One of the places, from the middle."""
+        return self.poses[len(self.poses) // 2]
+
+
+def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samples) -> Start:
+    """Find the robot on some frames, and learn how large it is, within a tenth, and what its edges look like.
+
+    Args:
+        name: name of the video.
+        body: the robot's body, about as large as it looks.
+        frames: frames spread over the video.
+        still: what stands still in them, (h, w, 3).
+
+    Raises:
+        InputError: if there is no robot.
+    """
+    every = np.unique(np.linspace(0, len(frames) - 1, min(_SEARCHED, len(frames))).round().astype(int)).tolist()
+    images, focal = [frames[k].image for k in every], body.optics.focal
+    found = _places(body, images, still)
+    if not _clear(found):
+        raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
+    chosen = most_likely(found, body.robot.body.length)
+    rivals, flags = rivals_in(body, images, found, chosen), turned_flags(body, images, still, found, chosen)
+    known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
+    learnt = _learnt(name, body, _roughly(body, known, frames, still))
+    outline = outline_seen(body, learnt.typical)
+    for _ in range(_AGAIN):
+        if outline.fits(body.optics.length_per_pixel):
+            break
+        body, learnt = _relearnt(name, body, learnt, outline)
+        outline = outline_seen(body, learnt.typical)
+    size = body.optics.focal / focal * outline.size
+    every = range(len(learnt.poses))
+    whole = [k for k in every if learnt.whole[k]]
+    seen = [(learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= _WHOLE else every)]
+    path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
+    return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
+
+
+def _places(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> list[list[Candidate]]:
+    """The likeliest places on some frames."""
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+        return list(pool.map(lambda image: close_places(image, still, body.contour, body.optics, body.bounds), images))
+
+
+def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
+    """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
+    found = [
+        refined(
+            frame.image, still, Candidate(on_the_way(known, frame.time), 0.0), body.contour, body.optics, body.bounds
+        )
+        for frame in frames
+    ]
+    usual = float(np.quantile([one.score for one in found], 0.8))
+    clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > _FAINT * usual]
+    return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
+
+
+def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
+    """Learn from frames on which the places are known to a pixel or so.
+
+    Raises:
+        InputError: if it is clear on none.
+    """
+    times = np.array([frame.time for frame in about.frames])
+    found = body.learn([frame.image for frame in about.frames], about.poses, times)
+    good = [(frame, one) for frame, one in zip(about.frames, found, strict=True) if one.known]
+    if not good:
+        raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {_ALLOWED}")
+    whole = [one.inside >= FULL_VIEW for _, one in good]
+    return _Learnt([frame for frame, _ in good], [one.pose for _, one in good], about.score, whole)
+
+
+def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit) -> tuple[BodyFinder, _Learnt]:
+    """Learn again where the outline lies, in front of a camera that shows it as large as it looks."""
+    other = resized(body, outline.size) if outline.resizes else body
+    moved = np.array(learnt.poses) + np.array(outline.move)
+    there = places_seen_by(other.optics, body.optics, moved[:, :2])
+    poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
+    return other, _learnt(name, other, _Learnt(learnt.frames, poses, learnt.score, learnt.whole))
+
+
+def _clear(found: Sequence[list[Candidate]]) -> bool:
+    """Whether something stands out of the pictures as a robot does."""
+    clear = [len(some) > 0 and (len(some) < 3 or some[0].score > _CLEAR * some[2].score) for some in found]
+    return float(np.mean(clear)) >= _OFTEN
+
+
+def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
+    """Where the body should be at a time, by straight lines between and beyond known places."""
+    times = np.array([at for at, _ in known])
+    poses = np.array([pose for _, pose in known])
+    if len(known) == 1:
+        return BodyPose(*poses[0].tolist())
+    if times[0] <= time <= times[-1]:
+        return BodyPose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
+    few = slice(0, 4) if time < times[0] else slice(-4, None)
+    span = times[few] - times[few].mean()
+    slope = span @ (poses[few] - poses[few].mean(axis=0)) / max(float(span @ span), 1e-12)
+    edge = 0 if time < times[0] else -1
+    there = poses[edge] + slope * (time - times[edge]) * np.array([1.0, 1.0, 0.0])
+    return BodyPose(*there.tolist())

@@ -1,0 +1,201 @@
+"""From a video and its setup to a track: scale, looks, then one frame after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.camera import bounds_of, opened, samples_of, scale_of, sight_of
+from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
+from spirillum.vision.camera.ruler import still_picture
+from spirillum.vision.camera.scale import Sight
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.body import BodyFinder, Placed
+from spirillum.vision.track.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.first_look import Start, on_the_way
+from spirillum.vision.track.identity import Introduced, introduced
+from spirillum.vision.track.search import candidates, refined
+from spirillum.vision.track.size import doubted
+from spirillum.vision.track.steadiness import camera_flags
+from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.unwrapping import contradictions, nothing_moves, unwrapped
+from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
+from spirillum.vision.video.frames import Frame, Video
+
+__all__ = ["Seen", "follow", "scale_of"]
+
+_LOOK_AGAIN = 15
+"""Frames between two searches of the whole picture for a robot that was lost."""
+_MEMORY = 12
+"""Frames from which the next place is guessed."""
+
+
+class Seen(NamedTuple):
+    """What was seen on one frame, for whoever draws it."""
+
+    time: float
+    """s."""
+    pose: BodyPose | None
+    """Where the body is in the camera's frame; None where it was not seen."""
+    body_angle: float
+    """rad, modulo the stripes' period; NaN where it could not be read."""
+    tail_phase: float
+    """rad, modulo 2 pi; NaN where it could not be read."""
+    optics: Optics
+    """The camera."""
+
+
+@dataclass
+class _Row:
+    """What is kept of the frames."""
+
+    time: list[float] = field(default_factory=list)
+    index: list[int] = field(default_factory=list)
+    placed: list[Placed] = field(default_factory=list)
+    roll: list[tuple[float, float]] = field(default_factory=list)
+    tail: list[tuple[float, float]] = field(default_factory=list)
+
+
+def follow(
+    video: str | Path | Video,
+    setup: Setup,
+    robot: Robot,
+    *,
+    folder: Path | None = None,
+    progress: Callable[[int, int | None], None] | None = None,
+    on_frame: Callable[[int, np.ndarray, Seen], None] | None = None,
+) -> Track:
+    """Follow a robot through a video.
+
+    Args:
+        video: the film, or a folder of images.
+        setup: what the experimenter knows.
+        robot: the robot in front of the camera.
+        folder: folder of the setup file, where a checkerboard's pictures lie; unset: the present one.
+        progress: called with the number of frames done and of all, where that is known.
+        on_frame: called with each frame's number, its picture (8-bit RGB) and what was seen on it.
+
+    Raises:
+        InputError: if the video cannot be read, or neither ruler nor robot is found in it.
+    """
+    video = opened(video, setup)
+    frames = samples_of(video, setup)
+    images = [frame.image for frame in frames]
+    still = still_picture(images)
+    sight = sight_of(video, setup, still, folder)
+    bounds = bounds_of(setup, video)
+    known = introduced(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
+    start, stripes, wire = known.start, known.stripes, known.wire
+    body, rows = start.body, _Row()
+    aside = ThreadPoolExecutor(1)  # ends while the frames are followed
+    moved = aside.submit(camera_flags, frames, start, ruled=setup.markers.spacing is not None)
+    aside.shutdown(wait=False)
+    total = video.count
+    for frame in video.frames(setup.start, setup.end):
+        found = _placed(body, frame, _guess(rows, frame.time), start)
+        if not found.known and len(rows.time) % _LOOK_AGAIN == 0:
+            found = _searched(body, frame.image, still, start, found)
+        read = (np.nan, np.nan), (np.nan, np.nan)
+        if found.known:
+            read = stripes.read(frame.image, found.pose), wire.read(frame.image, found.pose)
+        rows.time.append(frame.time)
+        rows.index.append(frame.index)
+        rows.placed.append(found)
+        rows.roll.append(read[0])
+        rows.tail.append(read[1])
+        if on_frame is not None:
+            pose = found.pose if found.known else None
+            on_frame(frame.index, frame.image, Seen(frame.time, pose, read[0][0], read[1][0], body.optics))
+        if progress is not None:
+            progress(len(rows.time), total)
+    every = (*video.flags, *sight.flags, *moved.result(), *known.flags, *start.flags, *stripes.flags, *wire.flags)
+    return _track(video, setup, sight, known, rows, every)
+
+
+def _guess(rows: _Row, time: float) -> BodyPose | None:
+    """Where the body should be, from the frames before; None where it was not seen on the last one."""
+    last = [(at, one.pose) for at, one in zip(rows.time[-_MEMORY:], rows.placed[-_MEMORY:], strict=True) if one.known]
+    if len(last) < 2 or not rows.placed[-1].known:
+        return None
+    return on_the_way(last, time)
+
+
+def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start) -> Placed:
+    """The body near a guess, or else where it should be; not seen if it would have jumped."""
+    found, far = None, 4.0 * body.optics.length_per_pixel
+    if guess is not None:
+        found = body.place(frame.image, guess)
+        if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+            return found
+    expected = start.expected(frame.time)
+    again = body.place(frame.image, expected)
+    if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
+        return again
+    return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
+
+
+def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
+    """The body anywhere in a picture."""
+    for candidate in candidates(image, still, body.contour, body.optics, body.bounds)[:2]:
+        better = refined(image, still, candidate, body.contour, body.optics, body.bounds)
+        if start.as_clear(better.score):
+            found = body.place(image, better.pose)
+            if found.known:
+                return found
+    return lost
+
+
+def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _Row, flags: tuple[Flag, ...]) -> Track:
+    body, time = known.start.body, np.array(rows.time)
+    seen = np.array([one.known for one in rows.placed])
+    pose = np.where(seen[:, None], np.array([one.pose for one in rows.placed]), np.nan)
+    errors = np.array([one.error for one in rows.placed])
+    roll, tail = np.array(rows.roll), np.array(rows.tail)
+    optics = body.optics  # shows the body as large as it looks; lengths are those of the stated scale
+    seen_flags = sight_flags(time, pose, errors, rows.placed, optics, setup)
+    cut = cut_off(rows.placed)
+    pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
+    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
+    tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
+    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    scale, size_flags = doubted(sight.scale, body, known.size)
+    hand = known.wire.handedness()
+    motion = time, body_angle, tail_phase, position[:, 0], body.robot
+    odd = (*nothing_moves(*motion), *contradictions(*motion, hand))
+    series = time, position[:, 0], body_angle, tail_phase, optics.length_per_pixel
+    cuts = (*cuts_in(*series), *jumps_of_time(*series, known.stripes.period))
+    frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
+    return Track(
+        time=time,
+        frame=frame,
+        position=position,
+        heading=pose[:, 2],
+        body_angle=body_angle,
+        tail_phase=tail_phase,
+        position_error=errors[:, 0] * optics.focal / sight.optics.focal,
+        body_angle_error=np.where(np.isfinite(body_angle), roll[:, 1], np.nan),
+        tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
+        picture=_drawn(pose, body.robot, optics),
+        size=video.size,
+        scale=scale,
+        setup=setup,
+        video=video.name,
+        words=video.words,
+        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *cuts, *roll_flags, *tail_flags, *odd),
+    )
+
+
+def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
+    """Pixels of the body's mid-length and of its nose on every frame, (n, 4)."""
+    axis = np.array([[0.0, 0.0, 0.0], [0.5 * robot.body.length, 0.0, 0.0]])
+    out = np.full((len(pose), 4), np.nan)
+    for k in np.flatnonzero(np.isfinite(pose[:, 0])):
+        out[k] = optics.pixels(placed(axis, BodyPose(*pose[k].tolist()), optics.axis_height)).ravel()
+    return out

@@ -1,0 +1,342 @@
+"""The phase of the tail on each frame, from the wire's picture: a travelling wave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.kernels.pictures import sampled
+from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.track import Flag
+
+__all__ = ["TailWave"]
+
+_TAIL = ("tail_rotation_rate",)
+_PHASES = 40
+"""Phases that are tried on every frame."""
+_EVERY = 3
+"""Rows of the strip from one to the next one that is looked at there."""
+_COARSE = 13
+"""Places along the tail at which the optics are asked."""
+_SHARE = 0.4
+"""Least share of the wire that has to be where it should be."""
+_RIVAL = 0.85
+"""Largest score of another phase over the best one."""
+_OFFSET, _LEAN = 0.3, 0.02
+"""Likely sideways offset of the tail, in widths of the wire, and tilt, rad."""
+_FLOOR = 0.004
+"""What the tail's shape is trusted to, rad."""
+_CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
+"""Weights of red, green and blue that are tried first: a darker, brighter, more yellow, ... wire than its sides."""
+_FACTORS = np.arange(0.60, 1.66, 0.03)
+"""Wavelengths that are tried, over that of the robot file."""
+_AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
+"""Amplitudes that are tried with them where the tail does not fit, over that of the robot file."""
+
+
+class _Strip(NamedTuple):
+    """Where the tail is in the picture."""
+
+    middle: Samples
+    """Pixel of the axis in each row, (rows, 2)."""
+    across: Samples
+    """Pixels from one column to the next, (rows, 2)."""
+    tilt: Samples
+    """How the picture moves along (e) and across (f) and grows (g) with height, (rows, 3)."""
+
+
+class TailWave:
+    """Reads the phase phi of the tail in the lab, modulo 2 pi.
+
+    Known are the wave's length, amplitude, taper and hand from the robot; unknown the phase, and a small sideways
+    offset and tilt of the tail. A picture shows which way the wave travels; the hand makes a sense of rotation of it.
+    The hand itself shows too, weakly: what is higher looks larger and further from the middle of the picture.
+    """
+
+    period = 2.0 * np.pi
+
+    def __init__(self, robot: Robot, setup: Setup, optics: Optics) -> None:  # noqa: ARG002 - as Stripes
+        self.robot, self.optics = robot, optics
+        tail = robot.tail
+        root = 0.5 * robot.body.length + robot.coupling.length
+        wavenumber = 2.0 * np.pi / tail.wavelength
+        self.wave = np.array(
+            [
+                -robot.hand * wavenumber,
+                -robot.hand * wavenumber * root,
+                0.0 if tail.taper is None else tail.taper / tail.length,
+                tail.amplitude,
+            ]
+        )
+        pixel = optics.length_per_pixel
+        first = min(2.0 * tail.wire_diameter, 0.1 * tail.length)
+        rows = int(np.clip(round((tail.length - first) / (1.2 * pixel)), 40, 400))
+        self.xi = np.linspace(first, tail.length, rows)
+        step = float(np.clip(0.25 * tail.wire_diameter, 0.4 * pixel, pixel))
+        self.inner = max(1, round(0.5 * tail.wire_diameter / step))
+        reach = tail.amplitude + 3.0 * max(tail.wire_diameter, 2.0 * pixel)
+        self.columns = 1 + 2 * int(np.ceil(reach / step))
+        self.step = step
+        self.width = max(tail.wire_diameter, 2.0 * pixel)
+        self.contrast: Samples | None = None
+        self.usual = 0.0
+        self.readable = 0.0
+        self._flags: list[Flag] = []
+        self._hand: list[tuple[float, float]] = []
+        coarse = np.linspace(first, tail.length, _COARSE)
+        from scipy.interpolate import CubicSpline
+
+        self._between = np.ascontiguousarray(CubicSpline(coarse, np.eye(_COARSE))(self.xi))
+        b = self.lift = tail.amplitude
+        corners = np.array([[0, 0], [b, 0], [-b, 0], [0, b], [0, -b], [b, b], [-b, -b], [b, -b], [-b, b]], dtype=float)
+        x = np.broadcast_to((-root - coarse)[:, None], (_COARSE, len(corners)))
+        y, z = (np.broadcast_to(corners[:, k], x.shape) for k in (0, 1))
+        self._points = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+        self._slope = np.gradient(np.eye(_COARSE), coarse[1] - coarse[0], axis=0, edge_order=2)
+
+    def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
+        """Find out how the wire differs from what is around it, and whether it is the robot's.
+
+        Args:
+            samples: pictures, 8-bit RGB (h, w, 3), and where the body is in each.
+        """
+        strips = [(image, self._strip(pose)) for image, pose in samples]
+        best, chosen = 0.0, None
+        for weights in _CONTRASTS:
+            contrast = np.array(weights, dtype=float)
+            contrast /= np.linalg.norm(contrast)
+            found = np.array([self._clearness(image, strip, contrast) for image, strip in strips])
+            found = found[np.isfinite(found)]
+            clear = float(found.mean()) if found.size else 0.0
+            if clear > best:
+                best, chosen = clear, contrast
+        self.contrast = chosen
+        if chosen is None:
+            self._flags = [self._unseen()]
+            return
+        for _ in range(2):
+            self.usual = 0.0
+            self._sharpen(strips)
+        fits = np.array([self._fit(image, strip)[0] for image, strip in strips])
+        readable = fits[:, 2] > _SHARE
+        self.readable = float(np.mean(readable))
+        self._check_shape(strips, fits[readable], self.readable)
+        if self.readable < 0.2 and not self._flags:
+            self._flags = [self._unseen()]
+
+    def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
+        """Phase of the tail and its standard error, rad; NaN where it cannot be read.
+
+        Args:
+            image: the picture, 8-bit RGB (h, w, 3).
+            pose: where the body is in it.
+        """
+        found, hand = self._reading(image, pose)
+        if hand is not None:
+            self._hand.append(hand)
+        return found
+
+    def reads(self, image: np.ndarray, pose: BodyPose) -> bool:
+        """Whether a tail like the robot's is there; nothing is kept of it."""
+        return bool(np.isfinite(self._reading(image, pose)[0][0]))
+
+    def _reading(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float] | None]:
+        """Phase and its error, and what is said of the hand."""
+        nothing = (np.nan, np.nan), None
+        if self.contrast is None:
+            return nothing
+        answer, rival = self._fit(image, self._strip(pose))
+        if not np.isfinite(answer[:2]).all() or answer[2] < _SHARE or rival > _RIVAL:
+            return nothing
+        hand = (float(answer[5]), float(answer[6])) if answer[6] > 0.0 else None
+        return (float(answer[0] % (2.0 * np.pi)), float(np.hypot(answer[1], _FLOOR))), hand
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """What was odd, including the hand that the frames read so far show."""
+        flags = list(self._flags)
+        if self.handedness() == -1:
+            hand = self.robot.tail.handedness
+            sentence = (
+                f"the tail looks {'left' if hand == 'right' else 'right'}-handed, by how perspective shows what is "
+                f"higher, but tail.handedness is '{hand}'; its sense of rotation, and so its rate, is not given"
+            )
+            flags.append(Flag("handedness", sentence, _TAIL))
+        return tuple(flags)
+
+    def handedness(self) -> int:
+        """1 where perspective shows the hand of the robot file, -1 where the other one, 0 where it does not show."""
+        if len(self._hand) < 20:
+            return 0
+        top, bottom = np.array(self._hand).T
+        misfit = top.sum() / bottom.sum()
+        rest = top - misfit * bottom
+        blocks = np.array_split(rest, min(12, rest.size // 5))  # frames near each other err alike
+        sums = np.array([block.sum() for block in blocks])
+        error = np.sqrt(np.sum(sums**2)) / bottom.sum()
+        if abs(misfit + 1.0) < max(4.0 * error, 0.35):
+            return 0
+        return 1 if misfit > -1.0 else -1
+
+    def _unseen(self) -> Flag:
+        return Flag("tail-unreadable", "the wire of the tail is not seen, so that its rotation is not given", _TAIL)
+
+    def _strip(self, pose: BodyPose) -> _Strip:
+        pixels = seen(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
+        b = self.lift
+        axis = pixels[:, 0]
+        y = (pixels[:, 1] - pixels[:, 2]) / (2.0 * b)
+        z = (pixels[:, 3] - pixels[:, 4]) / (2.0 * b)
+        yz = (pixels[:, 5] + pixels[:, 6] - pixels[:, 7] - pixels[:, 8]) / (4.0 * b * b)
+        along = self._slope @ axis
+        det = along[:, 0] * y[:, 1] - along[:, 1] * y[:, 0]
+        e = (z[:, 0] * y[:, 1] - z[:, 1] * y[:, 0]) / det
+        f = (along[:, 0] * z[:, 1] - along[:, 1] * z[:, 0]) / det
+        g = (along[:, 0] * yz[:, 1] - along[:, 1] * yz[:, 0]) / det
+        fine = self._between @ np.column_stack([axis, y * self.step, e, f, g])
+        return _Strip(
+            np.ascontiguousarray(fine[:, :2]), np.ascontiguousarray(fine[:, 2:4]), np.ascontiguousarray(fine[:, 4:])
+        )
+
+    def _ridge(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> Samples:
+        ridge = np.empty((self.xi.size, self.columns))
+        ridge_of(image, strip.middle, strip.across, contrast, self.inner, ridge)
+        return ridge
+
+    def _scores(self, ridge: Samples, strip: _Strip, wave: Samples) -> Samples:
+        scores = np.empty(_PHASES)
+        wave_scores(ridge, self.xi, strip.tilt, wave, self.step, _EVERY, scores)
+        return scores
+
+    def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
+        """How far the best phase stands out, in units of what the strip has elsewhere."""
+        ridge = self._ridge(image, strip, contrast)
+        scores = self._scores(ridge, strip, self.wave)
+        if not np.isfinite(scores).all():
+            return np.nan
+        return float((scores.max() - np.median(scores)) / (np.sqrt(np.nanmean(ridge**2)) + 0.5))
+
+    def _fit(self, image: np.ndarray, strip: _Strip) -> tuple[Samples, float]:
+        """The answer of `wave_fit` and the best score of another phase over the best one."""
+        answer = np.full(10, np.nan)
+        answer[2] = 0.0
+        if self.contrast is None:
+            return answer, np.inf
+        ridge = self._ridge(image, strip, self.contrast)
+        scores = self._scores(ridge, strip, self.wave)
+        if not np.isfinite(scores).all() or scores.max() <= 0.0:
+            return answer, np.inf
+        best = int(np.argmax(scores))
+        apart = np.abs((np.arange(_PHASES) - best + _PHASES // 2) % _PHASES - _PHASES // 2) > _PHASES / 6
+        likely = _OFFSET * self.width, _LEAN * (self.xi[-1] - self.xi[0])
+        settings = (2.0 * np.pi * best / _PHASES, self.step, self.width, self.usual, *likely)
+        wave_fit(ridge, self.xi, strip.tilt, self.wave, settings, answer)
+        return answer, float(scores[apart].max() / scores[best])
+
+    def _curve(self, strip: _Strip, answer: Samples) -> Samples:
+        """Pixels of the fitted wire, (rows, 2), to first order in the height."""
+        wave = self.wave
+        r = wave[3] * (1.0 - np.exp(-(wave[2] if wave[2] > 0 else 1e12) * self.xi))
+        a = wave[0] * self.xi + wave[1] + answer[0]
+        y = r * np.cos(a) + answer[3] + answer[4] * (self.xi - self.xi.mean())
+        z = r * np.sin(a)
+        e, f, g = strip.tilt.T
+        sideways = (y + f * z + g * y * z) / self.step
+        along = np.gradient(strip.middle, self.xi, axis=0)
+        return np.asarray(strip.middle + sideways[:, None] * strip.across + (e * z)[:, None] * along)
+
+    def _sharpen(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> None:
+        """The contrast of the wire to what is on both sides of it, in the colours that tell them apart best."""
+        steps, spreads, peaks = [], [], []
+        for image, strip in strips:
+            answer, rival = self._fit(image, strip)
+            if answer[2] < 0.3 or rival > 0.95:
+                continue
+            curve = self._curve(strip, answer)
+            colours = []
+            for shift in (0.0, 1.6, -1.6, 2.2, -2.2):
+                found = np.empty((len(curve), 3))
+                sampled(image, curve + shift * self.width / self.step * strip.across, found)
+                colours.append(found)
+            sides = np.stack(colours[1:])
+            rest = sides.reshape(-1, 3)
+            rest = rest[np.isfinite(rest).all(axis=1)]
+            if not len(rest):
+                continue
+            steps.append(np.nanmedian(colours[0] - sides.mean(axis=0), axis=0))
+            rest -= rest.mean(axis=0)
+            spreads.append(rest.T @ rest / len(rest))
+        if steps:
+            step = np.median(steps, axis=0)
+            noise = np.median(spreads, axis=0) + 9.0 * np.eye(3)
+            contrast = np.linalg.solve(noise, step)
+            self.contrast = np.asarray(contrast / np.linalg.norm(contrast))
+        for image, strip in strips:
+            answer, _ = self._fit(image, strip)
+            if answer[2] > 0.3:
+                peaks.append(answer[9])
+        self.usual = 0.5 * float(np.median(peaks)) if peaks else 0.0
+
+    def _check_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]], fits: Samples, readable: float) -> None:
+        """Compare other wavelengths and amplitudes with those of the robot file."""
+        if self.contrast is None:
+            return
+        few = strips[:: max(1, len(strips) // 12)]
+        ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in few]
+        scores = self._likeness(ridges, 1.0)
+        if scores is None:
+            return
+        own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
+        if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
+            spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
+            sentence = f"the tail does not look as the robot file says{self._seen_shape(few)}: check the file; " + (
+                "the tail's rotation is not given" if spoils else "its rotation is read all the same"
+            )
+            self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
+            return
+        tail = self.robot.tail
+        if len(fits):
+            share = float(fits[:, 7].sum() / max(fits[:, 8].sum(), 1e-300))
+            if abs(share) > 0.2:
+                sentence = (
+                    f"the tail's amplitude looks like {(1.0 + share) * tail.amplitude * 1e3:.1f} mm or further from "
+                    f"that of the file, {tail.amplitude * 1e3:.3g} mm: check it; its rotation is read all the same"
+                )
+                self._flags.append(Flag("tail-does-not-fit", sentence))
+
+    def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> str:
+        """The wavelength and amplitude that look likeliest, in whatever colours, in words; empty if none does."""
+        tail, found = self.robot.tail, []
+        for weights in _CONTRASTS:
+            contrast = np.array(weights) / np.linalg.norm(weights)
+            ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
+            ridges = [(ridge / (np.sqrt(np.mean(np.nan_to_num(ridge) ** 2)) + 0.5), strip) for ridge, strip in ridges]
+            for amplitude in _AMPLITUDES:
+                likeness = self._likeness(ridges, amplitude)
+                if likeness is not None:
+                    found.append((likeness.max(), _FACTORS[int(np.argmax(likeness))], amplitude))
+        score, wavelength, amplitude = max(found, default=(0.0, 1.0, 1.0))
+        if score <= 0.0:
+            return ""
+        seen = []
+        for name, factor, least in (("wavelength", wavelength, 0.07), ("amplitude", amplitude, 0.0)):
+            if abs(factor - 1.0) > least:
+                given = getattr(tail, name) * 1e3
+                seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
+        return f" ({'; '.join(seen)})" if seen else ""
+
+    def _likeness(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
+        """How well waves of `_FACTORS` times the wavelength fit; None where too little of the tail is in view."""
+        found = []
+        for ridge, strip in ridges:
+            waves = [self.wave * np.array([1.0 / factor, 1.0 / factor, 1.0, amplitude]) for factor in _FACTORS]
+            scores = np.array([self._scores(ridge, strip, wave).max() for wave in waves])
+            if np.isfinite(scores).all():
+                found.append(scores)
+        return np.sum(found, axis=0) if found else None

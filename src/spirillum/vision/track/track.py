@@ -1,0 +1,83 @@
+"""What was seen of a robot on every frame of a video."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from spirillum.arrays import Samples
+from spirillum.vision.setup import Setup
+
+__all__ = ["Flag", "Scale", "Track"]
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Something about a video that whoever uses its numbers has to know."""
+
+    name: str
+    """Short, for machines, such as `robot-left-the-view`."""
+    sentence: str
+    """One sentence for people: what was seen, when, and what follows for the numbers."""
+    spoils: tuple[str, ...] = ()
+    """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large a length at the height of the robot's axis is in the picture."""
+
+    length_per_pixel: float
+    """m per pixel at the height of the robot's axis, in the middle of the picture."""
+    relative_uncertainty: float
+    """Standard uncertainty of all lengths, relative: heights, index, spacing and how well the lines were found."""
+    sources: dict[str, float]
+    """Its parts by name, such as `robot.axis_height`, relative; they add up in squares."""
+    markers: int
+    """Number of lines of the ruler that were found; 0 where the scale was given."""
+    residual: float
+    """Root mean square distance of the lines from where the fit has them, pixels; NaN without a ruler."""
+    apparent_size: float = math.nan
+    """Size of the body in the picture over that of its file at this scale; NaN where it was not looked at."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A robot on every frame; NaN where it was not seen. SI.
+
+    The frame has x along the channel towards the nose, z towards the camera, y = z x x; its origin lies in the middle
+    of the picture, at the height of the robot's axis. All angles are signed about +x (or, for the heading, about +z).
+    """
+
+    time: Samples = field(repr=False)
+    """Time of each frame in the video, s, (n,)."""
+    frame: Samples = field(repr=False)
+    """Number of each frame in the video, counted as it was recorded where that is known, (n,)."""
+    position: Samples = field(repr=False)
+    """The body's mid-length (x, y), m, (n, 2)."""
+    heading: Samples = field(repr=False)
+    """Angle of the motor axis to the x axis in the plane of the picture, rad, (n,)."""
+    body_angle: Samples = field(repr=False)
+    """Angle by which the body has turned about +x, unwrapped, rad, (n,)."""
+    tail_phase: Samples = field(repr=False)
+    """Phase phi of the tail about +x in the lab, unwrapped, rad, (n,)."""
+    position_error: Samples = field(repr=False)
+    """Estimated standard error of the x position on each frame, m, (n,)."""
+    body_angle_error: Samples = field(repr=False)
+    """Estimated standard error of the body's angle on each frame, rad, (n,)."""
+    tail_phase_error: Samples = field(repr=False)
+    """Estimated standard error of the tail's phase on each frame, rad, (n,)."""
+    picture: Samples = field(repr=False)
+    """For drawing: pixel (u, v) of the body's mid-length and of its nose, (n, 4)."""
+    size: tuple[int, int]
+    """Width and height of the picture, pixels."""
+    scale: Scale
+    """Scale of lengths."""
+    setup: Setup = field(repr=False)
+    """The setup that it was measured with."""
+    video: str
+    """Name of the video."""
+    flags: tuple[Flag, ...] = ()
+    """What to know about it."""
+    words: str = ""
+    """What the video's file says of itself, such as that it is synthetic."""

@@ -1,0 +1,365 @@
+"""From angles within a period to angles that go on, and what no camera can tell.
+
+Frames taken at even times show a rate, or one that is greater by any number of periods a frame: nothing in them tells
+which. The smallest one is taken. What can betray a faster one is looked for: a step from frame to frame near half a
+period, steps without order, times that are not even, and a body that turns with its tail instead of against it.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+from spirillum.units import show
+from spirillum.vision.setup import Setup, stripes_of
+from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.track import Flag
+
+__all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
+
+LARGEST_STEP = 0.45
+"""Step from frame to frame, in periods, from which on its sense is doubtful."""
+_ORDER = 0.6
+"""Least length of the mean of the steps as unit vectors: less is no rotation."""
+_STRAY = 0.3
+"""Distance from where an angle should be, in periods, that makes it a stray reading."""
+_START = 40
+"""Steps from which the first rate is found."""
+_LOST = 6
+"""Stray readings in a row after which the rate is found anew."""
+_GAIN, _RATE_GAIN = 0.5, 0.08
+"""How far angle and rate follow each reading."""
+_DRIFT = 0.05
+"""Change of the rate over a gap, relative, that has to be reckoned with."""
+_TURNED = 0.35
+"""Least angle, rad, that counts as turning when two senses of rotation are compared."""
+_RESTS, _STILL = 0.005, 0.02
+"""Least way, over the body's length, and turn, rad, of something that is not a part of the background."""
+_LEAP, _FEW_LEAPS, _NEAR_STEPS = np.radians(25.0), 2, 9
+"""Steps of the body beside the median of nine around it, from which on it leaps, and how many say that it is misread.
+
+On rendered films with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and more."""
+_RARELY = 0.1
+"""Share of the frames on which angles have to be read."""
+_FEW_FRAMES = 10
+"""Frames on which something has to rest to be taken for a part of the background."""
+_WALLS = 1.5
+"""What walls may add to the largest advance of a helix in a turn."""
+
+_Part = Literal["body", "tail"]
+_RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
+
+
+class Resolvable(NamedTuple):
+    """Largest rates that a camera resolves, rad/s."""
+
+    tail: float
+    """Half a turn of the tail a frame."""
+    body: float
+    """Half a period of the stripes a frame; NaN without stripes."""
+
+
+def nyquist(setup: Setup, robot: Robot, frames_per_second: float) -> Resolvable:
+    """Largest rates of tail and body whose sense a camera resolves, rad/s.
+
+    Args:
+        setup: the setup; its stripes stand before those of the robot.
+        robot: the robot.
+        frames_per_second: 1/s.
+    """
+    stripes = stripes_of(setup, robot)
+    body = 0.5 * pattern_period(stripes) * frames_per_second if len(set(stripes)) > 1 else np.nan
+    return Resolvable(np.pi * frames_per_second, body)
+
+
+def unwrapped(
+    time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body"
+) -> tuple[Samples, tuple[Flag, ...]]:
+    """Angles that go on over many periods, NaN where they are unknown or stray, and flags.
+
+    Every angle goes to the turn that is nearest to where the ones before lead, by their times, over gaps too.
+
+    Args:
+        time: time of each frame, s, (n,).
+        angle: angle modulo `period`, rad, NaN where not read, (n,).
+        error: standard error of each, rad, (n,).
+        period: of the angle, rad.
+        part: `body` or `tail`, for the flags.
+    """
+    out = np.full(angle.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(angle) & np.isfinite(time))
+    if known.size < 4:
+        return out, (_unread(part, known.size, angle.size),)
+    t, a = time[known], angle[known] % period
+    dt = float(np.median(np.diff(t)))
+    rate, order = _rate(t, a, period, dt)
+    flags: list[Flag] = []
+    if known.size < 0.5 * angle.size:
+        flags.append(_unread(part, known.size, angle.size))
+    if abs(rate) * dt > LARGEST_STEP * period:
+        flags.append(_too_fast(part, rate, dt, period))
+    elif (other := _better_alias(t, a, period, dt, rate)) is not None:
+        flags.append(_other_rate(part, rate, other))
+    elif order < _ORDER and _local_order(t, a, period, dt) < _ORDER:  # a start or stop is in order at each time
+        flags.append(_jumps(part))
+    values, doubtful = _followed(t, a, error[known], period, dt)
+    if doubtful:
+        flags.append(
+            Flag(
+                f"{part}-turns-lost",
+                f"between {doubtful[0]:.1f} s and {doubtful[1]:.1f} s the {part} was not seen for so long that whole "
+                "turns may be missing from its angle",
+            )
+        )
+    if part == "body" and (count := _leaps(t, values, dt)) >= _FEW_LEAPS:
+        flags.append(_wrong_stripes(count))
+    out[known] = values
+    return out, tuple(flags)
+
+
+def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples) -> Samples:
+    """How well the steps agree with each rate: mean cosine of what is left of them, 1 at best."""
+    steps, spans = np.diff(a), np.diff(t)
+    near = (spans > 0) & (spans < 3.5 * dt)
+    turns = (steps[near] - rates[:, None] * spans[near]) / period
+    return np.asarray(np.mean(np.cos(2 * np.pi * turns), axis=1) if near.any() else np.zeros(rates.size))
+
+
+def _rate(t: Samples, a: Samples, period: float, dt: float) -> tuple[float, float]:
+    """The rate within half a period a frame by which most steps agree, and how well they do."""
+    rates = np.linspace(-0.5, 0.5, 241) * period / dt
+    length = _resultant(t, a, period, dt, rates)
+    best = rates[int(np.argmax(length))]
+    rates = best + np.linspace(-1.0, 1.0, 21) / 240 * period / dt
+    fine = _resultant(t, a, period, dt, rates)
+    return float(rates[int(np.argmax(fine))]), float(fine.max())
+
+
+def _local_order(t: Samples, a: Samples, period: float, dt: float) -> float:
+    """How well the steps agree within short stretches."""
+    starts = range(0, max(1, t.size - 10), 20)
+    return float(np.median([_rate(t[k : k + 20], a[k : k + 20], period, dt)[1] for k in starts]))
+
+
+def _better_alias(t: Samples, a: Samples, period: float, dt: float, rate: float) -> float | None:
+    """A rate that is greater by whole periods a frame and that uneven times agree with better."""
+    others = rate + np.array([-3, -2, -1, 1, 2, 3]) * period / dt
+    length = np.array(
+        [_resultant(t, a, period, dt, other + np.linspace(-0.02, 0.02, 41) * period / dt).max() for other in others]
+    )
+    own = _resultant(t, a, period, dt, rate + np.linspace(-0.02, 0.02, 41) * period / dt).max()
+    best = int(np.argmax(length))
+    count = max(4, t.size - 1)
+    return float(others[best]) if length[best] > own + 3.0 / np.sqrt(count) * (1.0 - own) + 1e-3 else None
+
+
+def _followed(
+    t: Samples, a: Samples, error: Samples, period: float, dt: float
+) -> tuple[Samples, tuple[float, float] | None]:
+    """Each angle in the turn nearest to where the ones before lead; NaN for stray ones. Also the first lost gap."""
+    values = np.full(a.size, np.nan)
+    stray = 0
+    lost = None
+    rate = _rate(t[: _START + 1], a[: _START + 1], period, dt)[0]
+    state, at = float(a[_first_good(t, a, period, rate)]), float(t[_first_good(t, a, period, rate)])
+    begin = _first_good(t, a, period, rate)
+    for k in range(begin, a.size):
+        span = float(t[k]) - at
+        ahead = state + rate * span
+        value = float(a[k] + period * np.round((ahead - a[k]) / period))
+        if span > 10.0 * dt and abs(rate) * span * _DRIFT > 0.5 * period and lost is None:
+            lost = (at, float(t[k]))
+        if abs(value - ahead) > _STRAY * period and k > begin:
+            stray += 1
+            if stray >= _LOST:
+                near = slice(max(0, k - _LOST + 1), min(a.size, k + _START))
+                rate = _rate(t[near], a[near], period, dt)[0]
+                state, at, stray = value, float(t[k]), 0
+                values[k] = value
+            continue
+        stray = 0
+        values[k] = value
+        gain = _GAIN if np.isfinite(error[k]) and error[k] < 0.1 * period else 0.2
+        if span > 0:
+            rate += _RATE_GAIN * gain / _GAIN * (value - ahead) / max(span, dt)
+        state, at = ahead + gain * (value - ahead), float(t[k])
+    return values, lost
+
+
+def _first_good(t: Samples, a: Samples, period: float, rate: float) -> int:
+    """The first angle that the next ones agree with."""
+    for k in range(min(20, a.size - 3)):
+        ahead = a[k] + rate * (t[k + 1 : k + 6] - t[k])
+        miss = (a[k + 1 : k + 6] - ahead) / period
+        if np.median(np.abs(miss - np.round(miss))) < 0.2:
+            return k
+    return 0
+
+
+def _leaps(t: Samples, values: Samples, dt: float) -> int:
+    """Steps from reading to reading that are far from those around them."""
+    known = np.isfinite(values)
+    steps, spans = np.diff(values[known]), np.diff(t[known])
+    if steps.size < _NEAR_STEPS:
+        return 0
+    around = sliding_window_view(np.pad(steps / spans, _NEAR_STEPS // 2, mode="edge"), _NEAR_STEPS)
+    off = np.abs(steps - np.median(around, axis=1) * spans)
+    return int(np.sum((off > _LEAP) & (spans < 10.0 * dt)))
+
+
+def _wrong_stripes(count: int) -> Flag:
+    return Flag(
+        "stripes-do-not-fit",
+        f"the body's angle leaps {count} times by more than {np.degrees(_LEAP):.0f} degrees from frame to frame: "
+        "number or order of the stripes is wrong, or they are misread; the body's rotation is not given",
+        _RATES["body"],
+    )
+
+
+def _unread(part: _Part, seen: int, total: int) -> Flag:
+    name, what = ("stripes-unreadable", "stripes") if part == "body" else ("tail-unreadable", "tail")
+    if seen < max(4, _RARELY * total):
+        return Flag(
+            name, f"the {what} could be read on {seen} of {total} frames; the rotation is not given", _RATES[part]
+        )
+    return Flag(name, f"the {what} could be read on {seen} of {total} frames only")
+
+
+def _jumps(part: _Part) -> Flag:
+    return Flag(
+        f"aliased-{part}",
+        f"the {part}'s angle jumps from frame to frame without order: it turns too fast for this frame rate, or it is "
+        "misread; its rotation is not given",
+        _RATES[part],
+    )
+
+
+def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
+    return Flag(
+        f"aliased-{part}",
+        f"the {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
+        f"rotation is doubtful; allowed: below {LARGEST_STEP:g}, with more frames a second; its rotation is not given",
+        _RATES[part],
+    )
+
+
+def _other_rate(part: _Part, rate: float, other: float) -> Flag:
+    return Flag(
+        f"aliased-{part}",
+        f"by the uneven times of the frames the {part} turns at {other / (2 * np.pi):.3g} Hz rather than "
+        f"{rate / (2 * np.pi):.3g} Hz, too fast for this frame rate; its rotation is not given",
+        _RATES[part],
+    )
+
+
+def _slope(time: Samples, value: Samples) -> tuple[float, float]:
+    """Rate of an angle or place, and how far it went; 0 where unknown."""
+    known = np.isfinite(value)
+    if known.sum() < 4:
+        return 0.0, 0.0
+    t, v = time[known], value[known]
+    centred = t - t.mean()
+    rate = float(centred @ (v - v.mean()) / max(float(centred @ centred), 1e-300))
+    return rate, rate * float(t[-1] - t[0])
+
+
+def nothing_moves(
+    time: Samples, body_angle: Samples, tail_phase: Samples, x: Samples, robot: Robot
+) -> tuple[Flag, ...]:
+    """Something that neither moves nor turns and has no tail: it may be a part of the background.
+
+    Args:
+        time: s, (n,).
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        x: place along the channel, m, (n,).
+        robot: the robot.
+    """
+    if time.size < _FEW_FRAMES:
+        return ()
+    moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
+    if np.isfinite(tail_phase).any() or moved > _RESTS * robot.body.length or turned > _STILL:
+        return ()
+    sentence = (
+        "what was followed neither moves nor turns, and its tail is not seen: it may be something that stands in "
+        "the picture; nothing is given"
+    )
+    return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
+
+
+def contradictions(
+    time: Samples, body_angle: Samples, tail_phase: Samples, x: Samples, robot: Robot, hand_seen: int = 0
+) -> tuple[Flag, ...]:
+    """Rates that no free swimmer has: a sign of a rate too fast for the camera, or of a wrong robot file.
+
+    Without an outer torque the body turns against its tail; a tail that turns forward drives forward, and no further
+    than it would without a body.
+
+    Args:
+        time: s, (n,).
+        body_angle: unwrapped, rad, (n,).
+        tail_phase: unwrapped, rad, (n,).
+        x: place along the channel, m, (n,).
+        robot: the robot.
+        hand_seen: `TailWave.handedness()`.
+    """
+    if robot.drive is not None and robot.drive.joint == "fixed":
+        return ()  # body and tail are one: they turn together
+    body, body_turned = _slope(time, body_angle)
+    tail, tail_turned = _slope(time, tail_phase)
+    _, moved = _slope(time, x)
+    turns = abs(tail_turned) > _TURNED
+    if turns and abs(body_turned) > _TURNED and body * tail > 0:
+        if hand_seen > 0:
+            sentence = (
+                "body and tail seem to turn the same way, as no free swimmer does, though the tail's hand is as given: "
+                "its rate is likely too fast for this frame rate, or the order of the stripes is wrong; none is given"
+            )
+            return (Flag("aliased-tail", sentence, (*_RATES["tail"], *_RATES["body"])),)
+        sentence = (
+            "body and tail seem to turn the same way, as no free swimmer does: tail.handedness or the order of the "
+            "stripes is wrong, or the tail is too fast for this frame rate; neither rotation is given"
+        )
+        return (Flag("handedness", sentence, (*_RATES["tail"], *_RATES["body"])),)
+    far = abs(moved) > 0.05 * robot.body.length
+    if far and np.isfinite(tail_phase).any() and (flags := _not_driven(moved, tail_turned, robot)):
+        return flags
+    if turns and abs(body) > 1.5 * abs(tail):
+        sentence = (
+            "the body seems to turn faster than its tail: the tail may be too fast for this frame rate "
+            f"({abs(tail) / (2 * np.pi):.3g} Hz is the least rate that fits)"
+        )
+        return (Flag("aliased-tail", sentence),)
+    return ()
+
+
+def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
+    """A way that no tail drives which turns as this one seems to."""
+    turns, what = abs(tail_turned) / (2 * np.pi), "the tail is too fast for this frame rate"
+    if abs(tail_turned) > _TURNED and moved * tail_turned * robot.hand < 0:
+        why, what = "moves against the sense in which its tail seems to turn", f"{what}, tail.handedness is wrong"
+    elif abs(moved) <= turns * _WALLS * _largest_advance(robot):
+        return ()
+    elif abs(tail_turned) > _TURNED:
+        why = (
+            f"advances {show(abs(moved) / turns, 'mm')} a turn of its tail, more than such a wire can in viscous fluid"
+        )
+    else:
+        why = "moves while its tail seems to rest"
+    sentence = f"the robot {why}: {what}, or something else moves the robot; the tail's rotation is not given"
+    return (Flag("aliased-tail", sentence, _RATES["tail"]),)
+
+
+def _largest_advance(robot: Robot) -> float:
+    """Advance of the tail alone in a turn, m: the largest that resistive force theory allows (Gray and Hancock 1955).
+
+    A helix of angle b, tan b = k B_o, which no force acts on, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its
+    wavelength, with g = c_t/c_n no less than 1/2.
+    """
+    tail = robot.tail
+    steepness = (2 * np.pi * tail.amplitude / tail.wavelength) ** 2
+    return float(tail.wavelength * 0.5 * steepness / (0.5 + steepness))

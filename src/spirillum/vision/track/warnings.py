@@ -1,0 +1,226 @@
+"""What a video shows that whoever uses its numbers has to know: two robots, gaps, a robot that leaves, glare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.body import BodyFinder, Placed
+from spirillum.vision.track.search import Candidate, close_places
+from spirillum.vision.track.track import Flag
+
+__all__ = ["EVERYTHING", "FULL_VIEW", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
+
+_THREADS = 2
+EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+"""All that a track gives."""
+
+_SECOND = 0.75
+"""Score of a second robot over that of the first."""
+_CLEAR = 1.3
+"""The same over the next best place."""
+_MAYBE, _TURNED = 0.85, 1.05
+"""Score of a robot the other way round over that of the stated direction, from which on more frames are asked, and
+from which on it is said."""
+_OFTEN = 0.6
+"""Share of the frames in which something has to be seen to be said."""
+_ASKED = 3
+"""Every how manieth frame is looked at the other way round first."""
+_LOST = 0.03
+"""Share of frames without the robot that is said."""
+FULL_VIEW = 0.97
+"""Share of the edges in the picture below which the robot is partly out of view."""
+_ENOUGH = 0.2
+"""Share of frames on which it is in full view, from which on the others are left out."""
+_HIDDEN = 0.55
+"""Share of the edges that fit below which glare, shadows or bubbles are said."""
+
+
+def rivals_in(
+    body: BodyFinder,
+    images: Sequence[np.ndarray],
+    found: Sequence[list[Candidate]],
+    chosen: Sequence[Candidate | None],
+) -> list[tuple[np.ndarray, BodyPose]]:
+    """Frames on which another place stands out as the robot's does, and where; none unless it does on most of them.
+
+    Args:
+        body: the robot's body.
+        images: the frames that were searched, 8-bit RGB.
+        found: candidates of each frame.
+        chosen: the one that was taken for the robot.
+    """
+    half, rivals, count = 0.5 * body.robot.body.length, [], 0
+    for image, others, one in zip(images, found, chosen, strict=True):
+        if one is None:
+            continue
+        count += 1
+        apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
+        clear = [other for other in apart if other.score > max(_SECOND * one.score, _CLEAR * others[2].score)]
+        rivals += [(image, other.pose) for other in clear[:1]]
+    return rivals if len(rivals) > _OFTEN * count else []
+
+
+def turned_flags(
+    body: BodyFinder,
+    images: Sequence[np.ndarray],
+    still: Samples,
+    found: Sequence[list[Candidate]],
+    chosen: Sequence[Candidate | None],
+) -> tuple[Flag, ...]:
+    """A nose at the other end.
+
+    Args:
+        body: the robot's body.
+        images: the frames that were searched, 8-bit RGB.
+        still: what stands still in the video.
+        found: candidates of each frame.
+        chosen: the one that was taken for the robot.
+    """
+    seen = [(image, some[0].score) for image, some, one in zip(images, found, chosen, strict=True) if one is not None]
+    turned = _turned(body, seen[::_ASKED], still)
+    if turned > _MAYBE:
+        turned = _turned(body, seen, still)
+    if turned <= _TURNED:
+        return ()
+    side = "left" if body.optics.leftward else "right"
+    sentence = (
+        f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits {turned:.2g} times "
+        "better; all signs would be wrong, so that nothing is given"
+    )
+    return (Flag("nose-on-the-other-side", sentence, EVERYTHING),)
+
+
+def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
+    """How much better a body the other way round fits, usually; of each frame its score as stated is given."""
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+        backs = pool.map(
+            lambda image: close_places(image, still, body.contour, body.optics, body.bounds, turn=np.pi),
+            [image for image, _ in seen],
+        )
+        ratios = [
+            back[0].score / max(score, 1e-9) if back else 0.0 for back, (_, score) in zip(backs, seen, strict=True)
+        ]
+    return float(np.median(ratios)) if ratios else 0.0
+
+
+def _apart(other: Candidate, one: Candidate, half: float) -> bool:
+    """Whether two robots could be at both places without touching."""
+    return max(abs(other.pose.x - one.pose.x) / 2.0, abs(other.pose.y - one.pose.y)) > half
+
+
+def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
+    """Numbers of the frames as they were recorded, with those that are missing counted.
+
+    Args:
+        time: times of the frames, s, (n,).
+        index: their numbers among those that are there, (n,).
+    """
+    if time.size < 3:
+        return index, ()
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    turns = (time - time[0]) / usual
+    whole = np.round(turns)
+    if np.abs(turns - whole).max() > 0.2 or np.any(np.diff(whole) < 1.0):
+        turns = np.concatenate([np.zeros(1), np.cumsum(np.maximum(1.0, np.round(steps / usual)))])
+        whole = turns if np.mean(np.abs(steps / usual - np.round(steps / usual)) < 0.2) > 0.95 else index - index[0]
+    missing = int(whole[-1] - whole[0]) + 1 - time.size
+    flags: tuple[Flag, ...] = ()
+    if missing > 0:
+        share = 100.0 * missing / (missing + time.size)
+        longest = float(steps.max())
+        flags = (
+            Flag(
+                "dropped-frames",
+                f"{missing} frames ({share:.1f} %) are missing, the longest gap is {longest:.3g} s: the true times are "
+                "used",
+            ),
+        )
+    return index[0] + whole, flags
+
+
+def cut_off(found: Sequence[Placed]) -> np.ndarray:
+    """Frames that are left out because the robot is partly out of view, if it is in full view often enough, (n,)."""
+    part = np.array([one.known and one.inside < FULL_VIEW for one in found])
+    whole = np.array([one.known and one.inside >= FULL_VIEW for one in found])
+    enough = int(whole.sum()) > _ENOUGH * int((part | whole).sum())
+    return part if enough else np.zeros(part.shape, dtype=bool)
+
+
+def sight_flags(
+    time: Samples, pose: Samples, errors: Samples, found: Sequence[Placed], optics: Optics, setup: Setup
+) -> tuple[Flag, ...]:
+    """A robot that leaves, comes late, is partly out of view, hidden, or swims the other way.
+
+    Args:
+        time: times, s, (n,).
+        pose: x, y, heading, NaN where it was not seen, (n, 3).
+        errors: their standard errors, (n, 3).
+        found: what was found on each frame.
+        optics: the camera.
+        setup: the setup.
+    """
+    flags: list[Flag] = []
+    known = np.isfinite(pose[:, 0])
+    count = known.size
+    if not known.any():
+        return (Flag("robot-not-seen", "the robot was not seen well enough on any frame", EVERYTHING),)
+    first, last = np.flatnonzero(known)[[0, -1]]
+    inside = np.array([one.inside for one in found])
+    if count - 1 - last > max(3, _LOST * count):
+        flags.append(
+            Flag(
+                "robot-left-the-view",
+                f"the robot was last seen at {time[last]:.2f} s of {time[-1]:.2f} s: what was measured until then "
+                "is kept",
+            )
+        )
+    if first > max(3, _LOST * count):
+        sentence = f"the robot was first seen at {time[first]:.2f} s: the measurement begins there"
+        flags.append(Flag("robot-came-late", sentence))
+    between = ~known[first : last + 1]
+    if between.mean() > _LOST:
+        flags.append(
+            Flag(
+                "robot-lost",
+                f"the robot was not seen on {between.sum()} frames ({100 * between.mean():.1f} %) between: they are "
+                "left out",
+            )
+        )
+    part = known & (inside < FULL_VIEW)
+    if part.mean() > _LOST:
+        flags.append(
+            Flag(
+                "robot-partly-out-of-view",
+                f"the robot is partly out of view on {100 * part.mean():.0f} % of the frames: "
+                + ("they are left out" if cut_off(found).any() else "its place there is less sure"),
+            )
+        )
+    share = np.array([one.share for one in found])
+    if known.sum() and float(np.median(share[known])) < _HIDDEN:
+        flags.append(
+            Flag(
+                "edges-hidden",
+                f"only {100 * float(np.median(share[known])):.0f} % of the body's edges look alike on most frames: "
+                "glare, a shadow, bubbles or a wrong robot file; the place rests on the others",
+            )
+        )
+    if known.sum() > 10:
+        t, x = time[known], pose[known, 0]
+        slope = float(np.polyfit(t - t.mean(), x, 1)[0])
+        spread = float(np.std(x - np.polyval(np.polyfit(t, x, 1), t))) + float(np.nanmedian(errors[:, 0]))
+        if slope * (t[-1] - t[0]) < -max(5.0 * spread, 2.0 * optics.length_per_pixel):
+            flags.append(
+                Flag(
+                    "moves-backwards",
+                    f"the robot moves away from its nose: is robot.direction = '{setup.robot.direction}' right? If "
+                    "it is, the forward velocity is negative",
+                )
+            )
+    return tuple(flags)
