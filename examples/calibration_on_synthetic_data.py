@@ -44,10 +44,9 @@ for wavelength, amplitude in ((10, 1.5), (10, 3.0), (15, 2.5), (20, 1.5), (25, 2
 with tempfile.TemporaryDirectory() as folder:
     observations = Path(folder) / "observations.csv"
     observations.write_text("\n".join(rows) + "\n", encoding="utf-8")
-    found = sp.calibrate(observations, ROBOT, model="sbt")
+    found = sp.calibrate(observations, ROBOT, folder, model="sbt", figures=False)
     for name, item in found.values.items():
         print(f"{name}: {item.value:.3f} ({item.low:.3f} to {item.high:.3f})")
-    found.write(folder, figures=False)
 
     new_tail = sp.load(ROBOT, **{"tail.wavelength": "18 mm", "tail.amplitude": "2.2 mm"})
     own = truth(18, 2.2)

@@ -55,10 +55,9 @@ with tempfile.TemporaryDirectory() as name:
     observations = folder / "observations.csv"
     join_observations(files, observations)
 
-    found = sp.calibrate(observations, "biorob2012-wide", model="sbt", method="least-squares")
+    found = sp.calibrate(observations, "biorob2012-wide", folder, model="sbt", method="least-squares", figures=False)
     for parameter, item in found.values.items():
         print(f"{parameter}: {item.value:.4f} ({item.low:.4f} to {item.high:.4f})")
-    found.write(folder, figures=False)
 
     new_tail = {"tail.wavelength": "20 mm", "tail.amplitude": "2.2 mm"}
     predicted = sp.predict(

@@ -11,9 +11,11 @@ from hypothesis import Phase, settings
 from jaxtyping import install_import_hook
 
 HOOKED = [
+    "spirillum.exports",
+    "spirillum.dynamics",
+    "spirillum.fields",
     "spirillum.fluid",
     "spirillum.swimming",
-    "spirillum.exports",
     "spirillum.robot.geometry",
     "spirillum.robot.links",
     "spirillum.robot.mesh",

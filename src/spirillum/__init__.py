@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from spirillum.calibration.fit import Calibrated, calibrate
+    from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.ranking import Ranking, rank_models
     from spirillum.calibration.suggest import Suggestion, suggest
     from spirillum.citations import citation
@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from spirillum.fields.flow import Flow, flow
     from spirillum.fluid.resistance import Resistance, resistance
     from spirillum.measurement.feasibility import Feasibility, feasibility
-    from spirillum.measurement.measure import Measurement, measure
+    from spirillum.measurement.measure import Measurement
+    from spirillum.results.calibration import calibrate
+    from spirillum.results.measurement import measure
+    from spirillum.results.study import study
     from spirillum.robot.batch import RobotBatch
     from spirillum.robot.load import load
     from spirillum.robot.robot import Robot
-    from spirillum.studies.run import study
     from spirillum.swimming.answer import Swimming
     from spirillum.swimming.comparison import ModelComparison, compare_models
     from spirillum.swimming.prediction import Prediction, predict
@@ -79,7 +81,7 @@ __all__ = [
 ]
 
 _HOME = {
-    "Calibrated": "spirillum.calibration.fit",
+    "Calibrated": "spirillum.calibration.calibrated",
     "Export": "spirillum.exports.write",
     "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.view.scene3d.film",
@@ -96,7 +98,7 @@ _HOME = {
     "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.swimming.answer",
-    "calibrate": "spirillum.calibration.fit",
+    "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
     "export": "spirillum.exports.write",
@@ -105,7 +107,7 @@ _HOME = {
     "flow": "spirillum.fields.flow",
     "load": "spirillum.robot.load",
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
-    "measure": "spirillum.measurement.measure",
+    "measure": "spirillum.results.measurement",
     "predict": "spirillum.swimming.prediction",
     "rank_models": "spirillum.calibration.ranking",
     "render": "spirillum.virtual.trial",
@@ -113,7 +115,7 @@ _HOME = {
     "settle": "spirillum.dynamics.settling",
     "show": "spirillum.view.scene3d.show",
     "simulate": "spirillum.dynamics.simulation",
-    "study": "spirillum.studies.run",
+    "study": "spirillum.results.study",
     "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.swimming.steady",
     "virtual_experiment": "spirillum.virtual.experiment",
@@ -122,9 +124,9 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from importlib.metadata import version
+        from spirillum.answer import own_version
 
-        return version("spirillum")
+        return own_version()
     if name not in _HOME:
         raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)

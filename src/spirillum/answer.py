@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["as_json", "envelope", "quantity", "versions"]
+__all__ = ["as_json", "envelope", "own_version", "quantity", "versions"]
 
 
 def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> dict[str, Any]:
@@ -40,6 +40,12 @@ def envelope(kind: str, content: Mapping[str, Any], warnings: Iterable[str]) -> 
 def as_json(answer: Mapping[str, Any]) -> str:
     """JSON text; refuses anything that is not valid JSON, such as NaN."""
     return json.dumps(answer, indent=2, allow_nan=False, ensure_ascii=False)
+
+
+@lru_cache(maxsize=1)
+def own_version() -> str:
+    """Version of the program."""
+    return version("spirillum")
 
 
 @lru_cache(maxsize=1)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from spirillum.answer import own_version
 from spirillum.errors import InputError
+from spirillum.fluid.registry import find_model
 
 __all__ = ["REFERENCES", "citation"]
 
@@ -106,18 +108,14 @@ def citation(result: object = None) -> str:
     Raises:
         InputError: if the object carries no references.
     """
-    from spirillum import __version__
-
     keys = list(dict.fromkeys(("biorob2012", *_keys_of(result))))
-    return "\n".join([_SOFTWARE.format(version=__version__), *(REFERENCES[key] for key in keys)])
+    return "\n".join([_SOFTWARE.format(version=own_version()), *(REFERENCES[key] for key in keys)])
 
 
 def _keys_of(result: object) -> Iterable[str]:
     if result is None:
         return ()
     if isinstance(result, str):
-        from spirillum.fluid.registry import find_model
-
         return find_model(result).references
     found = getattr(result, "references", None)
     if found is None:

@@ -9,6 +9,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.cli import main
+from spirillum.results.calibration import write_calibration
 
 WIDE = "biorob2012-wide"
 HEADER = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
@@ -106,7 +107,7 @@ def test_a_folder_of_other_origin_is_left_alone(tmp_path: Path, made: Callable[.
     (tmp_path / "calibration.toml").write_text("[calibration.sbt]\n")
     found = sp.calibrate(made(), [WIDE, "biorob2012-narrow"], method="paper")
     with pytest.raises(InputError, match="unknown origin"):
-        found.write(tmp_path)
+        write_calibration(found, tmp_path)
     assert (tmp_path / "calibration.toml").read_text() == "[calibration.sbt]\n"
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.results.calibration import check_folder, earlier_results
+from spirillum.results.calibration import check_folder, earlier_results, write_calibration
 
 WIDE = "biorob2012-wide"
 
@@ -33,7 +33,7 @@ def test_a_file_that_no_calibration_wrote_is_refused_and_stays(found: Any, tmp_p
     with pytest.raises(InputError, match=f"holds {name} of unknown origin; allowed: a new folder"):
         check_folder(tmp_path)
     with pytest.raises(InputError, match="unknown origin"):
-        found.write(tmp_path, figures=False)
+        write_calibration(found, tmp_path, figures=False)
     assert foreign.read_bytes() == b"my own\n"
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == [foreign]
 
@@ -44,7 +44,7 @@ def test_numbers_are_written_before_the_figures(found: Any, tmp_path: Path, monk
 
     monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        found.write(tmp_path)
+        write_calibration(found, tmp_path)
     assert {path.name for path in tmp_path.glob("*.*")} == {"calibration.toml", "predictions.csv"}
     assert sp.predict(WIDE, tail_rate="1 Hz", calibration=tmp_path / "calibration.toml").calibrated
 
@@ -53,17 +53,17 @@ def test_figures_of_an_earlier_run_go_and_changed_ones_stay(
     found: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("spirillum.view.figures.calibration.calibration_figures", small_figures)
-    found.write(tmp_path)
+    write_calibration(found, tmp_path)
     (tmp_path / "figures" / "my-own.png").write_bytes(b"mine")
     assert {path.name for path in earlier_results(tmp_path)} == {
         "calibration.toml",
         "predictions.csv",
         *(f"{name}{suffix}" for name in ("residuals", "profiles") for suffix in (".png", ".svg")),
     }
-    found.write(tmp_path, figures=False)
+    write_calibration(found, tmp_path, figures=False)
     kept = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()}
     assert kept == {"calibration.toml", "predictions.csv", "figures/my-own.png"}
-    found.write(tmp_path)
+    write_calibration(found, tmp_path)
     (tmp_path / "figures" / "residuals.png").write_bytes(b"drawn anew by hand")
     with pytest.raises(InputError, match=r"figures/residuals\.png of unknown origin"):
         check_folder(tmp_path)

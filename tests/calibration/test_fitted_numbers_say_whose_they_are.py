@@ -10,6 +10,7 @@ import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
 from spirillum.fitted.posterior_file import read_posterior
+from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
 
 WIDE = "biorob2012-wide"
@@ -76,9 +77,8 @@ def test_a_negative_friction_is_zero_and_said(calibration: Path) -> None:
 def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
     folder = tmp_path_factory.mktemp("fitted")
-    sp.calibrate(made(**small, seed=4), WIDE, model="rft", free="body_drag,friction", sampling=SHORT).write(
-        folder, figures=False
-    )
+    free = "body_drag,friction"
+    sp.calibrate(made(**small, seed=4), WIDE, folder, model="rft", free=free, sampling=SHORT, figures=False)
     return folder
 
 
@@ -135,7 +135,9 @@ def test_a_second_calibration_leaves_nothing_of_the_first(
     (folder / "figures").mkdir(exist_ok=True)
     (folder / "figures" / "my-own.png").write_bytes(b"mine")
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5), "discrepancy": 0.03}
-    sp.calibrate(made(**small, seed=4), WIDE, model="rft", method="least-squares").write(folder, figures=False)
+    write_calibration(
+        sp.calibrate(made(**small, seed=4), WIDE, model="rft", method="least-squares"), folder, figures=False
+    )
     found = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     assert found == {"calibration.toml", "predictions.csv", "figures/my-own.png"}
 

@@ -15,6 +15,7 @@ from spirillum import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.closed.rft import Rft
 from spirillum.fluid.registry import MODELS, SWIMMER_MODELS
+from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -81,7 +82,7 @@ def test_a_planted_gap_comes_back_within_the_stated_error(walls: MadeUp, tmp_pat
     assert 0 < error < 2e-3
     assert found.values["gap"].value == pytest.approx(3.1e-4, rel=10 * error)
     assert any("resistances are interpolated" in warning for warning in found.warnings)
-    found.write(tmp_path / "out", figures=False)
+    write_calibration(found, tmp_path / "out", figures=False)
     answer = sp.predict(WIDE, model="tube", calibration=tmp_path / "out" / "calibration.toml", tail_rate="1 Hz")
     assert answer.batch.placement.gap == pytest.approx(found.values["gap"].value)
     assert answer.band is None
@@ -134,7 +135,7 @@ def test_a_posterior_of_places_is_not_taken_for_predictions(walls: MadeUp, tmp_p
     few = Sampling(ensembles=2, walkers=24, warm_up=200, steps=400, doublings=2)
     found = sp.calibrate(path, WIDE, model="tube", free="gap", sampling=few)
     assert found.values["gap"].low < 4e-4 < found.values["gap"].high
-    found.write(tmp_path / "out", figures=False)
+    write_calibration(found, tmp_path / "out", figures=False)
     with pytest.raises(InputError, match=r"allowed: its calibration\.toml"):
         sp.predict(WIDE, model="tube", posterior=tmp_path / "out" / "posterior.nc", tail_rate="1 Hz")
 

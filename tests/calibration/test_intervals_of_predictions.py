@@ -11,6 +11,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
+from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 
@@ -25,7 +26,7 @@ def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) 
     found = sp.calibrate(made(**small, seed=4), WIDE, sampling=SHORT)
     assert found.converged
     folder = tmp_path_factory.mktemp("fitted")
-    found.write(folder, figures=False)
+    write_calibration(found, folder, figures=False)
     return folder
 
 
@@ -106,7 +107,7 @@ def test_every_parameter_reaches_the_prediction(
     few = Sampling(ensembles=2, walkers=28, warm_up=50, steps=51, kept=17, doublings=0)
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}
     found = sp.calibrate(made(**small, seed=4), WIDE, model=model, free=free, sampling=few)
-    found.write(tmp_path, figures=False)
+    write_calibration(found, tmp_path, figures=False)
     robot = found.experiment.robots[3]
     answer = sp.predict(robot, model=model, posterior=tmp_path / "posterior.nc")
     assert answer.intervals is not None

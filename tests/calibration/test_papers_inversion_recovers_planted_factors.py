@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 
@@ -72,7 +73,7 @@ def test_a_left_handed_tail_gives_the_same_factors(made: Callable[..., Path]) ->
 def test_the_calibration_file_lets_predict_repeat_the_observations(made: Callable[..., Path], tmp_path: Path) -> None:
     path = made(error=0.0, trials=1, drag=(2.2, 4.1), rotation=(0.7, 1.3))
     found = sp.calibrate(path, PRESETS, method="paper")
-    found.write(tmp_path, figures=False)
+    write_calibration(found, tmp_path, figures=False)
     robot = load(PRESETS[1], **{"tail.wavelength": "20 mm", "tail.amplitude": "1.5 mm"})
     answer = sp.predict(robot, calibration=tmp_path / "calibration.toml")
     row = next(

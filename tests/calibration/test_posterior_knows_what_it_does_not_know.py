@@ -9,6 +9,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
+from spirillum.results.calibration import write_calibration
 
 WIDE = "biorob2012-wide"
 SHORT = Sampling(ensembles=2, walkers=24, warm_up=300, steps=500, doublings=2)
@@ -45,7 +46,7 @@ def test_chains_that_have_not_mixed_are_refused_loudly(
     found = sp.calibrate(made(), [WIDE, "biorob2012-narrow"], sampling=hasty)
     assert not found.converged
     assert found.warnings[0].startswith("the posterior may not be used")
-    found.write(tmp_path, figures=False)
+    write_calibration(found, tmp_path, figures=False)
     assert "has not converged" in (tmp_path / "calibration.toml").read_text()
 
     from spirillum.cli import main
@@ -69,7 +70,7 @@ def test_the_same_seed_gives_the_same_draws(made: Callable[..., Path]) -> None:
 def test_the_file_holds_arviz_groups(wrong: Any, tmp_path: Path) -> None:
     import xarray as xr
 
-    wrong.write(tmp_path, figures=False)
+    write_calibration(wrong, tmp_path, figures=False)
     with xr.open_datatree(tmp_path / "posterior.nc", engine="h5netcdf") as tree:
         assert {"posterior", "log_likelihood", "observed_data", "sample_stats"} <= set(tree.children)
         assert set(tree["posterior"].dims) == {"chain", "draw"}

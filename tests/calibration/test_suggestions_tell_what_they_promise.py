@@ -10,6 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
+from spirillum.results.calibration import write_calibration
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=500, doublings=2)
@@ -21,7 +22,7 @@ def fitted(made: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) 
     """A posterior from four tails in the wide channel."""
     found = sp.calibrate(made(presets=(WIDE,), **FEW), WIDE, free="body_drag,body_rotation", sampling=SHORT)
     folder = tmp_path_factory.mktemp("suggest")
-    found.write(folder, figures=False)
+    write_calibration(found, folder, figures=False)
     return folder
 
 

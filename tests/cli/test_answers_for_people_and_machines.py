@@ -148,10 +148,10 @@ def test_schemas_describe_the_files(run: Callable[..., Any], name: str) -> None:
 
 
 def test_every_help_has_an_example_that_runs(run: Callable[..., Any], tmp_path: Path, monkeypatch) -> None:
-    from spirillum.studies import run as study_run
+    from spirillum.results import study as study_results
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(study_run, "_write_report", lambda *_: None)
+    monkeypatch.setattr(study_results, "write_report", lambda *_: None)
     monkeypatch.setenv("COLUMNS", "200")
     commands = ["predict", "resistance", "study", "simulate", "schema", "citation", "robot new", "robot show"]
     for command in [*commands, "robot check"]:

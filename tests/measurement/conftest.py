@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
+from spirillum.vision.camera.scale import Scale
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.track import Flag, Scale, Track
+from spirillum.vision.track.track import Track
 
 SETUP = """\
 [camera]

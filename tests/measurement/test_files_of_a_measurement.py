@@ -13,12 +13,14 @@ import xarray as xr
 from spirillum import InputError
 from spirillum.files import write_dataset
 from spirillum.formats.labelled import Labelled
-from spirillum.measurement.measure import Measurement, measure
+from spirillum.measurement.measure import Measurement
 from spirillum.measurement.observations import read_observations
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import trial_of
-from spirillum.vision.track.track import Flag, Track
+from spirillum.results.measurement import measure
+from spirillum.vision.flag import Flag
+from spirillum.vision.track.track import Track
 
 Make = Callable[..., Track]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.measurement.measure import measure
+from spirillum.results.measurement import measure
 
 av = pytest.importorskip("av")
 pytest.importorskip("cv2")

@@ -19,7 +19,8 @@ from spirillum.measurement.marks import (
     track_of_marks,
 )
 from spirillum.measurement.trials import trial_of
-from spirillum.vision.track.track import Scale, Track
+from spirillum.vision.camera.scale import Scale
+from spirillum.vision.track.track import Track
 
 PIXEL = 0.25e-3
 RULED = Ruled.plain(Scale(PIXEL, 0.0, {}, 80, 0.05), (640, 480), leftward=False)

@@ -10,7 +10,8 @@ from scipy.stats import t
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.summary import compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, trial_of
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.flag import Flag
+from spirillum.vision.track.track import Track
 
 Make = Callable[..., Track]
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import Evidence, evaluated
-from spirillum.studies import places, run
+from spirillum.papers.biorob2012.claims import evaluated
+from spirillum.papers.biorob2012.evidence import Evidence
+from spirillum.studies import places
 from spirillum.studies.places import AT_PLACES
 from spirillum.view.figures.study import study_figures
 from spirillum.view.figures.style import look_of_model
@@ -76,7 +77,7 @@ def test_models_and_band_override_the_file(leaning: Any, question: dict[str, obj
 def test_interrupted_band_resumes_where_it_stopped(
     leaning: Any, question: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "_write_report", lambda *_: None)
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
     whole = sp.study(question, band=True)
     done: list[int] = []
     original = places.PlaceTask.answer

@@ -10,6 +10,7 @@ import pytest
 import spirillum as sp
 from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
+from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
@@ -35,7 +36,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     few = Sampling(ensembles=2, walkers=32, warm_up=250, steps=400, doublings=2)
     found = sp.calibrate(path, [WIDE, NARROW], sampling=few)
     assert found.converged
-    found.write(folder, figures=False)
+    write_calibration(found, folder, figures=False)
     return folder
 
 

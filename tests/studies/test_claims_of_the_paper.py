@@ -5,7 +5,8 @@ from collections import Counter
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.claims import Claim, evaluated
+from spirillum.papers.biorob2012.claims import evaluated
+from spirillum.papers.biorob2012.evidence import Claim
 
 
 @pytest.fixture(scope="module")

@@ -1,15 +1,16 @@
-"""`calibrate`: from observations to parameters, with what they are worth."""
+"""From observations to parameters, with what they are worth."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.calibration.calibrated import Calibrated
+from spirillum.calibration.estimate import LEVEL, Estimate
 from spirillum.calibration.experiment import Experiment, Quantity, read_experiment
 from spirillum.calibration.identifiability import Identifiability, identified
 from spirillum.calibration.judgement import (
@@ -22,89 +23,22 @@ from spirillum.calibration.judgement import (
     stray_warnings,
 )
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
-from spirillum.calibration.paper_method import PaperFit, paper_fit
+from spirillum.calibration.paper_method import paper_fit
 from spirillum.calibration.parameters import free_names
-from spirillum.calibration.posterior import Posterior, Sampling, sampled
+from spirillum.calibration.posterior import Sampling, sampled
 from spirillum.calibration.problem import Problem, Progress, posed
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 
-__all__ = ["LEVEL", "METHODS", "Calibrated", "RobotSource", "calibrate", "given_robots"]
+__all__ = ["METHODS", "RobotSource", "fit_model", "given_robots"]
 
 METHODS = ("posterior", "least-squares", "paper")
-LEVEL = 0.95
-"""Level of all intervals."""
 _READINGS = ("rotor", "paper")
 _FRICTION_DRAWS = 2000
 
 RobotSource = str | Path | Mapping[str, Any] | Robot
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A number with its 95 % interval, SI; NaN where the method gives none."""
-
-    value: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """What a calibration found."""
-
-    problem: Problem
-    method: Literal["posterior", "least-squares", "paper"]
-    reading: str
-    """Reading of the friction under which B_eff follows from (18)."""
-    values: dict[str, Fitted]
-    """Free numbers by label."""
-    friction: tuple[Fitted, ...]
-    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed."""
-    predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
-    """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
-    discrepancy: dict[Quantity, Fitted]
-    """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
-    error: dict[Quantity, float]
-    """Relative error of one trial."""
-    paper: PaperFit | None
-    least_squares: LeastSquares | None
-    posterior: Posterior | None
-    identifiability: Identifiability | None
-    warnings: tuple[str, ...]
-
-    @property
-    def experiment(self) -> Experiment:
-        """The observations."""
-        return self.problem.experiment
-
-    @property
-    def converged(self) -> bool:
-        """Whether a posterior may be used; True for the other methods."""
-        return self.posterior is None or self.posterior.converged
-
-    def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum calibrate --json`."""
-        from spirillum.calibration.answers import calibration_answer
-
-        return calibration_answer(self)
-
-    def write(self, folder: str | Path, *, figures: bool = True, progress: Progress | None = None) -> list[Path]:
-        """Write `calibration.toml`, `predictions.csv`, figures and, for a posterior, `posterior.nc` into a folder.
-
-        Args:
-            folder: where to.
-            figures: whether to draw figures too, which takes some seconds.
-            progress: told what is being done.
-
-        Raises:
-            InputError: if it cannot be written to.
-        """
-        from spirillum.results.calibration import write_calibration
-
-        return write_calibration(self, Path(folder), figures=figures, progress=progress)
 
 
 def given_robots(robots: RobotSource | Sequence[RobotSource]) -> list[Robot]:
@@ -116,7 +50,7 @@ def given_robots(robots: RobotSource | Sequence[RobotSource]) -> list[Robot]:
     return [load(item) for item in items]
 
 
-def calibrate(
+def fit_model(
     observations: str | Path,
     robots: RobotSource | Sequence[RobotSource],
     *,
@@ -174,16 +108,16 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
     z = problem.coordinate_of({name: np.array(value) for name, value in fit.values.items()})
     check_believable(problem, z)
     nan = float("nan")
-    friction: tuple[Fitted, ...] = ()
+    friction: tuple[Estimate, ...] = ()
     if "friction" in problem.free:
         best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
-        friction = tuple(Fitted(float(value), nan, nan) for value in best)
+        friction = tuple(Estimate(float(value), nan, nan) for value in best)
     unknown = np.full(problem.experiment.size, nan)
     return Calibrated(
         problem=problem,
         method="paper",
         reading=reading,
-        values={name: Fitted(value, nan, nan) for name, value in fit.values.items()},
+        values={name: Estimate(value, nan, nan) for name, value in fit.values.items()},
         friction=friction,
         predicted={name: (values, unknown, unknown) for name, values in problem.predicted_at(z).items()},
         discrepancy={},
@@ -293,12 +227,12 @@ def _limits(draws: Samples) -> tuple[Samples, Samples]:
     return low, high
 
 
-def _fitted(value: float, draws: Samples) -> Fitted:
+def _fitted(value: float, draws: Samples) -> Estimate:
     low, high = (float(end) for end in _limits(draws))
-    return Fitted(value, min(low, value), max(high, value))
+    return Estimate(value, min(low, value), max(high, value))
 
 
-def _middle(draws: Samples) -> Fitted:
+def _middle(draws: Samples) -> Estimate:
     return _fitted(float(np.median(draws)), draws)
 
 
@@ -309,7 +243,7 @@ def _friction(
     error: Mapping[Quantity, float],
     reading: str,
     rng: np.random.Generator,
-) -> tuple[Fitted, ...]:
+) -> tuple[Estimate, ...]:
     """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it."""
     if "friction" not in problem.free:
         return ()
@@ -321,7 +255,7 @@ def _friction(
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
     low, high = _limits(draws)
     low, high = np.minimum(low, middle), np.maximum(high, middle)  # NaN where no motor rate was observed
-    return tuple(Fitted(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))
+    return tuple(Estimate(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))
 
 
 def _predicted(

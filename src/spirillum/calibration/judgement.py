@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.calibration.estimate import Estimate
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.identifiability import FAR
 from spirillum.calibration.least_squares import FEWEST_LEFT
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
-
-if TYPE_CHECKING:
-    from spirillum.calibration.fit import Fitted
 
 __all__ = [
     "CALLED",
@@ -118,7 +115,7 @@ def stray_warnings(problem: Problem, z: Samples) -> list[str]:
 
 
 def misfit_warnings(
-    problem: Problem, discrepancy: Mapping[Quantity, Fitted], left: Mapping[Quantity, float] | None = None
+    problem: Problem, discrepancy: Mapping[Quantity, Estimate], left: Mapping[Quantity, float] | None = None
 ) -> list[str]:
     """A wrong model must not look certain: say by how much it misses.
 
@@ -204,7 +201,7 @@ def synthetic_warning(source: str) -> str:
     return f"{source} says that its numbers are synthetic: nothing here is measured"
 
 
-def common_warnings(problem: Problem, friction: Sequence[Fitted]) -> list[str]:
+def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]:
     """What has to be said of any method's answer."""
     experiment = problem.experiment
     found = []

@@ -1,30 +1,26 @@
-"""The posterior on disk: ArviZ groups in NetCDF, with all that a later prediction needs in the attributes."""
+"""A posterior as labelled groups in the layout of ArviZ, with all that a later prediction needs in the attributes."""
 
 from __future__ import annotations
 
 import json
 import warnings
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.answer import versions
 from spirillum.arrays import Samples
-from spirillum.files import whole_file
-from spirillum.fitted.posterior_file import posterior_checksum
+from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.experiment import Quantity
-    from spirillum.calibration.fit import Calibrated
     from spirillum.calibration.posterior import Posterior
 
-__all__ = ["SCHEMA", "posterior_tree", "write_posterior"]
-
-SCHEMA = "spirillum.posterior/1"
+__all__ = ["posterior_tree"]
 
 
 def posterior_tree(found: Calibrated) -> xr.DataTree:
@@ -100,17 +96,3 @@ def _friction(found: Calibrated) -> list[dict[str, Any]]:
         for robot, item in zip(found.experiment.robots, found.friction, strict=False)
         if np.isfinite(item.value)
     ]
-
-
-def write_posterior(found: Calibrated, path: Path) -> Path:
-    """Write the posterior as NetCDF-4, whole or not at all."""
-    tree = posterior_tree(found)
-    with whole_file(path) as temporary:
-        squeezed = {"zlib": True, "complevel": 4}
-        encoding = {
-            f"/{name}": {str(item): squeezed for item in group.data_vars}
-            for name, group in tree.children.items()
-            if name in ("posterior", "log_likelihood")
-        }
-        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
-    return path

@@ -18,7 +18,9 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.calibration.fit import LEVEL, Calibrated, RobotSource, calibrate
+from spirillum.calibration.calibrated import Calibrated
+from spirillum.calibration.estimate import LEVEL
+from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.judgement import synthetic_warning
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate
 from spirillum.calibration.posterior import Sampling
@@ -179,7 +181,7 @@ def rank_models(
     _check_common(names, chosen)
     fits = {}
     for name in names:
-        fits[name] = calibrate(
+        fits[name] = fit_model(
             observations, robots, model=name, free=chosen, method="posterior", sampling=sampling, progress=progress
         )
     return ranked_fits(fits)

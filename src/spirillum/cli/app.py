@@ -60,9 +60,9 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
     if wanted:
-        from spirillum import __version__
+        from spirillum.answer import own_version
 
-        typer.echo(f"spirillum {__version__}")
+        typer.echo(f"spirillum {own_version()}")
         raise typer.Exit
 
 
@@ -264,7 +264,7 @@ def study(
     from spirillum.cli import text
 
     with text.progress_bar(quiet=json) as progress:
-        from spirillum.studies.run import study as answer
+        from spirillum.results.study import study as answer
 
         dataset = answer(
             source,

@@ -53,31 +53,25 @@ def calibrate(
 
     Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
     """
-    from spirillum.calibration.fit import calibrate as answer
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import calibration_text, text
-    from spirillum.results.calibration import check_folder, earlier_results
+    from spirillum.results.calibration import calibrate as answer
 
-    if not output.strip():
-        raise InputError("output = ''; allowed: a folder for the results (-o DIR)")
-    folder = Path(output)
-    check_folder(folder)
     robots = [loaded_robot(name, settings) for name in robot]
     with text.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
             robots,
+            output,
             model=model,
             free=free,
             method=method,
             friction=friction,
             sampling=Sampling(seed=seed),
+            figures=not no_figures,
             progress=progress,
         )
-        replaced = earlier_results(folder)
-        written = found.write(folder, figures=not no_figures, progress=progress)
-    content = calibration_text.calibration_content(found.to_dict(), folder, written, replaced)
-    text.show(content, calibration_text.calibration, json=json)
+    text.show(found.to_dict(), calibration_text.calibration, json=json)
     if not found.converged:
         raise typer.Exit(1)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
@@ -13,27 +12,7 @@ from spirillum.cli.text import Answer, friendly_unit, grid, in_unit
 if TYPE_CHECKING:
     from rich.console import Console
 
-__all__ = ["calibration", "calibration_content", "ranking", "suggestion"]
-
-
-def calibration_content(
-    answer: Answer, folder: Path, written: Sequence[Path], replaced: Sequence[Path] = ()
-) -> dict[str, Any]:
-    """The answer with the files that were written; warnings stay last.
-
-    Args:
-        answer: the answer.
-        folder: the folder of its files.
-        written: the files.
-        replaced: files of an earlier calibration, which are gone.
-    """
-    content = {name: item for name, item in answer.items() if name != "warnings"}
-    content |= {"folder": str(folder), "files": sorted(str(path.relative_to(folder)) for path in written)}
-    gone = [path.relative_to(folder) for path in replaced if path not in written]
-    pictures = sum(1 for path in gone if len(path.parts) > 1)
-    names = [str(path) for path in gone if len(path.parts) == 1] + ([_counted(pictures, "figure")] if pictures else [])
-    said = [f"{folder} held an earlier calibration: its {' and '.join(names)} are gone"] if names else []
-    return {**content, "warnings": [*answer["warnings"], *said]}
+__all__ = ["calibration", "ranking", "suggestion"]
 
 
 def _counted(number: int, word: str) -> str:

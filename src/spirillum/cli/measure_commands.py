@@ -90,7 +90,7 @@ def measure(
             raise typer.Exit(1)
         return
     _check_no_expectations(expect_tail_rate, expect_body_rate, expect_speed, duration, fps, view_width)
-    from spirillum.measurement.measure import measure as answer
+    from spirillum.results.measurement import measure as answer
 
     with text.progress_bar(quiet=json) as progress:
         result = answer(

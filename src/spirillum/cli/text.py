@@ -257,9 +257,9 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     """Answer of `study`."""
     import numpy as np
 
-    from spirillum.papers.biorob2012.claims import evaluated
+    from spirillum.papers.registry import claims_of
 
-    claims = evaluated(dataset)
+    claims = claims_of(dataset)
     verdicts = {
         verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
     }

@@ -7,12 +7,13 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.files import whole_file
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
@@ -24,9 +25,12 @@ from spirillum.fitted.calibration_file import (
 from spirillum.robot.options import Calibration, FittedTo
 from spirillum.robot.robot import Robot
 
-__all__ = ["PosteriorFile", "posterior_checksum", "read_posterior"]
+if TYPE_CHECKING:
+    import xarray as xr
 
-_SCHEMA = "spirillum.posterior/1"
+__all__ = ["SCHEMA", "PosteriorFile", "posterior_checksum", "read_posterior", "write_posterior"]
+
+SCHEMA = "spirillum.posterior/1"
 _DRAWS = 1000
 _WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
 _TAIL = ("channel_diameter", "wavelength", "amplitude")
@@ -181,7 +185,7 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     try:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             attributes = {str(name): item for name, item in tree.attrs.items()}
-            if attributes.get("schema") != _SCHEMA:
+            if attributes.get("schema") != SCHEMA:
                 raise InputError(f"{path} is no posterior of a calibration; allowed: {_WHAT}")
             values = {str(name): np.asarray(item.values, float) for name, item in tree["posterior"].data_vars.items()}
         whole = attributes["checksum"] == posterior_checksum(attributes, values)
@@ -241,3 +245,20 @@ def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Sample
         friction=tuple(json.loads(attributes["friction"])),
         friction_reading=str(attributes["friction_reading"]),
     )
+
+
+def write_posterior(tree: xr.DataTree, path: Path) -> None:
+    """Write a posterior as NetCDF-4, whole or not at all.
+
+    Args:
+        tree: groups and attributes, see `spirillum.calibration.posterior_tree`.
+        path: the file.
+    """
+    with whole_file(path) as temporary:
+        squeezed = {"zlib": True, "complevel": 4}
+        encoding = {
+            f"/{name}": {str(item): squeezed for item in group.data_vars}
+            for name, group in tree.children.items()
+            if name in ("posterior", "log_likelihood")
+        }
+        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)

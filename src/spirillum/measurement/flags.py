@@ -10,8 +10,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.measurement.rates import Rate
 from spirillum.robot.robot import Robot
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.track import Track
 
 __all__ = ["BY_HAND", "IMPORTED", "SEEN", "SYNTHETIC", "flags_of", "says_synthetic"]
 

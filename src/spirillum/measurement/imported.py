@@ -14,8 +14,9 @@ from spirillum.files import read_text
 from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
 from spirillum.measurement.tables import Row, read_table
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.track import Track
 
 __all__ = ["read_track"]
 

@@ -13,8 +13,10 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.tables import Row, Table, read_table
+from spirillum.vision.camera.scale import Scale
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.track import Flag, Scale, Track
+from spirillum.vision.track.track import Track
 
 __all__ = [
     "EDGE",

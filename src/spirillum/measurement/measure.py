@@ -1,19 +1,15 @@
-"""From videos to speeds and rates: `spirillum.measure`."""
+"""From videos to speeds and rates: what is asked, one trial after the other, and all of them together."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
-from spirillum.files import output_folder, whole_file, write_text
-from spirillum.formats.labelled import Labelled
-from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.imported import read_track
 from spirillum.measurement.marks import (
     Marks,
@@ -24,21 +20,22 @@ from spirillum.measurement.marks import (
     read_marks,
     track_of_marks,
 )
-from spirillum.measurement.rows import observation_rows
-from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.sight import Sighted, sighted
 from spirillum.measurement.summary import Summary, compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.view.annotate import annotated_film
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, load_setup
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.follow import Watcher, follow
+from spirillum.vision.track.track import Track
+from spirillum.vision.video.frames import Video
 
-__all__ = ["Measurement", "measure"]
+__all__ = ["TABLE", "Asked", "Measurement", "Progress", "asked_of", "measured_trial", "measurement_of"]
 
 Progress = Callable[[str, int, int], None]
-_TABLE = "observations.csv"
+TABLE = "observations.csv"
+"""Name of the table that a measurement writes."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +71,8 @@ class Measurement:
         ]
         if len(self.trials) == 1:
             found.append("one trial: the intervals are its own, and say nothing of how trials differ")
-        if self.files and _TABLE not in self.files:
-            found.append(f"no trial gives a speed or a rate of a robot in a channel: {_TABLE} is not written")
+        if self.files and TABLE not in self.files:
+            found.append(f"no trial gives a speed or a rate of a robot in a channel: {TABLE} is not written")
         if self.left:
             found.append(f"not of this measurement, and left in the folder from before: {', '.join(self.left)}")
         return tuple(found)
@@ -105,80 +102,144 @@ def _sentences(trial: Trial) -> list[str]:
     return [f"{trial.name}: {sentence}" for sentence in (*flags, *missing)]
 
 
-def measure(
+class Asked(NamedTuple):
+    """Videos of one robot with one setup, checked: one trial each."""
+
+    videos: tuple[Path, ...]
+    """Films or folders of images."""
+    names: tuple[str, ...]
+    """Names of the trials."""
+    readings: tuple[Marks | None, ...]
+    """Readings by hand of each video."""
+    setup: Setup
+    """The setup, with the times that were asked for."""
+    setup_file: str
+    """The setup file."""
+    robot: Robot
+    """The robot."""
+    track: Path | None
+    """Table of positions that another program has found."""
+    tracking: bool
+    """Whether the robot is looked for in the videos."""
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the setup file, from which its other files are named."""
+        return Path(self.setup_file).parent
+
+
+def asked_of(
     videos: str | Path | Sequence[str | Path],
     setup: str | Path,
-    output: str | Path | None = None,
     *,
     marks: str | Path | None = None,
     track: str | Path | None = None,
     tracking: bool = True,
-    annotated: bool = True,
-    figures: bool = True,
     start: float | None = None,
     end: float | None = None,
     overrides: Mapping[str, Any] | None = None,
-    progress: Progress | None = None,
-) -> Measurement:
-    """Measure forward velocity and rotation rates of a robot in videos, one video a trial.
-
-    A video that cannot be measured does not stop the others.
+) -> Asked:
+    """Check what is to be measured, before any video is opened.
 
     Args:
-        videos: films or folders of images, each once; all of them with the same setup and robot.
+        videos: films or folders of images, each once.
         setup: the setup file.
-        output: folder for the results; None writes nothing.
-        marks: table of readings by hand, which replace what is seen on their frames.
-        track: table of trackpy or DeepLabCut with the positions of one video, instead of our own tracking.
-        tracking: look for the robot in the videos; if not, the readings by hand are all there is.
-        annotated: write an annotated video of each trial.
-        figures: draw figures and write the report.
+        marks: table of readings by hand.
+        track: table of trackpy or DeepLabCut with the positions of one video.
+        tracking: look for the robot in the videos.
         start: time in the video from which on to measure, s, instead of the setup's.
         end: time until which to measure, s.
         overrides: dotted fields of the robot, as for `spirillum.load`.
-        progress: called with what is being done, steps done and steps in all.
 
     Raises:
-        InputError: if setup, robot or a table is wrong, or no video could be measured.
-        KeyboardInterrupt: if it was interrupted; the trials that were finished are written.
-        OSError: if a file could not be written, for want of space, say; the same.
+        InputError: if setup, robot, a name or a table is wrong.
     """
     given = [videos] if isinstance(videos, (str, Path)) else list(videos)
-    words = [*(("video", video) for video in given), ("output", output), ("marks", marks), ("track", track)]
+    words = [*(("video", video) for video in given), ("marks", marks), ("track", track)]
     for what, word in words:
         if word == "":  # else it would be the folder one works in
             raise InputError(f'{what} = ""; allowed: a name')
     paths = [Path(video) for video in given]
     chosen, robot = _loaded(setup, overrides, start, end)
     readings = _readings(paths, marks, track, tracking=tracking)
-    names = _names(paths)
-    folder = None if output is None else Path(output)
-    fresh = folder is not None and not folder.exists()
-    if folder is not None:
-        _check_folder(output_folder(folder))
-    work = _Work(chosen, robot, str(setup), folder, annotated=annotated, figures=figures, progress=progress)
-    for number, (path, name) in enumerate(zip(paths, names, strict=True)):
-        try:
-            work.add(path, name, number, len(paths), readings[number], track, tracking=tracking)
-        except (KeyboardInterrupt, OSError):
-            work.keep()
-            raise
-        except InputError as error:
-            work.failures.append((str(path), str(error)))
-    if not work.trials:
-        if folder is not None and fresh and not any(folder.iterdir()):
-            folder.rmdir()
-        more = "" if len(paths) == 1 else f" (and {len(paths) - 1} more)"
-        sentences = [sentence for _, sentence in work.failures]
-        raise InputError(f"{sentences[0]}{more}", sentences)
-    return work.finish(interrupted=False)
+    table = None if track is None else Path(track)
+    return Asked(tuple(paths), tuple(_names(paths)), tuple(readings), chosen, str(setup), robot, table, tracking)
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse to replace a table of observations that no measurement has written."""
-    table = folder / _TABLE
-    if table.exists() and not any(folder.glob("*.nc")):
-        raise InputError(f"{table} is there and not from a measurement; allowed: another folder for the results")
+def measured_trial(
+    asked: Asked,
+    number: int,
+    video: Path | Video,
+    *,
+    progress: Callable[[int, int | None], None] | None = None,
+    on_frame: Watcher | None = None,
+) -> Trial:
+    """Speed, rates and wobble from one video.
+
+    Args:
+        asked: what is measured.
+        number: place of the video among them.
+        video: its path, or the video opened.
+        progress: called with frames done and, where it is known, frames in all.
+        on_frame: called with every frame and what was found on it.
+
+    Raises:
+        InputError: if the video cannot be measured.
+    """
+    path, name, marks = asked.videos[number], asked.names[number], asked.readings[number]
+    if asked.tracking and asked.track is None:
+        track = follow(video, asked.setup, asked.robot, folder=asked.folder, progress=progress, on_frame=on_frame)
+        ruled = sighted(path, asked.setup, asked.folder).ruled if _in_pixels(marks) else None
+    else:
+        sight = sighted(path, asked.setup, asked.folder, needed=asked.track is not None or _in_pixels(marks))
+        ruled = sight.ruled
+        if marks is not None and ruled is not None:
+            check_pixels(marks, ruled.size)
+        track = replace(_of_tables(path, sight, marks, asked), words=sight.words)
+        marks = marks if asked.track is not None else None
+    read = None  # no frame was corrected
+    if marks is not None:
+        check_pixels(marks, track.size)
+        read = frames_read(track, marks)
+        track = corrected(track, marks, ruled)
+    return trial_of(track, asked.robot, name, read)
+
+
+def _of_tables(path: Path, sight: Sighted, marks: Marks | None, asked: Asked) -> Track:
+    if asked.track is not None:
+        assert sight.ruled is not None  # noqa: S101 - asked for
+        assert sight.time_of is not None  # noqa: S101
+        return read_track(asked.track, asked.setup, path.name, sight.ruled, sight.time_of)
+    if marks is None:
+        raise InputError(f"{path} has no readings by hand; allowed: some, or tracking")
+    check_times(marks, sight.duration)
+    track = track_of_marks(marks, asked.setup, path.name, sight.ruled, sight.time_of)
+    if sight.seen:
+        return track
+    unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
+    return replace(track, flags=(*track.flags, unseen))
+
+
+def measurement_of(
+    asked: Asked, trials: Sequence[Trial], failures: Sequence[tuple[str, str]] = (), *, interrupted: bool = False
+) -> Measurement:
+    """All trials compared with each other, and their summary.
+
+    Args:
+        asked: what was measured.
+        trials: the trials, one at least.
+        failures: videos that could not be measured, each with a sentence.
+        interrupted: whether it was interrupted before the last video.
+    """
+    compared_trials = compared(trials)
+    return Measurement(
+        tuple(compared_trials),
+        summary_of(compared_trials),
+        asked.robot,
+        asked.setup_file,
+        tuple(failures),
+        interrupted=interrupted,
+    )
 
 
 def _loaded(
@@ -253,141 +314,6 @@ def _readings(
         if name not in known:
             raise InputError(f"{marks}, column video: '{name[:60]}'; allowed: {', '.join(path.name for path in paths)}")
     return [next((item for name, item in found.items() if known[name] == number), None) for number in range(len(paths))]
-
-
-class _Work:
-    """Trials as they are measured and written, one after the other."""
-
-    def __init__(
-        self,
-        setup: Setup,
-        robot: Robot,
-        setup_file: str,
-        folder: Path | None,
-        *,
-        annotated: bool,
-        figures: bool,
-        progress: Progress | None,
-    ) -> None:
-        self.setup, self.robot, self.setup_file, self.folder = setup, robot, setup_file, folder
-        self.beside = Path(setup_file).parent
-        self.annotated, self.figures = annotated and folder is not None, figures
-        self.progress: Progress = progress or (lambda _what, _done, _total: None)
-        self.trials: list[Trial] = []
-        self.failures: list[tuple[str, str]] = []
-        self.files: list[str] = []
-        self.thumbnails: dict[str, bytes] = {}
-
-    def add(
-        self,
-        path: Path,
-        name: str,
-        number: int,
-        total: int,
-        marks: Marks | None,
-        table: str | Path | None,
-        *,
-        tracking: bool,
-    ) -> None:
-        """Measure one video and write what belongs to it alone."""
-        words = path.name if total == 1 else f"{path.name} ({number + 1} of {total})"
-
-        def tell(done: int, frames: int | None) -> None:
-            self.progress(words, done, max(done, frames or 0))
-
-        if tracking and table is None:
-            track = self._followed(path, name, tell)
-            ruled = sighted(path, self.setup, self.beside).ruled if _in_pixels(marks) else None
-        else:
-            sight = sighted(path, self.setup, self.beside, needed=table is not None or _in_pixels(marks))
-            ruled = sight.ruled
-            if marks is not None and ruled is not None:
-                check_pixels(marks, ruled.size)
-            track = replace(self._of_tables(path, sight, marks, table), words=sight.words)
-            marks = marks if table is not None else None
-        read = None  # no frame was corrected
-        if marks is not None:
-            check_pixels(marks, track.size)
-            read = frames_read(track, marks)
-            track = corrected(track, marks, ruled)
-        trial = trial_of(track, self.robot, name, read)
-        if self.folder is not None:
-            self._write(self.folder / f"{name}.nc", series_of(trial, self.robot))
-            self._write(self.folder / f"{name}.movement.nc", movement_of(trial, self.robot))
-        self.trials.append(trial)
-
-    def _followed(self, path: Path, name: str, tell: Callable[[int, int | None], None]) -> Track:
-        from spirillum.vision.track.follow import follow
-        from spirillum.vision.video.frames import open_video
-
-        if not self.annotated or self.folder is None:
-            return follow(path, self.setup, self.robot, folder=self.beside, progress=tell)
-        target = self.folder / f"{name}.annotated.mp4"
-
-        def thumbnail(picture: bytes) -> None:
-            self.thumbnails[name] = picture
-
-        video = open_video(path, self.setup.camera.frames_per_second)
-        words = {"title": f"{path.name}, annotated"}
-        if says_synthetic(video.words):
-            words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
-        with whole_file(target) as temporary, annotated_film(temporary, self.robot, words, thumbnail) as on_frame:
-            track = follow(video, self.setup, self.robot, folder=self.beside, progress=tell, on_frame=on_frame)
-        self.files.append(target.name)
-        return track
-
-    def _of_tables(self, path: Path, sight: Sighted, marks: Marks | None, table: str | Path | None) -> Track:
-        if table is not None:
-            assert sight.ruled is not None  # noqa: S101 - asked for
-            assert sight.time_of is not None  # noqa: S101
-            return read_track(table, self.setup, path.name, sight.ruled, sight.time_of)
-        if marks is None:
-            raise InputError(f"{path} has no readings by hand; allowed: some, or tracking")
-        check_times(marks, sight.duration)
-        track = track_of_marks(marks, self.setup, path.name, sight.ruled, sight.time_of)
-        if sight.seen:
-            return track
-        unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
-        return replace(track, flags=(*track.flags, unseen))
-
-    def _write(self, path: Path, arrays: Labelled) -> None:
-        arrays.write(path)
-        self.files.append(path.name)
-
-    def keep(self) -> None:
-        """Write what belongs to the trials that are finished, as far as there is room for it."""
-        with suppress(OSError):
-            if self.trials:
-                self.finish(interrupted=True)
-
-    def finish(self, *, interrupted: bool) -> Measurement:
-        """Compare the trials and write what belongs to all of them."""
-        trials = compared(self.trials)
-        rows = observation_rows(trials, self.robot, Path(self.setup_file).name)
-        if self.folder is not None and rows is not None:
-            write_text(self.folder / _TABLE, rows)
-            self.files.append(_TABLE)
-        found = Measurement(
-            tuple(trials),
-            summary_of(trials),
-            self.robot,
-            self.setup_file,
-            tuple(self.failures),
-            tuple(self.files),
-            interrupted,
-            self._left(),
-        )
-        if self.folder is None or not self.figures:
-            return found
-        from spirillum.results.measurement_report import write_measurement_report
-
-        more = write_measurement_report(found, self.folder, self.thumbnails, self.progress)
-        return replace(found, files=(*found.files, *more))
-
-    def _left(self) -> tuple[str, ...]:
-        if self.folder is None:
-            return ()
-        return tuple(sorted(path.name for path in self.folder.glob("*.nc") if path.name not in self.files))
 
 
 def _in_pixels(marks: Marks | None) -> bool:

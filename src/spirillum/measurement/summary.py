@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
 from spirillum.measurement.statistics import mean_with_interval
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial
-from spirillum.vision.track.track import Flag
+from spirillum.vision.flag import Flag
 
 __all__ = ["Summary", "compared", "summary_of"]
 

@@ -15,9 +15,10 @@ from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.outliers import stray_frames
 from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
 from spirillum.robot.robot import Robot
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.track import Track
 
 __all__ = [
     "LEVEL",

@@ -1,4 +1,4 @@
-"""What a calibration leaves on disk."""
+"""A calibration fitted and written: `spirillum.calibrate`."""
 
 from __future__ import annotations
 
@@ -6,21 +6,25 @@ import csv
 import hashlib
 import io
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from spirillum.calibration.answers import calibration_text
+from spirillum.calibration.calibrated import Calibrated
+from spirillum.calibration.fit import RobotSource, fit_model
+from spirillum.calibration.posterior import Sampling
+from spirillum.calibration.posterior_tree import posterior_tree
+from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
 from spirillum.files import output_folder, write_text
+from spirillum.fitted.posterior_file import write_posterior
+from spirillum.results.calibration_file import calibration_text
+from spirillum.view.figures.calibration import calibration_figures
+from spirillum.view.figures.style import save
 
-if TYPE_CHECKING:
-    from spirillum.calibration.fit import Calibrated
-    from spirillum.calibration.problem import Progress
-
-__all__ = ["check_folder", "earlier_results", "predictions_text", "write_calibration"]
+__all__ = ["calibrate", "predictions_text", "write_calibration"]
 
 _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
 _FIGURES = ("observed-", "residuals", "posterior", "profiles")
@@ -98,10 +102,63 @@ def _checksum(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+def calibrate(
+    observations: str | Path,
+    robots: RobotSource | Sequence[RobotSource],
+    output: str | Path | None = None,
+    *,
+    model: str = "sbt",
+    free: str | Sequence[str] | None = None,
+    method: str = "posterior",
+    friction: str = "rotor",
+    sampling: Sampling | None = None,
+    figures: bool = True,
+    progress: Progress | None = None,
+) -> Calibrated:
+    """Fit parameters of a model to observed speeds and rates.
+
+    Args:
+        observations: observations file, see `docs/commands`.
+        robots: a robot for each channel (preset, file, mapping or robot); the tails are those of the rows.
+        output: folder for `calibration.toml`, `predictions.csv`, figures and, for a posterior, `posterior.nc`; None:
+            nothing is written.
+        model: hydrodynamic model.
+        free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
+        method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
+        friction: reading under which B_eff follows from (18): `rotor` or `paper`.
+        sampling: how the posterior is sampled.
+        figures: draw figures too, which takes some seconds.
+        progress: told what is being done.
+
+    Raises:
+        InputError: for wrong input, or observations that cannot tell what is asked, or a folder that cannot be
+            written to or holds files of the same names that no calibration has written.
+    """
+    if output is not None and not str(output).strip():
+        raise InputError("output = ''; allowed: a folder for the results (-o DIR)")
+    folder = None if output is None else Path(output)
+    if folder is not None:
+        check_folder(folder)
+    found = fit_model(
+        observations,
+        robots,
+        model=model,
+        free=free,
+        method=method,
+        friction=friction,
+        sampling=sampling,
+        progress=progress,
+    )
+    return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)
+
+
 def write_calibration(
     found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
-) -> list[Path]:
+) -> Calibrated:
     """Write all files of a calibration, the figures last; each is whole or not there.
+
+    Returns:
+        The calibration with the names of its files, and a warning where files of an earlier one are gone.
 
     Raises:
         InputError: if the folder cannot be written to, or holds files of the same names that no calibration has
@@ -109,23 +166,33 @@ def write_calibration(
     """
     check_folder(folder)
     output_folder(folder)
-    for path in earlier_results(folder):  # half of an older calibration beside a new one would be believed
+    earlier = earlier_results(folder)
+    for path in earlier:  # half of an older calibration beside a new one would be believed
         path.unlink(missing_ok=True)
     (folder / "figures" / _RECORD).unlink(missing_ok=True)
     written = [folder / "calibration.toml", folder / "predictions.csv"]
     write_text(written[0], calibration_text(found))
     write_text(written[1], predictions_text(found))
     if found.posterior is not None:
-        from spirillum.calibration.posterior_tree import write_posterior
+        written.append(folder / "posterior.nc")
+        write_posterior(posterior_tree(found), written[-1])
+    if figures:
+        written += _drawn(found, folder, progress)
+    names = sorted(str(path.relative_to(folder)) for path in written)
+    gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
+    said = [f"{folder} held an earlier calibration: its {gone} are gone"] if gone else []
+    return replace(found, folder=folder, files=tuple(names), warnings=(*found.warnings, *said))
 
-        written.append(write_posterior(found, folder / "posterior.nc"))
-    return written + (_drawn(found, folder, progress) if figures else [])
+
+def _gone(paths: Sequence[Path]) -> str:
+    """Files of an earlier calibration that the new one does not have, in words."""
+    pictures = sum(1 for path in paths if len(path.parts) > 1)
+    names = [str(path) for path in paths if len(path.parts) == 1]
+    names += [f"{pictures} figure{'s' if pictures > 1 else ''}"] if pictures else []
+    return " and ".join(names)
 
 
 def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
-    from spirillum.view.figures.calibration import calibration_figures
-    from spirillum.view.figures.style import save
-
     tell = progress or (lambda _what, _done, _total: None)
     tell("figures", 0, 1)
     inside = output_folder(folder / "figures")

@@ -16,6 +16,8 @@ from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured
 from spirillum.results.study_report import EmbeddedPicture
+from spirillum.view.figures.measurement import measurement_figures
+from spirillum.view.figures.style import save
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 
@@ -43,9 +45,6 @@ def write_measurement_report(
     Raises:
         InputError: if the folder cannot be written to.
     """
-    from spirillum.view.figures.measurement import measurement_figures
-    from spirillum.view.figures.style import save
-
     pictures = measurement_figures(measurement)
     figures = output_folder(folder / "figures")
     embedded, written = [], []

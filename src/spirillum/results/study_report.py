@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.files import output_folder, write_text
+from spirillum.papers.registry import claims_of, figures_of
 from spirillum.results.study_content import content
+from spirillum.results.study_robot import robot_picture
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.style import save
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from spirillum.view.figures.picture import Picture
 
 __all__ = ["EmbeddedPicture", "write_report"]
 
@@ -47,8 +49,6 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
     Raises:
         InputError: if the folder cannot be written to.
     """
-    from spirillum.papers.biorob2012.claims import evaluated
-
     pictures = _pictures(dataset)
     figures = output_folder(folder / "figures")
     steps = len(pictures) + 1
@@ -57,7 +57,7 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
         tell(f"figure {name}", done, steps)
         embedded.append(_drawn(name, picture, figures))
     tell("report", len(pictures), steps)
-    claims = [claim.to_dict() for claim in evaluated(dataset)]
+    claims = [claim.to_dict() for claim in claims_of(dataset)]
     write_text(folder / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
     write_text(folder / "report.html", _page(dataset, embedded, claims))
     tell("report", steps, steps)
@@ -65,16 +65,11 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
 
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     """The robot first, then the figures of the study."""
-    from spirillum.results.study_robot import robot_picture
-    from spirillum.view.figures.study import study_figures
-
     robot = robot_picture(dataset)
-    return {**({"robot": robot} if robot else {}), **study_figures(dataset)}
+    return {**({"robot": robot} if robot else {}), **figures_of(dataset)}
 
 
 def _drawn(name: str, picture: Picture, figures: Path) -> EmbeddedPicture:
-    from spirillum.view.figures.style import save
-
     png, svg = save(picture.figure(), figures / name)
     vector = svg.stat().st_size <= _LARGEST_SVG
     data = base64.b64encode((svg if vector else png).read_bytes()).decode("ascii")

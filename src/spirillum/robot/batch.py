@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, cast
+from functools import cache, cached_property
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_hints
 
 import numpy as np
 
@@ -16,76 +16,54 @@ from spirillum.robot.actuation import DriveKind, FrictionReading
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.parts import End, Shape
 from spirillum.robot.placement import Placement
-
-if TYPE_CHECKING:
-    from spirillum.robot.robot import Robot
+from spirillum.robot.tables import RobotTables
 
 __all__ = ["CalibrationFactors", "Electrics", "RobotBatch", "batches"]
 
-# Attribute of the batch -> dotted field of the robot file, and the value of an unset field.
-_COLUMNS: dict[str, tuple[str, float]] = {
-    "viscosity": ("fluid.viscosity", np.nan),
-    "density": ("fluid.density", np.nan),
-    "body_diameter": ("body.diameter", np.nan),
-    "body_length": ("body.length", np.nan),
-    "fillet": ("body.fillet", 0.0),
-    "coupling_diameter": ("coupling.diameter", 0.0),
-    "coupling_length": ("coupling.length", 0.0),
-    "coupling_clearance": ("coupling.clearance", 0.0),
-    "wavelength": ("tail.wavelength", np.nan),
-    "amplitude": ("tail.amplitude", np.nan),
-    "tail_length": ("tail.length", np.nan),
-    "wire_diameter": ("tail.wire_diameter", np.nan),
-    "taper": ("tail.taper", np.inf),
-    "channel_diameter": ("channel.diameter", np.inf),
-    "channel_length": ("channel.length", np.inf),
-    "axis_height": ("model.rft.axis_height", np.nan),
-    "effective_friction": ("friction.effective", np.nan),
-    "drive_rate": ("drive.rate", np.nan),
-    "drive_torque": ("drive.torque", np.nan),
-    "magnetic_moment": ("magnetic.moment", np.nan),
-    "moment_angle": ("magnetic.moment_angle", np.nan),
-    "magnetic_field": ("magnetic.field", np.nan),
-    "field_rate": ("magnetic.rotation_rate", np.nan),
-    "body_mass": ("body.mass", np.nan),
-    "tail_density": ("tail.density", np.nan),
-}
-_ELECTRIC_COLUMNS: dict[str, tuple[str, float]] = {
-    "torque_constant": ("motor.torque_constant", np.nan),
-    "back_emf_constant": ("motor.back_emf_constant", np.nan),
-    "inductance": ("motor.inductance", np.nan),
-    "rotor_friction": ("motor.rotor_friction", np.nan),
-    "constant": ("motor.resistance.constant", np.nan),
-    "decay": ("motor.resistance.decay", 0.0),
-    "decay_rate": ("motor.resistance.decay_rate", 0.0),
-    "growth": ("motor.resistance.growth", 0.0),
-    "growth_rate": ("motor.resistance.growth_rate", 0.0),
-    "slope": ("motor.resistance.slope", 0.0),
-    "voltage": ("battery.voltage", np.nan),
-    "internal_resistance": ("battery.internal_resistance", np.nan),
-    "capacity": ("battery.capacity", np.nan),
-    "duty": ("drive.duty", 1.0),
-}
+
+class Column(NamedTuple):
+    """Where a column of a batch comes from, and what its values may be."""
+
+    path: str
+    """Dotted field of the robot file."""
+    unset: float = np.nan
+    """Value where the field is not set."""
+    optional: bool = False
+    """Whether a robot swims without it."""
+    zero: bool = False
+    """Whether zero is allowed."""
+    signed: bool = False
+    """Whether negative values are allowed."""
+    infinite: bool = False
+    """Whether infinity is allowed."""
+
+
+@cache
+def _columns(name: str) -> dict[str, Column]:
+    """Columns of a struct of arrays by attribute."""
+    hints = get_type_hints(globals()[name], include_extras=True)
+    marks = {name: getattr(hint, "__metadata__", ()) for name, hint in hints.items()}
+    return {name: mark for name, found in marks.items() for mark in found if isinstance(mark, Column)}
 
 
 @dataclass(frozen=True)
 class Electrics:
     """Motor and battery of every robot (Table II), SI; `polarity` is the sign of the driven rate about +x."""
 
-    torque_constant: PerRobot
-    back_emf_constant: PerRobot
-    inductance: PerRobot
-    rotor_friction: PerRobot
-    constant: PerRobot
-    decay: PerRobot
-    decay_rate: PerRobot
-    growth: PerRobot
-    growth_rate: PerRobot
-    slope: PerRobot
-    voltage: PerRobot
-    internal_resistance: PerRobot
-    capacity: PerRobot
-    duty: PerRobot
+    torque_constant: Annotated[PerRobot, Column("motor.torque_constant")]
+    back_emf_constant: Annotated[PerRobot, Column("motor.back_emf_constant")]
+    inductance: Annotated[PerRobot, Column("motor.inductance")]
+    rotor_friction: Annotated[PerRobot, Column("motor.rotor_friction")]
+    constant: Annotated[PerRobot, Column("motor.resistance.constant")]
+    decay: Annotated[PerRobot, Column("motor.resistance.decay", unset=0.0)]
+    decay_rate: Annotated[PerRobot, Column("motor.resistance.decay_rate", unset=0.0)]
+    growth: Annotated[PerRobot, Column("motor.resistance.growth", unset=0.0)]
+    growth_rate: Annotated[PerRobot, Column("motor.resistance.growth_rate", unset=0.0)]
+    slope: Annotated[PerRobot, Column("motor.resistance.slope", unset=0.0)]
+    voltage: Annotated[PerRobot, Column("battery.voltage")]
+    internal_resistance: Annotated[PerRobot, Column("battery.internal_resistance")]
+    capacity: Annotated[PerRobot, Column("battery.capacity")]
+    duty: Annotated[PerRobot, Column("drive.duty", unset=1.0)]
     polarity: PerRobot
 
 
@@ -110,31 +88,31 @@ class RobotBatch:
     An unset number is NaN, an absent channel has infinite size, a tail without taper an infinite `taper`.
     """
 
-    viscosity: PerRobot
-    density: PerRobot
-    body_diameter: PerRobot
-    body_length: PerRobot
-    fillet: PerRobot
-    coupling_diameter: PerRobot
-    coupling_length: PerRobot
-    coupling_clearance: PerRobot
-    wavelength: PerRobot
-    amplitude: PerRobot
-    tail_length: PerRobot
-    wire_diameter: PerRobot
-    taper: PerRobot
-    channel_diameter: PerRobot
-    channel_length: PerRobot
-    axis_height: PerRobot
-    effective_friction: PerRobot
-    drive_rate: PerRobot
-    drive_torque: PerRobot
-    magnetic_moment: PerRobot
-    moment_angle: PerRobot
-    magnetic_field: PerRobot
-    field_rate: PerRobot
-    body_mass: PerRobot
-    tail_density: PerRobot
+    viscosity: Annotated[PerRobot, Column("fluid.viscosity")]
+    density: Annotated[PerRobot, Column("fluid.density")]
+    body_diameter: Annotated[PerRobot, Column("body.diameter")]
+    body_length: Annotated[PerRobot, Column("body.length")]
+    fillet: Annotated[PerRobot, Column("body.fillet", unset=0.0, zero=True)]
+    coupling_diameter: Annotated[PerRobot, Column("coupling.diameter", unset=0.0, zero=True)]
+    coupling_length: Annotated[PerRobot, Column("coupling.length", unset=0.0, zero=True)]
+    coupling_clearance: Annotated[PerRobot, Column("coupling.clearance", unset=0.0, zero=True)]
+    wavelength: Annotated[PerRobot, Column("tail.wavelength")]
+    amplitude: Annotated[PerRobot, Column("tail.amplitude")]
+    tail_length: Annotated[PerRobot, Column("tail.length")]
+    wire_diameter: Annotated[PerRobot, Column("tail.wire_diameter")]
+    taper: Annotated[PerRobot, Column("tail.taper", unset=np.inf, infinite=True)]
+    channel_diameter: Annotated[PerRobot, Column("channel.diameter", unset=np.inf, infinite=True)]
+    channel_length: Annotated[PerRobot, Column("channel.length", unset=np.inf, infinite=True)]
+    axis_height: Annotated[PerRobot, Column("model.rft.axis_height", optional=True)]
+    effective_friction: Annotated[PerRobot, Column("friction.effective", optional=True, zero=True)]
+    drive_rate: Annotated[PerRobot, Column("drive.rate", optional=True, signed=True)]
+    drive_torque: Annotated[PerRobot, Column("drive.torque", optional=True, signed=True)]
+    magnetic_moment: Annotated[PerRobot, Column("magnetic.moment", optional=True)]
+    moment_angle: Annotated[PerRobot, Column("magnetic.moment_angle", optional=True, zero=True)]
+    magnetic_field: Annotated[PerRobot, Column("magnetic.field", optional=True)]
+    field_rate: Annotated[PerRobot, Column("magnetic.rotation_rate", optional=True, signed=True)]
+    body_mass: Annotated[PerRobot, Column("body.mass", optional=True)]
+    tail_density: Annotated[PerRobot, Column("tail.density", optional=True)]
     hand: PerRobot
     electrics: Electrics | None
     calibration: Mapping[str, CalibrationFactors]
@@ -148,7 +126,7 @@ class RobotBatch:
     placement: Placement
 
     @classmethod
-    def of(cls, robots: Robot | Sequence[Robot], placement: Placement | None = None) -> RobotBatch:
+    def of(cls, robots: RobotTables | Sequence[RobotTables], placement: Placement | None = None) -> RobotBatch:
         """Stack robots that differ in numbers only.
 
         Args:
@@ -167,7 +145,7 @@ class RobotBatch:
         first = items[0]
         hand = np.array([robot.hand for robot in items])
         return cls(
-            **{name: _column(items, *source) for name, source in _COLUMNS.items()},
+            **{name: _column(items, source) for name, source in _columns("RobotBatch").items()},
             hand=hand,
             electrics=_electrics(items, hand),
             calibration={name: _factors(items, name) for name in first.calibration},
@@ -194,11 +172,11 @@ class RobotBatch:
         Raises:
             InputError: for a field that is not a number of the batch, or lengths that do not match.
         """
-        attribute = {path: name for name, (path, _) in _COLUMNS.items()}
-        unknown = [path for path in values if path not in attribute]
+        known = {source.path: (name, source) for name, source in _columns("RobotBatch").items()}
+        unknown = [path for path in values if path not in known]
         if unknown:
-            raise InputError(f"{unknown[0]} is not a number that a batch can vary; allowed: {', '.join(attribute)}")
-        arrays = {attribute[path]: _checked_column(path, value) for path, value in values.items()}
+            raise InputError(f"{unknown[0]} is not a number that a batch can vary; allowed: {', '.join(known)}")
+        arrays = {known[path][0]: _checked_column(known[path][1], value) for path, value in values.items()}
         batch = replace(self, **cast("dict[str, Any]", arrays))
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
@@ -224,8 +202,8 @@ class RobotBatch:
     def known(self) -> Flags:
         """Whether every number that a robot needs is one."""
         result: Flags = np.ones(1, dtype=bool)
-        for name, (path, _) in _COLUMNS.items():
-            if path not in _MAY_BE_UNSET:
+        for name, source in _columns("RobotBatch").items():
+            if not source.optional:
                 result = result & ~np.isnan(getattr(self, name))
         return result
 
@@ -270,73 +248,50 @@ def _cut(struct: _S, cut: slice) -> _S:
     return type(struct)(**{f.name: part(getattr(struct, f.name)) for f in fields(struct)})
 
 
-_MAY_BE_UNSET = (
-    "model.rft.axis_height",
-    "friction.effective",
-    "drive.rate",
-    "drive.torque",
-    "magnetic.moment",
-    "magnetic.moment_angle",
-    "magnetic.field",
-    "magnetic.rotation_rate",
-    "body.mass",
-    "tail.density",
-)
-_MAY_BE_ZERO = (
-    "coupling.diameter",
-    "coupling.length",
-    "coupling.clearance",
-    "body.fillet",
-    "friction.effective",
-    "magnetic.moment_angle",
-)
-_OF_ANY_SIGN = ("drive.rate", "drive.torque", "magnetic.rotation_rate")
-_INFINITE = ("tail.taper", "channel.diameter", "channel.length")
-
-
-def _checked_column(path: str, value: np.ndarray | Sequence[float] | float) -> PerRobot:
+def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float) -> PerRobot:
     """One column of a batch.
 
     Raises:
         InputError: if it is not one axis of numbers that the field may have.
     """
+    path = source.path
     try:
-        column = np.atleast_1d(np.asarray(value, dtype=float))
+        values = np.atleast_1d(np.asarray(value, dtype=float))
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{path} = {str(value)[:60]}; allowed: numbers in SI units") from error
-    if column.ndim != 1 or column.size == 0:
-        raise InputError(f"{path} has shape {column.shape}; allowed: one value, or one for each robot")
-    finite = np.isfinite(column) & (np.abs(column) < 1e30)
-    positive = (column > 0) | ((column == 0) & (path in _MAY_BE_ZERO)) | (path in _OF_ANY_SIGN)
-    allowed = (finite & positive) | np.isnan(column)  # an unknown robot gets no answer, the others do
-    allowed |= np.isposinf(column) & (path in _INFINITE)
+    if values.ndim != 1 or values.size == 0:
+        raise InputError(f"{path} has shape {values.shape}; allowed: one value, or one for each robot")
+    finite = np.isfinite(values) & (np.abs(values) < 1e30)
+    positive = (values > 0) | ((values == 0) & source.zero) | source.signed
+    allowed = (finite & positive) | np.isnan(values)  # an unknown robot gets no answer, the others do
+    allowed |= np.isposinf(values) & source.infinite
     if not np.all(allowed):
         wrong = int(np.argmin(allowed))
-        least = "0 or more" if path in _MAY_BE_ZERO else "any sign" if path in _OF_ANY_SIGN else "above 0"
-        raise InputError(f"{path} of robot {wrong} = {column[wrong]:.6g}; allowed: finite SI numbers, {least}")
-    return column
+        least = "0 or more" if source.zero else "any sign" if source.signed else "above 0"
+        raise InputError(f"{path} of robot {wrong} = {values[wrong]:.6g}; allowed: finite SI numbers, {least}")
+    return values
 
 
-def _value(robot: Robot, path: str, unset: float) -> float:
+def _value(robot: RobotTables, source: Column) -> float:
     item: object = robot
-    for name in path.split("."):
+    for name in source.path.split("."):
         item = getattr(item, name, None)
-    return float(item) if isinstance(item, (int, float)) else unset
+    return float(item) if isinstance(item, (int, float)) else source.unset
 
 
-def _column(robots: Iterable[Robot], path: str, unset: float) -> PerRobot:
-    return np.array([_value(robot, path, unset) for robot in robots])
+def _column(robots: Iterable[RobotTables], source: Column) -> PerRobot:
+    return np.array([_value(robot, source) for robot in robots])
 
 
-def _electrics(robots: Sequence[Robot], hand: PerRobot) -> Electrics | None:
+def _electrics(robots: Sequence[RobotTables], hand: PerRobot) -> Electrics | None:
     if robots[0].motor is None or robots[0].battery is None:
         return None
     forward = np.array([1.0 if robot.motor and robot.motor.polarity == "forward" else -1.0 for robot in robots])
-    columns = {name: _column(robots, *source) for name, source in _ELECTRIC_COLUMNS.items()}
+    columns = {name: _column(robots, source) for name, source in _columns("Electrics").items()}
     return Electrics(**columns, polarity=forward * hand)
 
 
-def _factors(robots: Sequence[Robot], model: str) -> CalibrationFactors:
+def _factors(robots: Sequence[RobotTables], model: str) -> CalibrationFactors:
     entries = [robot.calibration[model] for robot in robots]
     return CalibrationFactors(
         body_drag=np.array([entry.body_drag for entry in entries]),
@@ -347,7 +302,7 @@ def _factors(robots: Sequence[Robot], model: str) -> CalibrationFactors:
     )
 
 
-def _shared(robot: Robot) -> tuple[object, ...]:
+def _shared(robot: RobotTables) -> tuple[object, ...]:
     drive = robot.drive
     return (
         robot.body.shape,
@@ -361,7 +316,7 @@ def _shared(robot: Robot) -> tuple[object, ...]:
     )
 
 
-def batches(robots: Sequence[Robot], placement: Placement | None = None) -> list[tuple[list[int], RobotBatch]]:
+def batches(robots: Sequence[RobotTables], placement: Placement | None = None) -> list[tuple[list[int], RobotBatch]]:
     """Group a mixed list of robots into batches; each comes with the positions of its robots in the list."""
     groups: dict[tuple[object, ...], list[int]] = {}
     for index, robot in enumerate(robots):

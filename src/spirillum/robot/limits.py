@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from spirillum.arrays import Flags, PerRobot
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing, shortest_body
 from spirillum.units import show
-
-if TYPE_CHECKING:
-    from spirillum.robot.batch import RobotBatch
 
 __all__ = ["Limit", "all_hold", "assembly_limits", "broken"]
 

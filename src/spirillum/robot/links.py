@@ -13,7 +13,7 @@ with brackets between the ends. They are exact as long as the wire is thinner th
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,9 +21,7 @@ from spirillum.arrays import Samples, Tensors, Vectors
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Line, Outline, body_outline, solid_outlines
-
-if TYPE_CHECKING:
-    from spirillum.robot.robot import Robot
+from spirillum.robot.tables import RobotTables
 
 __all__ = ["Link", "Links", "Solid", "links_of", "outlines_of", "revolution_solid", "robot_solids", "wire_solid"]
 
@@ -68,7 +66,7 @@ class Links(NamedTuple):
     """Coupling and wire."""
 
 
-def links_of(robot: Robot) -> Links:
+def links_of(robot: RobotTables) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
     `body.mass` is that of body and coupling together; it is assumed to be spread evenly over their volumes. The wire
@@ -86,7 +84,7 @@ def links_of(robot: Robot) -> Links:
     return Links(_link([(body, density)]), _link([*rotor, (wire, wire_density)]))
 
 
-def robot_solids(robot: Robot) -> dict[str, Solid]:
+def robot_solids(robot: RobotTables) -> dict[str, Solid]:
     """Volume, centroid and inertia of `body`, `coupling` (where there is one) and `tail`, each of density 1.
 
     Args:
@@ -106,7 +104,7 @@ def robot_solids(robot: Robot) -> dict[str, Solid]:
     return found
 
 
-def outlines_of(robot: Robot) -> dict[str, Outline]:
+def outlines_of(robot: RobotTables) -> dict[str, Outline]:
     """Outlines of `body` and, where there is one, `coupling`.
 
     Args:

@@ -13,7 +13,6 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
-from spirillum.fitted.calibration_file import with_calibration
 from spirillum.robot.fields import Section
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
@@ -27,7 +26,6 @@ __all__ = [
     "preset_text",
     "raw_table",
     "with_accuracy",
-    "with_calibration",
     "with_phases",
     "with_tolerance",
 ]

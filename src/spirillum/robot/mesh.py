@@ -8,7 +8,7 @@ of wire from the coupling to the tail's root, and an arm where the root does not
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -18,11 +18,9 @@ from spirillum.robot.geometry import Centreline, centreline, shortest_body
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.parts import Seal, StripeColour
+from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, Surface, mass_properties, profile_of, revolved, rod, swept
 from spirillum.units import show
-
-if TYPE_CHECKING:
-    from spirillum.robot.robot import Robot
 
 __all__ = ["COLOURS", "STRIPE_COLOURS", "RobotMesh", "TailLine", "robot_mesh", "tail_line"]
 

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -14,7 +13,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
-from spirillum.files import parse_toml, read_toml
+from spirillum.files import read_toml
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
@@ -184,7 +183,7 @@ class LoadedStudy:
 
 
 def load_study(
-    source: str | Path | Mapping[str, Any] | None = None,
+    source: str | Path | Mapping[str, Any],
     overrides: Mapping[str, Any] | None = None,
     *,
     models: Sequence[str] | None = None,
@@ -195,7 +194,7 @@ def load_study(
     """Load a study and its robots.
 
     Args:
-        source: study file or the same tables as a mapping; None: the paper's study, built in.
+        source: study file or the same tables as a mapping;
         overrides: dotted robot fields, applied to every robot.
         models: hydrodynamic models instead of the study's; None: the study's.
         band: whether to compute bands, instead of what the study says; None: what it says.
@@ -206,10 +205,7 @@ def load_study(
         InputError: if the study or one of its robots is wrong.
     """
     folder = Path()
-    if source is None:
-        text = (files("spirillum.studies") / "biorob2012.toml").read_text(encoding="utf-8")
-        table, name = parse_toml(text, "the built-in study", _WHAT), "the built-in study"
-    elif isinstance(source, Mapping):
+    if isinstance(source, Mapping):
         table, name = dict(source), "the study"
     else:
         table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent

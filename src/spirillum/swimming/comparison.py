@@ -11,9 +11,10 @@ from typing import Any
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_placement
+from spirillum.fitted.calibration_file import calibrated_placement, with_calibration
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.model import SwimmerModel
@@ -20,7 +20,7 @@ from spirillum.fluid.registry import check_placement, find_swimmer_model
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
-from spirillum.robot.load import load, with_accuracy, with_calibration, with_phases, with_tolerance
+from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope
+from spirillum.answer import envelope, own_version
 from spirillum.errors import InputError
 from spirillum.files import claim_folder, output_folder, write_text
 from spirillum.robot.load import PAPER_ROBOTS, load
@@ -158,8 +158,6 @@ def virtual_experiment(
         rates, _, said = steady_rates(robot, model=model, tail_rate=tail_rate, friction=friction)
         steady[name] = rates
         warnings += [f"{name}: {sentence}" for sentence in said]
-    from spirillum import __version__
-
     folder = Path(output)
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
@@ -169,7 +167,7 @@ def virtual_experiment(
         "duration": longest,
         "seed": seed,
         "look": look | {"degradation": asdict(look["degradation"])},
-        "version": __version__,
+        "version": own_version(),
     }
     mark = {
         "schema": "spirillum.virtual-experiment-folder/1",

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
-from spirillum.papers.biorob2012.claims import NO_RATES, Claim, Evidence, Verdict
+from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict
 from spirillum.robot.load import load
 from spirillum.units import Hz
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.papers.biorob2012.claims import NO_RATES, Claim, Evidence, Verdict, fraction_between, in_hertz, label
+from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict, fraction_between, in_hertz, label
 from spirillum.units import Hz
 
 __all__ = [

@@ -19,8 +19,8 @@ from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:
+    from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.experiment import Quantity
-    from spirillum.calibration.fit import Calibrated
 
 __all__ = ["calibration_figures", "observed_figure", "residual_figure"]
 

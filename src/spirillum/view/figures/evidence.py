@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,11 +20,20 @@ from spirillum.view.figures.style import Scale, plain
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NOTHING_MEASURED", "Shown", "spread"]
+__all__ = ["NOTHING_MEASURED", "PaperFigure", "Shown", "spread"]
 
 NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
-LARGEST_RE = {"wide": 0.0058, "narrow": 0.0038}
-"""Re_max of the captions of the paper's Figs 5 and 6."""
+
+
+class PaperFigure(NamedTuple):
+    """A figure of a paper that a study's figure of one channel is laid out as."""
+
+    file: str
+    """Name of the study's figure."""
+    label: str
+    """Name of the paper's figure."""
+    largest_reynolds: float
+    """Re_max of its caption."""
 
 
 def spread(count: int, most: int) -> list[int]:
@@ -41,11 +50,13 @@ class Shown:
     dataset: xr.Dataset
     whole: xr.Dataset
     """The dataset from which scales are taken, so that all figures of a study share them."""
+    paper_figures: Mapping[str, PaperFigure] = field(default_factory=dict)
+    """Figures of a paper by channel, for a study that repeats it."""
 
     @classmethod
-    def of(cls, dataset: xr.Dataset) -> Shown:
-        """All of a study."""
-        return cls(dataset, dataset)
+    def of(cls, dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> Shown:
+        """All of a study; `paper_figures` by channel, if it repeats a paper's."""
+        return cls(dataset, dataset, paper_figures or {})
 
     def part(self, **places: int | Sequence[int]) -> Shown:
         """A part of the study, by places along dimensions."""
@@ -77,11 +88,6 @@ class Shown:
     def observed(self) -> bool:
         """Whether anything in it was measured."""
         return "observed_forward_velocity" in self.whole
-
-    @property
-    def paper(self) -> bool:
-        """Whether it repeats the paper's study."""
-        return self.whole.attrs.get("claims") == "biorob2012"
 
     @property
     def source_line(self) -> str:
@@ -236,8 +242,8 @@ class Shown:
     def paper_speed(self, place: int) -> tuple[float, float] | None:
         """(Re_max, U) of the paper's caption for a channel; U = Re mu/(rho D_b), m/s."""
         channel = str(self.whole["channel"].values[place])
-        if not self.paper or channel not in LARGEST_RE or place >= len(self.robots):
+        if channel not in self.paper_figures or place >= len(self.robots):
             return None
         fluid, body = self.robots[place]["fluid"], self.robots[place]["body"]
-        reynolds = LARGEST_RE[channel]
+        reynolds = self.paper_figures[channel].largest_reynolds
         return reynolds, reynolds * fluid["viscosity"] / (fluid["density"] * body["diameter"])

@@ -15,7 +15,7 @@ from spirillum.view.figures.sheet import Sheet
 from spirillum.view.figures.style import COLOURS, Scale, look_of_model, new_figure, plain, styled
 
 if TYPE_CHECKING:
-    from spirillum.calibration.fit import Calibrated
+    from spirillum.calibration.calibrated import Calibrated
     from spirillum.calibration.identifiability import Profile
 
 __all__ = ["posterior_figure", "profile_figure"]

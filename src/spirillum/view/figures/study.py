@@ -1,9 +1,9 @@
-"""Figures of a study: the panels of the paper's Figs 5 and 6, the upper bound of the speed, lists of robots."""
+"""Figures of a study: panels for each channel, the upper bound of the speed, lists of robots."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from spirillum.view.figures.drop import drop_picture
-from spirillum.view.figures.evidence import Shown, spread
+from spirillum.view.figures.evidence import PaperFigure, Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
 from spirillum.view.figures.sheet import Sheet
@@ -40,22 +39,20 @@ NAMED_ROBOTS = 60
 _TICK_LETTER = 0.066
 """Width of a letter of a tick label, inches."""
 _DASHED = (0, (4.0, 2.0))
-_PAPER_FIGURES = {"wide": ("fig5-wide", "Fig. 5"), "narrow": ("fig6-narrow", "Fig. 6")}
 
 
-def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
+def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> dict[str, Picture]:
     """The figures of a study by file name (lower-case letters, digits and hyphens).
 
     Args:
         dataset: what `spirillum.study` returns.
+        paper_figures: figures of a paper by channel, for a study that repeats it.
 
     Returns:
-        For the paper's study `fig5-wide` and `fig6-narrow`, for other channels `channel-<name>`, with
-        `-part1`, `-part2` where wavelengths need several figures; `bound` with the speeds at the upper bound; for
-        the paper's study `drop` with the loss of speed in the narrow channel.
-        For a list of robots `robots`.
+        For channels of a paper its figures' names, for others `channel-<name>`, with `-part1`, `-part2` where
+        wavelengths need several figures; `bound` with the speeds at the upper bound. For a list of robots `robots`.
     """
-    shown = Shown.of(dataset)
+    shown = Shown.of(dataset, paper_figures)
     if not shown.grid:
         return {"robots": _robots_picture(shown)}
     found: dict[str, Picture] = {}
@@ -69,8 +66,7 @@ def study_figures(dataset: xr.Dataset) -> dict[str, Picture]:
             left_out = _left_out(shown, sum(map(len, pages)), len(channels))
             found[name] = _channel_picture(shown, channel, wavelengths, part, left_out)
     found[_free_name("bound", found)] = _bound_picture(shown)
-    drop = drop_picture(shown)
-    return found if drop is None else {**found, "drop": drop}
+    return found
 
 
 def _pages(count: int, most: int) -> list[list[int]]:
@@ -82,8 +78,8 @@ def _pages(count: int, most: int) -> list[list[int]]:
 
 def _file_name(shown: Shown, channel: int) -> str:
     name = str(shown.whole["channel"].values[channel])
-    if shown.paper and name in _PAPER_FIGURES:
-        return _PAPER_FIGURES[name][0]
+    if name in shown.paper_figures:
+        return shown.paper_figures[name].file
     return f"channel-{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')[:60] or 'unnamed'}"
 
 
@@ -120,8 +116,8 @@ def _left_out(shown: Shown, wavelengths: int, channels: int) -> str:
 def _channel_picture(shown: Shown, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:
     name = str(shown.whole["channel"].values[channel])
     title = _channel_title(shown, channel)
-    if shown.paper and name in _PAPER_FIGURES:
-        title = f"{title} · laid out as {_PAPER_FIGURES[name][1]} of the paper"
+    if name in shown.paper_figures:
+        title = f"{title} · laid out as {shown.paper_figures[name].label} of the paper"
     title = f"{title}{page}"
     rows = grid_rows(shown)
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)

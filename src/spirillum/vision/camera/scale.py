@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +13,10 @@ from spirillum.errors import InputError
 from spirillum.vision.camera.checkerboard import Lens
 from spirillum.vision.camera.optics import Optics, optics_of
 from spirillum.vision.camera.ruler import Lines
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.track import Flag, Scale
 
-__all__ = ["Sight", "fitted_camera", "given_camera", "with_source"]
+__all__ = ["Scale", "Sight", "fitted_camera", "given_camera", "with_source"]
 
 _EXPECTED_TILT = 0.1
 """Standard deviation of the camera's tilts before anything was seen, rad."""
@@ -32,6 +33,24 @@ _MODEL = 3e-4
 
 Assumed; on rendered films with exact numbers speeds came out within 0.02 % of the truth."""
 _STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Scale:
+    """How large a length at the height of the robot's axis is in the picture."""
+
+    length_per_pixel: float
+    """m per pixel at the height of the robot's axis, in the middle of the picture."""
+    relative_uncertainty: float
+    """Standard uncertainty of all lengths, relative: heights, index, spacing and how well the lines were found."""
+    sources: dict[str, float]
+    """Its parts by name, such as `robot.axis_height`, relative; they add up in squares."""
+    markers: int
+    """Number of lines of the ruler that were found; 0 where the scale was given."""
+    residual: float
+    """Root mean square distance of the lines from where the fit has them, pixels; NaN without a ruler."""
+    apparent_size: float = math.nan
+    """Size of the body in the picture over that of its file at this scale; NaN where it was not looked at."""
 
 
 class Sight(NamedTuple):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
-from spirillum.vision.track.track import Flag
+from spirillum.vision.flag import Flag
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["cuts_in", "jumps_of_time"]

@@ -12,10 +12,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.optics import BodyPose, places_seen_by
+from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.search import Candidate, close_places, most_likely, refined
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
-from spirillum.vision.track.track import Flag
 from spirillum.vision.track.warnings import FULL_VIEW, rivals_in, turned_flags
 from spirillum.vision.video.frames import Frame
 

@@ -16,6 +16,7 @@ from spirillum.vision.camera.camera import bounds_of, opened, samples_of, scale_
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.camera.ruler import still_picture
 from spirillum.vision.camera.scale import Sight
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
@@ -24,12 +25,12 @@ from spirillum.vision.track.identity import Introduced, introduced
 from spirillum.vision.track.search import candidates, refined
 from spirillum.vision.track.size import doubted
 from spirillum.vision.track.steadiness import camera_flags
-from spirillum.vision.track.track import Flag, Track
+from spirillum.vision.track.track import Track
 from spirillum.vision.track.unwrapping import contradictions, nothing_moves, unwrapped
 from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
 from spirillum.vision.video.frames import Frame, Video
 
-__all__ = ["Seen", "follow", "scale_of"]
+__all__ = ["Seen", "Watcher", "follow", "scale_of"]
 
 _LOOK_AGAIN = 15
 """Frames between two searches of the whole picture for a robot that was lost."""
@@ -63,6 +64,10 @@ class _Row:
     tail: list[tuple[float, float]] = field(default_factory=list)
 
 
+Watcher = Callable[[int, np.ndarray, Seen], None]
+"""Called with a frame's number, its picture (8-bit RGB) and what was seen on it."""
+
+
 def follow(
     video: str | Path | Video,
     setup: Setup,
@@ -70,7 +75,7 @@ def follow(
     *,
     folder: Path | None = None,
     progress: Callable[[int, int | None], None] | None = None,
-    on_frame: Callable[[int, np.ndarray, Seen], None] | None = None,
+    on_frame: Watcher | None = None,
 ) -> Track:
     """Follow a robot through a video.
 

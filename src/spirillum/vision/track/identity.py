@@ -12,13 +12,13 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.optics import BodyPose
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, SURE, another_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
-from spirillum.vision.track.track import Flag
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame
 

@@ -18,10 +18,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.edges import sums_along
 from spirillum.vision.camera.optics import BodyPose
-from spirillum.vision.camera.scale import with_source
+from spirillum.vision.camera.scale import Scale, with_source
+from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.search import Candidate, close_places
-from spirillum.vision.track.track import Flag, Scale
 
 __all__ = ["LENGTHS", "SURE", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
 

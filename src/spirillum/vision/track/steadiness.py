@@ -12,8 +12,8 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
+from spirillum.vision.flag import Flag
 from spirillum.vision.track.first_look import Start
-from spirillum.vision.track.track import Flag
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["camera_flags", "shift_between"]

@@ -11,6 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.kernels.pictures import profile_of_rows, stripe_fit, stripes_at
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.colours import (
     colour_classes,
@@ -20,7 +21,6 @@ from spirillum.vision.track.colours import (
     width_seen,
     without_glare,
 )
-from spirillum.vision.track.track import Flag
 
 __all__ = ["Stripes"]
 

@@ -12,8 +12,8 @@ from spirillum.kernels.pictures import sampled
 from spirillum.kernels.waves import ridge_of, wave_fit, wave_scores
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.track import Flag
 
 __all__ = ["TailWave"]
 

@@ -2,43 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 from spirillum.arrays import Samples
+from spirillum.vision.camera.scale import Scale
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 
-__all__ = ["Flag", "Scale", "Track"]
-
-
-@dataclass(frozen=True)
-class Flag:
-    """Something about a video that whoever uses its numbers has to know."""
-
-    name: str
-    """Short, for machines, such as `robot-left-the-view`."""
-    sentence: str
-    """One sentence for people: what was seen, when, and what follows for the numbers."""
-    spoils: tuple[str, ...] = ()
-    """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
-
-
-@dataclass(frozen=True)
-class Scale:
-    """How large a length at the height of the robot's axis is in the picture."""
-
-    length_per_pixel: float
-    """m per pixel at the height of the robot's axis, in the middle of the picture."""
-    relative_uncertainty: float
-    """Standard uncertainty of all lengths, relative: heights, index, spacing and how well the lines were found."""
-    sources: dict[str, float]
-    """Its parts by name, such as `robot.axis_height`, relative; they add up in squares."""
-    markers: int
-    """Number of lines of the ruler that were found; 0 where the scale was given."""
-    residual: float
-    """Root mean square distance of the lines from where the fit has them, pixels; NaN without a ruler."""
-    apparent_size: float = math.nan
-    """Size of the body in the picture over that of its file at this scale; NaN where it was not looked at."""
+__all__ = ["Track"]
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.units import show
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.track.track import Flag
 
 __all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
 

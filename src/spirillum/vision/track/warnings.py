@@ -9,10 +9,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.search import Candidate, close_places
-from spirillum.vision.track.track import Flag
 
 __all__ = ["EVERYTHING", "FULL_VIEW", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
 

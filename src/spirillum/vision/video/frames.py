@@ -15,7 +15,7 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.extras import required
-from spirillum.vision.track.track import Flag
+from spirillum.vision.flag import Flag
 from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.read_ahead import ahead
 

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012 import claims as claims_module
-from spirillum.papers.biorob2012.claims import Claim
+from spirillum.papers.biorob2012.evidence import Claim
 from spirillum.results.study_content import FRICTION_MEANINGS
 from spirillum.results.study_report import write_report
 from spirillum.robot.actuation import FrictionReading
@@ -147,7 +146,7 @@ def test_page_and_file_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_pat
         Claim("second", "p", "c", "disagrees", "because"),
         Claim(HOSTILE, "p", "c", "undecidable", "no rates"),
     ]
-    monkeypatch.setattr(claims_module, "evaluated", lambda _dataset: stated)
+    monkeypatch.setattr("spirillum.results.study_report.claims_of", lambda _dataset: stated)
     page = written(small_study(), tmp_path)
     for claim in stated:
         for value in claim.to_dict().values():

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
-from spirillum.papers.biorob2012.claims import Evidence
+from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.view.figures.evidence import Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
@@ -26,12 +26,12 @@ _DASHED = (0, (4.0, 2.0))
 
 
 def drop_picture(shown: Shown) -> Picture | None:
-    """The loss of every tail at equal motor rates; None for a study that does not repeat the paper's.
+    """The loss of every tail at equal motor rates; None for a study of other channels.
 
     Args:
         shown: a study of a grid of tails.
     """
-    if not shown.paper or not {"wide", "narrow"} <= {str(name) for name in shown.whole["channel"].values}:
+    if not {"wide", "narrow"} <= {str(name) for name in shown.whole["channel"].values}:
         return None
     evidence = Evidence(shown.whole)
     if not evidence.confined:

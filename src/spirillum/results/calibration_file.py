@@ -1,105 +1,16 @@
-"""A calibration as JSON, and as the calibration file that `predict` and `study` take."""
+"""`calibration.toml`: what a calibration has found, as the file that `predict` and `study` take."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity, versions
-from spirillum.calibration.fit import LEVEL
-from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT
+from spirillum.answer import versions
+from spirillum.calibration.calibrated import Calibrated
+from spirillum.calibration.estimate import Estimate
 
-if TYPE_CHECKING:
-    from spirillum.calibration.experiment import Quantity
-    from spirillum.calibration.fit import Calibrated, Fitted
-
-__all__ = ["MEANINGS", "calibration_answer", "calibration_text"]
-
-MEANINGS: dict[Quantity, tuple[str, str]] = {
-    "advance": ("m/rad", "advance per radian of the tail"),
-    "turning": ("1", "body rate over tail rate"),
-    "motor_rate": ("rad/s", "motor rate"),
-}
-"""Unit and meaning of what is compared."""
-
-
-def _interval(item: Fitted) -> dict[str, Any]:
-    if not math.isfinite(item.low):
-        return {}
-    return {"low": item.low, "high": item.high, "kind": "interval", "level": LEVEL}
-
-
-def calibration_answer(found: Calibrated) -> dict[str, Any]:
-    """The answer of `spirillum calibrate --json`."""
-    problem, experiment = found.problem, found.experiment
-    parameters = {
-        item.label: quantity(
-            found.values[item.label].value,
-            item.parameter.unit or "1",
-            **_interval(found.values[item.label]),
-            meaning=item.parameter.meaning,
-            prior=item.prior.words(item.parameter.unit) if found.method == "posterior" else None,
-        )
-        for item in problem.coordinates
-    }
-    content: dict[str, Any] = {
-        "observations": experiment.source,
-        "synthetic": experiment.synthetic,
-        "robots": experiment.size,
-        "rows": sum(len(rows) for rows in experiment.rows),
-        "model": problem.model.name,
-        "method": found.method,
-        "friction": found.reading,
-        "parameters": parameters,
-        "discrepancy": {name: quantity(v.value, "1", **_interval(v)) for name, v in found.discrepancy.items()},
-        "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
-        "tails": [_tail(found, place) for place in range(experiment.size)],
-    }
-    if found.least_squares is not None:
-        fit = found.least_squares
-        content["chi_squared"] = quantity(fit.chi2, "1", freedom=fit.freedom)
-    if found.identifiability is not None:
-        report = found.identifiability
-        content["identifiability"] = {
-            "labels": list(report.labels),
-            "singular_values": quantity(report.singular, "1"),
-            "directions": quantity(report.directions, "1"),
-            "sensitivities": quantity(report.sensitivity, "1"),
-        }
-    if found.posterior is not None:
-        posterior = found.posterior
-        content["sampler"] = {
-            "converged": posterior.converged,
-            "draws": int(posterior.flat.shape[0]),
-            "r_hat": posterior.rhat,
-            "largest_r_hat": LARGEST_RHAT,
-            "effective_draws": posterior.effective,
-            "fewest_effective_draws": FEWEST_EFFECTIVE,
-        }
-    return envelope("calibration", content, found.warnings)
-
-
-def _tail(found: Calibrated, place: int) -> dict[str, Any]:
-    robot = found.experiment.robots[place]
-    content: dict[str, Any] = {
-        "channel_diameter": quantity(robot.channel.diameter if robot.channel else None, "m"),
-        "wavelength": quantity(robot.tail.wavelength, "m"),
-        "amplitude": quantity(robot.tail.amplitude, "m"),
-        "rows": list(found.experiment.rows[place]),
-    }
-    for name, (values, low, high) in found.predicted.items():
-        unit, _ = MEANINGS[name]
-        ends = {}
-        if math.isfinite(low[place]):
-            ends = {"low": float(low[place]), "high": float(high[place]), "kind": "interval", "level": LEVEL}
-        content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)
-        content[f"{name}_predicted"] = quantity(float(values[place]), unit, **ends)
-    if found.friction:
-        item = found.friction[place]
-        content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
-    return content
+__all__ = ["calibration_text"]
 
 
 def _number(value: float) -> str:
@@ -108,7 +19,7 @@ def _number(value: float) -> str:
     return text if "." in text or "e" in text else f"{text}.0"
 
 
-def _words(item: Fitted) -> str:
+def _words(item: Estimate) -> str:
     ends = f" ({item.low:.5g} to {item.high:.5g})" if math.isfinite(item.low) else ""
     return f"{item.value:.5g}{ends}"
 
@@ -243,7 +154,7 @@ def _friction_tables(found: Calibrated) -> list[str]:
     return lines
 
 
-def _comment(item: Fitted) -> str:
+def _comment(item: Estimate) -> str:
     words = [f"comes out as {item.value:.4g}"] if item.value < 0 else []
     words += [f"{item.low:.4g} to {item.high:.4g}"] if math.isfinite(item.low) else []
     return f"  # {', '.join(words)}" if words else ""

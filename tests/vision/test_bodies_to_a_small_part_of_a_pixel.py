@@ -5,10 +5,10 @@ import pytest
 
 from spirillum.robot.load import load
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.contour import GROUPS, contour_of
 from spirillum.vision.track.search import candidates
-from spirillum.vision.track.track import Flag
 from spirillum.vision.track.warnings import gaps_of
 
 pytest.importorskip("cv2")

@@ -9,6 +9,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
+from spirillum.results.calibration import write_calibration
 
 WIDE = "biorob2012-wide"
 
@@ -16,7 +17,7 @@ WIDE = "biorob2012-wide"
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A posterior of a small synthetic experiment."""
-    place = Path(__file__).parent.parent / "calibration" / "conftest.py"
+    place = Path(__file__).parent.parent.parent / "calibration" / "conftest.py"
     spec = importlib.util.spec_from_file_location("synthetic_experiments", place)
     assert spec is not None
     assert spec.loader is not None
@@ -33,7 +34,7 @@ def _texts(figure: Any) -> str:
 
 
 def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any, tmp_path: Path) -> None:
-    written = {path.name for path in found.write(tmp_path)}
+    written = {Path(name).name for name in write_calibration(found, tmp_path).files}
     names = ("observed-40mm", "residuals", "posterior", "profiles")
     assert written >= {f"{name}.png" for name in names} | {"calibration.toml", "predictions.csv", "posterior.nc"}
     from spirillum.view.figures.calibration import observed_figure, residual_figure

@@ -1,0 +1,148 @@
+"""The answer of a calibration: estimates, predictions for every robot, and what they rest on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
+from spirillum.calibration.estimate import LEVEL, Estimate
+from spirillum.calibration.experiment import Experiment, Quantity
+from spirillum.calibration.identifiability import Identifiability
+from spirillum.calibration.least_squares import LeastSquares
+from spirillum.calibration.paper_method import PaperFit
+from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
+from spirillum.calibration.problem import Problem
+
+__all__ = ["MEANINGS", "Calibrated"]
+
+MEANINGS: dict[Quantity, tuple[str, str]] = {
+    "advance": ("m/rad", "advance per radian of the tail"),
+    "turning": ("1", "body rate over tail rate"),
+    "motor_rate": ("rad/s", "motor rate"),
+}
+"""Unit and meaning of what is compared."""
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a calibration found."""
+
+    problem: Problem
+    method: Literal["posterior", "least-squares", "paper"]
+    reading: str
+    """Reading of the friction under which B_eff follows from (18)."""
+    values: dict[str, Estimate]
+    """Free numbers by label."""
+    friction: tuple[Estimate, ...]
+    """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed."""
+    predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
+    """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
+    discrepancy: dict[Quantity, Estimate]
+    """Relative misfit of the model from robot to robot, beyond the scatter of the trials."""
+    error: dict[Quantity, float]
+    """Relative error of one trial."""
+    paper: PaperFit | None
+    least_squares: LeastSquares | None
+    posterior: Posterior | None
+    identifiability: Identifiability | None
+    warnings: tuple[str, ...]
+    folder: Path | None = None
+    """Folder of the files that were written, if any were."""
+    files: tuple[str, ...] = ()
+    """Files that were written, as seen from the folder."""
+
+    @property
+    def experiment(self) -> Experiment:
+        """The observations."""
+        return self.problem.experiment
+
+    @property
+    def converged(self) -> bool:
+        """Whether a posterior may be used; True for the other methods."""
+        return self.posterior is None or self.posterior.converged
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum calibrate --json`."""
+        written = {} if self.folder is None else {"folder": str(self.folder), "files": list(self.files)}
+        return envelope("calibration", _content(self) | written, self.warnings)
+
+
+def _interval(item: Estimate) -> dict[str, Any]:
+    if not math.isfinite(item.low):
+        return {}
+    return {"low": item.low, "high": item.high, "kind": "interval", "level": LEVEL}
+
+
+def _content(found: Calibrated) -> dict[str, Any]:
+    """What was fitted, quantity by quantity."""
+    problem, experiment = found.problem, found.experiment
+    parameters = {
+        item.label: quantity(
+            found.values[item.label].value,
+            item.parameter.unit or "1",
+            **_interval(found.values[item.label]),
+            meaning=item.parameter.meaning,
+            prior=item.prior.words(item.parameter.unit) if found.method == "posterior" else None,
+        )
+        for item in problem.coordinates
+    }
+    content: dict[str, Any] = {
+        "observations": experiment.source,
+        "synthetic": experiment.synthetic,
+        "robots": experiment.size,
+        "rows": sum(len(rows) for rows in experiment.rows),
+        "model": problem.model.name,
+        "method": found.method,
+        "friction": found.reading,
+        "parameters": parameters,
+        "discrepancy": {name: quantity(v.value, "1", **_interval(v)) for name, v in found.discrepancy.items()},
+        "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
+        "tails": [_tail(found, place) for place in range(experiment.size)],
+    }
+    if found.least_squares is not None:
+        fit = found.least_squares
+        content["chi_squared"] = quantity(fit.chi2, "1", freedom=fit.freedom)
+    if found.identifiability is not None:
+        report = found.identifiability
+        content["identifiability"] = {
+            "labels": list(report.labels),
+            "singular_values": quantity(report.singular, "1"),
+            "directions": quantity(report.directions, "1"),
+            "sensitivities": quantity(report.sensitivity, "1"),
+        }
+    if found.posterior is not None:
+        posterior = found.posterior
+        content["sampler"] = {
+            "converged": posterior.converged,
+            "draws": int(posterior.flat.shape[0]),
+            "r_hat": posterior.rhat,
+            "largest_r_hat": LARGEST_RHAT,
+            "effective_draws": posterior.effective,
+            "fewest_effective_draws": FEWEST_EFFECTIVE,
+        }
+    return content
+
+
+def _tail(found: Calibrated, place: int) -> dict[str, Any]:
+    robot = found.experiment.robots[place]
+    content: dict[str, Any] = {
+        "channel_diameter": quantity(robot.channel.diameter if robot.channel else None, "m"),
+        "wavelength": quantity(robot.tail.wavelength, "m"),
+        "amplitude": quantity(robot.tail.amplitude, "m"),
+        "rows": list(found.experiment.rows[place]),
+    }
+    for name, (values, low, high) in found.predicted.items():
+        unit, _ = MEANINGS[name]
+        ends = {}
+        if math.isfinite(low[place]):
+            ends = {"low": float(low[place]), "high": float(high[place]), "kind": "interval", "level": LEVEL}
+        content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)
+        content[f"{name}_predicted"] = quantity(float(values[place]), unit, **ends)
+    if found.friction:
+        item = found.friction[place]
+        content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
+    return content

@@ -1,0 +1,145 @@
+"""What a study says about the paper's quantitative statements: the evidence, and the form of a verdict.
+
+The paper's data points are lost, and with them the tails' rates. A statement is judged only where it follows
+for any rates, from the geometry, or from an observations file; else it is undecidable, and the reason says
+what was computed instead.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.studies.places import reference_place
+from spirillum.units import Hz
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["NO_RATES", "Claim", "Evidence", "Verdict", "fraction_between", "in_hertz", "label"]
+
+Verdict = Literal["agrees", "disagrees", "undecidable"]
+
+NO_RATES = "the observed rates are lost; give an observations file to decide"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and what became of it."""
+
+    claim: str
+    paper: str
+    computed: str
+    verdict: Verdict
+    reason: str
+
+    def to_dict(self) -> dict[str, str]:
+        """The entry of `claims.json`."""
+        return asdict(self)
+
+
+class Evidence:
+    """What a study's dataset can say, in the words of the paper (channels `wide` and `narrow`, tails in mm)."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self.dataset = dataset
+        self.models: tuple[str, ...] = tuple(str(name) for name in dataset["model"].values)
+        self.observed = "observed_forward_velocity" in dataset
+        readings = [str(name) for name in dataset["friction"].values]
+        self.bound = next((name for name in ("none", "rotor") if name in readings), readings[0])
+        self.robot: Robot = load("biorob2012-wide")
+        settings = json.loads(str(dataset.attrs.get("settings", "{}")))
+        self._settings: dict[str, Any] = settings
+        computed = [name for name in self.models if SWIMMER_MODELS[name].placed]
+        fitted = {name for robot in settings.get("robots", []) for name in robot.get("calibration") or {}}
+        self.computed: tuple[str, ...] = tuple(computed)
+        """Models that compute the channel's walls."""
+        self.confined: tuple[str, ...] = tuple(name for name in self.models if name in computed or name in fitted)
+        """Models to which the channel makes a difference: those, and models with factors that stand for the walls."""
+
+    def free(self, name: str, model: str, channel: str | None = None) -> Values:
+        """A quantity of free swimming at the friction-free bound, (wavelength, amplitude) or both channels first."""
+        chosen = self.dataset[name].sel(model=model, friction=self.bound)
+        values: Values = chosen.sel(channel=channel or ["wide", "narrow"]).values
+        return values
+
+    def seen(self, name: str, channel: str | None = None) -> Values:
+        """An observed quantity, (wavelength, amplitude) or with both channels first."""
+        chosen = self.dataset[f"observed_{name}"]
+        values: Values = chosen.sel(channel=channel or ["wide", "narrow"]).values
+        return values
+
+    def complete(self, *names: str) -> bool:
+        """Whether these quantities were observed of every tail in both channels."""
+        return self.observed and all(bool(np.all(np.isfinite(self.seen(name)))) for name in names)
+
+    def lacking(self, *names: str) -> str:
+        """Why a statement about all tails stays open: no observations, or not of all of them."""
+        if not self.observed:
+            return NO_RATES
+        counts = []
+        for name in names:
+            seen = np.isfinite(self.seen(name))
+            counts.append(f"{name.replace('_', ' ')} of {np.count_nonzero(seen)} of {seen.size} robots")
+        return f"it speaks of all tails in both channels; the observations have {', '.join(counts)}"
+
+    def tail(self, wavelength_mm: float, amplitude_mm: float) -> tuple[int, int] | None:
+        """Place of a tail in the grid, if it is there."""
+        places = []
+        for name, value in (("wavelength", wavelength_mm), ("amplitude", amplitude_mm)):
+            near = np.flatnonzero(np.isclose(self.dataset[name].values, value * 1e-3, rtol=1e-6))
+            if not near.size:
+                return None
+            places.append(int(near[0]))
+        return places[0], places[1]
+
+    def speed_of(self, reynolds: float) -> float:
+        """U = Re mu/(rho D_b), m/s: the speed behind a Reynolds number if its length is the body's diameter."""
+        fluid = self.robot.fluid
+        return reynolds * fluid.viscosity / (fluid.density * self.robot.body.diameter)
+
+    def drop_per_motor_turn(self, model: str, ending: str = "") -> Values:
+        """Relative loss of speed from wide to narrow at equal motor rates, for every tail.
+
+        Args:
+            model: name of the model.
+            ending: `_at_place` for the loss at each place of a band, the last axis; "" for the reference place.
+        """
+        per_turn = self.free(f"forward_velocity{ending}", model) / self.free(f"motor_rotation_rate{ending}", model)
+        loss: Values = 1.0 - per_turn[1] / per_turn[0]
+        return loss
+
+    def drops_of_the_band(self, model: str) -> Values | None:
+        """The same at the reference place and, along the last axis, at the places of a band; None without a band."""
+        if model not in self.computed or "forward_velocity_at_place" not in self.dataset:
+            return None
+        return np.concatenate(
+            [self.drop_per_motor_turn(model)[..., None], self.drop_per_motor_turn(model, "_at_place")], axis=-1
+        )
+
+    @property
+    def place(self) -> str:
+        """Where robots lie for the models that compute the walls, in words."""
+        return reference_place(self._settings)
+
+
+def label(model: str) -> str:
+    """A model's name as it stands in text: abbreviations in capitals."""
+    return model.upper() if len(model) <= 3 else model
+
+
+def fraction_between(values: Values) -> str:
+    """A range of fractions in per cent."""
+    return f"{100 * np.nanmin(values):.1f} to {100 * np.nanmax(values):.1f} %"
+
+
+def in_hertz(rate: float) -> str:
+    """A rate in Hz."""
+    return f"{rate / Hz:.3g} Hz"

@@ -1,0 +1,28 @@
+"""The paper's own figures of a study: Figs 5 and 6, and the loss of speed in the narrow channel."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from spirillum.papers.biorob2012.drop_figure import drop_picture
+from spirillum.view.figures.evidence import PaperFigure, Shown
+from spirillum.view.figures.picture import Picture
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["PAPER_FIGURES", "more_figures"]
+
+PAPER_FIGURES = {
+    "wide": PaperFigure("fig5-wide", "Fig. 5", 0.0058),
+    "narrow": PaperFigure("fig6-narrow", "Fig. 6", 0.0038),
+}
+"""Figures by channel, with Re_max of their captions."""
+
+
+def more_figures(dataset: xr.Dataset) -> dict[str, Picture]:
+    """Figures that only this paper asks for: `drop`, the loss of speed from the wide to the narrow channel."""
+    if "channel" not in dataset.dims:
+        return {}
+    drop = drop_picture(Shown.of(dataset, PAPER_FIGURES))
+    return {} if drop is None else {"drop": drop}

@@ -1,0 +1,78 @@
+"""A study computed and written: `spirillum.study`."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.files import claim_folder, output_folder, write_dataset
+from spirillum.papers.biorob2012.study import paper_study
+from spirillum.results.study_report import write_report
+from spirillum.studies.dataset import read_dataset
+from spirillum.studies.observed import observed_arrays
+from spirillum.studies.run import Progress, computed_study, study_fingerprint
+from spirillum.studies.spec import load_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["study"]
+
+_RESULTS = ("dataset.nc", "figures", "report.html", "claims.json")
+"""What a folder without the mark of a study may not hold, for it would be replaced."""
+
+
+def study(
+    source: str | Path | Mapping[str, Any] | None = None,
+    *,
+    observations: str | Path | None = None,
+    output: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    models: Sequence[str] | None = None,
+    band: bool | None = None,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Run a study of many robots.
+
+    Args:
+        source: study file (see `spirillum schema study`) or its tables; None: the paper's study.
+        observations: observations file; the study then also runs at the observed rates and infers B_eff.
+        output: folder for `dataset.nc`, `figures/`, `report.html` and `claims.json`; a rerun resumes there.
+            None: nothing is written.
+        overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
+        models: hydrodynamic models instead of the study's; None: the study's.
+        band: compute models that compute the channel's walls over the places that the placement leaves open too
+            (many minutes), or not, instead of what the study says; None: what it says.
+        calibration: calibration file, applied to every robot.
+        posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
+            model have 95 % intervals.
+        progress: called as the work goes on.
+
+    Returns:
+        Dataset with dimensions `channel`, `wavelength`, `amplitude` (or `robot`), `model`, `friction`.
+
+    Raises:
+        InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
+    """
+    question = paper_study() if source is None else source
+    loaded = load_study(question, overrides, models=models, band=band, calibration=calibration, posterior=posterior)
+    observed = observed_arrays(observations, loaded) if observations is not None else None
+    fingerprint = study_fingerprint(loaded, observed)
+    tell = progress or (lambda _what, _done, _total: None)
+    if output is None:
+        return computed_study(loaded, observed, fingerprint, None, tell)
+    folder = Path(output)
+    mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
+    claim_folder(folder, "study.json", mark, "study", _RESULTS)
+    dataset = read_dataset(folder / "dataset.nc")
+    if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
+        parts = output_folder(folder / f"parts-{fingerprint[:16]}")
+        dataset = computed_study(loaded, observed, fingerprint, parts, tell)
+        write_dataset(dataset, folder / "dataset.nc")
+        shutil.rmtree(parts, ignore_errors=True)  # another run of the same study may be at it too
+    write_report(dataset, folder, tell)
+    return dataset

@@ -1,0 +1,19 @@
+"""Flags: what a video shows that whoever uses its numbers has to know."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["Flag"]
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Something about a video that whoever uses its numbers has to know."""
+
+    name: str
+    """Short, for machines, such as `robot-left-the-view`."""
+    sentence: str
+    """One sentence for people: what was seen, when, and what follows for the numbers."""
+    spoils: tuple[str, ...] = ()
+    """Quantities that are not given because of it: `forward_velocity`, `body_rotation_rate`, `tail_rotation_rate`."""
