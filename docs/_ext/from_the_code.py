@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import typing
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -220,13 +219,9 @@ class Quantities(SphinxDirective):
     """`quantities`: the quantities of a prediction."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.swimming.answer import Swimming
+        from spirillum.swimming.answer import STEADY
 
-        rows = [
-            (f"`{f.name}`", f.metadata["unit"], f.metadata["meaning"], f.metadata["source"])
-            for f in fields(Swimming)
-            if f.name != "valid"
-        ]
+        rows = [(f"`{item.name}`", item.unit, item.meaning, item.source) for item in STEADY]
         return [table(("Quantity", "Unit", "Meaning", "Source"), rows, (26, 12, 40, 22))]
 
 

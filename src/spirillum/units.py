@@ -19,7 +19,18 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import pint
 
-__all__ = ["KINDS", "USUAL", "Kind", "parse_option", "parse_quantity", "show", "shown_in"]
+__all__ = [
+    "KINDS",
+    "USUAL",
+    "Kind",
+    "display_unit",
+    "for_people",
+    "in_unit",
+    "parse_option",
+    "parse_quantity",
+    "show",
+    "shown_in",
+]
 
 _QUANTITY = re.compile(
     r"\s*(?P<number>[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|nan|inf|infinity))\s*(?P<unit>\D.*)?", re.I | re.S
@@ -272,3 +283,51 @@ def show(value: float, unit: str) -> str:
     """Text of an SI `value` in a display `unit`, four significant digits."""
     number = f"{shown_in(value, unit):.4g}"
     return number if unit == "1" else f"{number} {unit}"
+
+
+_FOR_PEOPLE = {
+    "m/s": "mm/s",
+    "rad/s": "Hz",
+    "m/rad": "mm/turn",
+    "m": "mm",
+    "kg": "g",
+    "N": "mN",
+    "A": "mA",
+    "W": "mW",
+    "N m": "mN m",
+    "rad": "deg",
+    "m^3": "ml",
+}
+"""The unit in which people read values of an SI unit, at the size of a centimetre-scale robot."""
+_LARGE = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
+"""SI unit to the size from which on values are read in another unit, and that unit."""
+_SMALL = {
+    "m/s": (1e-4, "um/s"),
+    "m": (1e-5, "um"),
+    "m/rad": (1e-7, "um/turn"),
+    "kg": (1e-6, "kg"),
+    "m^3": (1e-12, "m^3"),
+    "N": (1e-8, "N"),
+    "N m": (1e-8, "N m"),
+    "W": (1e-8, "W"),
+}
+"""SI unit to the size below which values are read in another unit, and that unit."""
+
+
+def for_people(unit: str) -> str:
+    """The unit in which people read values of an SI `unit` that are neither very small nor very large."""
+    return _FOR_PEOPLE.get(unit, unit)
+
+
+def display_unit(value: float | None, unit: str) -> str:
+    """The unit in which people read an SI `value` of that size; None counts as neither small nor large."""
+    if value is not None and unit in _LARGE and abs(value) >= _LARGE[unit][0]:
+        return _LARGE[unit][1]
+    if value and unit in _SMALL and abs(value) < _SMALL[unit][0]:
+        return _SMALL[unit][1]
+    return for_people(unit)
+
+
+def in_unit(value: float | None, unit: str, shown: str) -> str:
+    """Text of an SI `value` of that `unit` in the unit `shown`, four significant digits; ``-`` for None."""
+    return "-" if value is None else f"{value if shown == unit else shown_in(value, shown):.4g}"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, friendly_unit, grid, in_unit
+from spirillum.cli.text import Answer, grid
+from spirillum.units import display_unit, in_unit
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -51,7 +52,7 @@ def calibration(answer: Answer, console: Console) -> None:
 
 
 def _add(table: Any, name: str, item: Answer) -> None:
-    unit = "%" if name.startswith(("discrepancy", "error")) else friendly_unit(item["value"], item["unit"])
+    unit = "%" if name.startswith(("discrepancy", "error")) else display_unit(item["value"], item["unit"])
     factor = 100.0 if unit == "%" else 1.0
     numbers = []
     for key in ("value", "low", "high"):

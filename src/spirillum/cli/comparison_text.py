@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, friendly_unit, grid, in_unit
+from spirillum.cli.text import Answer, grid
+from spirillum.units import display_unit, in_unit
 
 if TYPE_CHECKING:
     from spirillum.swimming.comparison import ModelComparison
@@ -43,7 +44,7 @@ def model_comparison(answer: Answer, console: Console) -> None:
         if not known:
             continue
         unit = models[0][name]["unit"]
-        shown = friendly_unit(max(known, key=abs), unit)
+        shown = display_unit(max(known, key=abs), unit)
         cells = []
         for item, value in zip(models, values, strict=True):
             cell = in_unit(value, unit, shown)

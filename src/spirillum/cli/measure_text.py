@@ -5,10 +5,10 @@ from __future__ import annotations
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, grid, in_unit
-from spirillum.measurement.shown import UNITS, Shown, shown
+from spirillum.cli.text import Answer, grid
+from spirillum.measurement.shown import Shown, shown
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
-from spirillum.units import shown_in
+from spirillum.units import for_people, in_unit, shown_in
 
 __all__ = ["feasibility", "measurement"]
 
@@ -70,7 +70,7 @@ def feasibility(answer: Answer, console: Console) -> None:
     verdict = "all rates can be resolved" if answer["feasible"] else "[bold]not all rates can be resolved[/bold]"
     expected = grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from")
     for name, item in answer["expected"].items():
-        unit = UNITS.get(item["unit"], item["unit"])
+        unit = for_people(item["unit"])
         expected.add_row(name.replace("_", " "), in_unit(item["value"], item["unit"], unit), unit, item["source"])
     console.print(expected)
     for check in answer["checks"]:
@@ -81,7 +81,7 @@ def feasibility(answer: Answer, console: Console) -> None:
         table = grid(f"expected 95 % interval of one trial, {span} long", "quantity", "half width", "unit", "share")
         for name, item in answer["intervals"].items():
             reach = item["half_width"]
-            unit = UNITS[reach["unit"]]
+            unit = for_people(reach["unit"])
             share = "-" if item["share"] is None else f"{100 * item['share']:.2g} %"
             table.add_row(name.replace("_", " "), f"{shown_in(reach['value'], unit):.2g}", unit, share)
         console.print(table)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, add_quantities, grid, in_unit
+from spirillum.cli.text import Answer, add_quantities, grid
 from spirillum.errors import InputError
+from spirillum.units import in_unit
 
 if TYPE_CHECKING:
     from spirillum.dynamics.settling import Settling

@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.answer import envelope, quantity
-from spirillum.cli.text import Answer, add_quantities, grid, in_unit, show_error
+from spirillum.cli.text import Answer, add_quantities, grid, show_error
+from spirillum.units import in_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +15,7 @@ from rich.table import Table
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.errors import InputError
 from spirillum.robot.fields import field_values
-from spirillum.units import KINDS, parse_option, shown_in
+from spirillum.units import KINDS, display_unit, in_unit, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,20 +26,6 @@ Answer = Mapping[str, Any]
 _NARROWEST = 80
 _NUMBERS = ("value", "low", "high", "SI")
 """Columns of numbers."""
-
-# What people read beside the SI value.
-_FRIENDLY = {"m/s": "mm/s", "rad/s": "Hz", "m/rad": "mm/turn", "m": "mm", "kg": "g", "N": "mN", "A": "mA", "W": "mW"}
-_FRIENDLY |= {"N m": "mN m", "rad": "deg", "m^3": "ml"}
-_LONG = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
-# What is so small is read in another unit.
-_SMALL = {
-    "m/s": (1e-4, "um/s"),
-    "m": (1e-5, "um"),
-    "m/rad": (1e-7, "um/turn"),
-    "kg": (1e-6, "kg"),
-    "m^3": (1e-12, "m^3"),
-}
-_SMALL |= {"N": (1e-8, "N"), "N m": (1e-8, "N m"), "W": (1e-8, "W")}
 
 
 class _PipedConsole(Console):
@@ -76,22 +61,8 @@ def grid(title: str, *columns: str) -> Table:
 
 
 def _friendly(value: float | None, unit: str) -> tuple[str, str]:
-    shown = friendly_unit(value, unit)
+    shown = display_unit(value, unit)
     return in_unit(value, unit, shown), "" if value is None or shown == "1" else shown
-
-
-def friendly_unit(value: float | None, unit: str) -> str:
-    """The unit in which people read such a value."""
-    if value is not None and unit in _LONG and abs(value) >= _LONG[unit][0]:
-        return _LONG[unit][1]
-    if value and unit in _SMALL and abs(value) < _SMALL[unit][0]:
-        return _SMALL[unit][1]
-    return _FRIENDLY.get(unit, unit)
-
-
-def in_unit(value: float | None, unit: str, shown: str) -> str:
-    """An SI value as people read it in one of their units."""
-    return "-" if value is None else f"{value if shown == unit else shown_in(value, shown):.4g}"
 
 
 def add_quantities(table: Table, items: Mapping[str, Any]) -> None:
@@ -135,7 +106,7 @@ def _add_bands(table: Table, items: Mapping[str, Any]) -> None:
     """A row for each quantity that has a value: name, value, low and high of its band, unit."""
     for name, item in items.items():
         if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
-            unit = friendly_unit(item["value"], item["unit"])
+            unit = display_unit(item["value"], item["unit"])
             numbers = [in_unit(item.get(key), item["unit"], unit) for key in ("value", "low", "high")]
             table.add_row(name.replace("_", " "), *numbers, "" if unit == "1" else unit)
 
@@ -158,7 +129,7 @@ def _band_words(item: Mapping[str, Any]) -> str:
     """Over what a field of the placement is left open."""
     if "low" not in item:
         return ""
-    unit = friendly_unit(item["high"], item["unit"])
+    unit = display_unit(item["high"], item["unit"])
     low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
     return f" (open: band over {low} to {high} {unit})"
 

@@ -9,6 +9,7 @@ import typer
 
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
+from spirillum.units import in_unit
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -278,6 +279,6 @@ def _experiment(answer: Answer, console: Console) -> None:
     table = text.grid(title, "robot", "forward velocity (mm/s)", "tail rate (Hz)", "body rate (Hz)")
     for robot in answer["robots"]:
         names = {"forward_velocity": "mm/s", "tail_rotation_rate": "Hz", "body_rotation_rate": "Hz"}
-        cells = [text.in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
+        cells = [in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
         table.add_row(escape(robot["robot"]), *cells)
     console.print(table)

@@ -20,6 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.remote import schedule, windows_of
 from spirillum.dynamics.sampling import duration_of, late_averages, sample_times
 from spirillum.errors import InputError
+from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques, rates_per_torque
@@ -239,6 +240,9 @@ def swim_in_time(
     return _dataset(prediction, batch.electrics, response, transient, switches)
 
 
+_SOURCE = "motor current (17) and the robot's linear response (8), (15)"
+
+
 def _dataset(
     prediction: Prediction,
     motor: Electrics,
@@ -254,44 +258,41 @@ def _dataset(
     torque2 = k_m**2 * m.current_squared
     shaft = r.rotor_load * r.slip * torque**2
     voltage = battery_voltage(motor, m.current)
-    series: dict[str, tuple[Samples, str, str, str]] = {
-        "position": (r.speed * impulse, "m", "distance swum along x", ""),
-        "tail_angle": (r.tail_rate * impulse, "rad", "angle of the tail in the lab", ""),
-        "body_angle": (r.body_rate * impulse, "rad", "roll angle of the body", ""),
-        "forward_velocity": (r.speed * torque, "m/s", "forward velocity U_x", "(8), (15)"),
-        "tail_rotation_rate": (r.tail_rate * torque, "rad/s", "rotation rate omega of the tail (lab)", "(15)"),
-        "body_rotation_rate": (r.body_rate * torque, "rad/s", "rotation rate Omega_x of the body", "(15)"),
-        "motor_rotation_rate": (r.slip * torque, "rad/s", "motor rate omega_m = omega - Omega_x", "(18)"),
-        "motor_current": (sign * m.current, "A", "motor current I", "(17)"),
-        "motor_resistance": (winding_resistance(motor, m.current), "ohm", "equivalent resistance R(I)", "Table II"),
-        "battery_voltage": (voltage, "V", "battery voltage V(I)", "Table II"),
-        "duty": (m.duty, "1", "duty of the voltage; 0 while the remote is off", ""),
-        "motor_torque": (torque, "N m", "motor torque K_m I", "(18)"),
-        "tail_torque": (np.abs(r.rotor_load * torque), "N m", "hydrodynamic torque T_h on the rotor", "(18)"),
-        "electrical_power": (m.duty * voltage * m.current, "W", "electrical power at the battery's terminals", ""),
-        "shaft_power": (shaft, "W", "drive torque times motor rate", ""),
-        "friction_power": (r.friction * torque**2, "W", "power lost to friction", "(18), (19)"),
-        "dissipated_power": (r.dissipated * torque**2, "W", "viscous dissipation", ""),
-        "electrical_energy": (m.electrical_energy, "J", "energy from the battery's terminals", ""),
-        "resistive_energy": (m.resistive_energy, "J", "energy lost in R(I)", "(17)"),
-        "magnetic_energy": (0.5 * float(motor.inductance[0]) * m.current**2, "J", "energy L I^2/2", "(17)"),
-        "conversion_energy": (
-            (k_b / k_m - 1.0) * r.slip * torque2,
-            "J",
-            "unmodelled conversion loss: integral of (K_b - K_m) omega_m I",
-            "(17), (18)",
-        ),
-        "friction_energy": (r.friction * torque2, "J", "energy lost to friction", ""),
-        "dissipated_energy": (r.dissipated * torque2, "J", "energy dissipated in the fluid", ""),
-        "battery_charge_used": (m.battery_charge, "C", "charge drawn from the battery", ""),
+    series = {
+        "position": r.speed * impulse,
+        "tail_angle": r.tail_rate * impulse,
+        "body_angle": r.body_rate * impulse,
+        "forward_velocity": r.speed * torque,
+        "tail_rotation_rate": r.tail_rate * torque,
+        "body_rotation_rate": r.body_rate * torque,
+        "motor_rotation_rate": r.slip * torque,
+        "motor_current": sign * m.current,
+        "motor_resistance": winding_resistance(motor, m.current),
+        "battery_voltage": voltage,
+        "duty": m.duty,
+        "motor_torque": torque,
+        "tail_torque": np.abs(r.rotor_load * torque),
+        "electrical_power": m.duty * voltage * m.current,
+        "shaft_power": shaft,
+        "friction_power": r.friction * torque**2,
+        "dissipated_power": r.dissipated * torque**2,
+        "electrical_energy": m.electrical_energy,
+        "resistive_energy": m.resistive_energy,
+        "magnetic_energy": 0.5 * float(motor.inductance[0]) * m.current**2,
+        "conversion_energy": (k_b / k_m - 1.0) * r.slip * torque2,
+        "friction_energy": r.friction * torque2,
+        "dissipated_energy": r.dissipated * torque2,
+        "battery_charge_used": m.battery_charge,
     }
-    data = {
-        name: ("time", values, {"units": unit, "long_name": meaning, "source": _source(eq)})
-        for name, (values, unit, meaning, eq) in series.items()
-    }
+    data = {name: ("time", values, attributes(name, source=_SOURCE)) for name, values in series.items()}
+    data["position"] = (
+        "time",
+        series["position"],
+        attributes("position", meaning="distance swum along x", source=_SOURCE),
+    )
     dataset = xr.Dataset(
         data,
-        coords={"time": ("time", m.time, {"units": "s", "long_name": "time"})},
+        coords={"time": ("time", m.time, attributes("time"))},
         attrs={
             "title": f"Axial swimming of {prediction.robot.name} (two degrees of freedom)",
             "robot": prediction.robot.name,
@@ -328,16 +329,6 @@ def _averages(dataset: xr.Dataset, prediction: Prediction) -> dict[str, Any]:
     found["hydrodynamic_efficiency"] = (
         (),
         prediction.hydrodynamic_efficiency,
-        {
-            "units": "1",
-            "long_name": "isolated uncalibrated body drag times U^2 over shaft power (constant in time)",
-            "source": "eq. (16) of BioRob 2012",
-        },
+        attributes("hydrodynamic_efficiency", source="eq. (16) of BioRob 2012; constant in time"),
     )
     return found
-
-
-def _source(equation: str) -> str:
-    if not equation:
-        return "integral or product of motor current and the robot's linear response (8), (9)"
-    return equation if equation.startswith("Table") else f"eq. {equation} of BioRob 2012"

@@ -25,6 +25,7 @@ from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import two_links as kernel
+from spirillum.quantities import attributes
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full
 from spirillum.swimming.prediction import Prediction, predict
@@ -225,35 +226,31 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: 
     table = {name: np.array([getattr(mean, name) for mean in found]) for name in _Mean._fields if name != "state"}
     batch = held.batch.with_values({"magnetic.rotation_rate": rates})
     closed = swim(batch, held.model, calibrated=False)
-    series = {
-        "forward_velocity": (table["velocity"], "m/s", "mean velocity along the axis of the field"),
-        "tail_rotation_rate": (table["rate"], "rad/s", "mean rate at which the moment turns about it"),
-        "wobble_angle": (table["wobble"], "rad", "mean angle between the motor axis and the axis of the field"),
-        "least_wobble_angle": (table["least_wobble"], "rad", "smallest such angle"),
-        "largest_wobble_angle": (table["most_wobble"], "rad", "largest such angle"),
-        "phase_lag": (table["lag"], "rad", "mean angle of the moment behind the field; NaN where it slips"),
-        "settled": (settled, "1", "1 where speed and wobble no longer change, 0 where they still do"),
-        "held_forward_velocity": (closed.forward_velocity, "m/s", "velocity of the held robot, closed form"),
-        "held_tail_rotation_rate": (closed.tail_rotation_rate, "rad/s", "rate of the held robot, closed form"),
-        "held_phase_lag": (closed.phase_lag, "rad", "phase lag of the held robot, closed form"),
+    free = {
+        "forward_velocity": (table["velocity"], "mean velocity along the axis of the field"),
+        "tail_rotation_rate": (table["rate"], "mean rate at which the moment turns about it"),
+        "wobble_angle": (table["wobble"], "mean angle between the motor axis and the axis of the field"),
+        "least_wobble_angle": (table["least_wobble"], None),
+        "largest_wobble_angle": (table["most_wobble"], None),
+        "phase_lag": (table["lag"], "mean angle of the moment behind the field; NaN where it slips"),
+        "settled": (settled, None),
     }
-    source = {"held": "m B sin(lag) = load rate", "free": "two rigid links, one piece, m x B"}
     data: dict[str, Any] = {
-        name: (
-            "field_rate",
-            np.broadcast_to(values, rates.shape),
-            {"units": unit, "long_name": meaning, "source": source["held" if name.startswith("held") else "free"]},
-        )
-        for name, (values, unit, meaning) in series.items()
+        name: ("field_rate", values, attributes(name, meaning=meaning, source="two rigid links, one piece, m x B"))
+        for name, (values, meaning) in free.items()
     }
+    for name in ("forward_velocity", "tail_rotation_rate", "phase_lag"):
+        values = np.broadcast_to(getattr(closed, name), rates.shape)
+        meaning = f"{name.replace('_', ' ')} of the held robot, closed form"
+        data[f"held_{name}"] = ("field_rate", values, attributes(name, meaning=meaning, source="m B sin(lag)"))
     data["step_out_rate"] = (
         (),
         held.step_out_rate,
-        {"units": "rad/s", "long_name": "step-out rate of the held robot", "source": "m B over resistance"},
+        attributes("step_out_rate"),
     )
     return xr.Dataset(
         data,
-        coords={"field_rate": ("field_rate", rates, {"units": "rad/s", "long_name": "rotation rate of the field"})},
+        coords={"field_rate": ("field_rate", rates, attributes("field_rate"))},
         attrs={
             "title": f"{held.robot.name} in a rotating field",
             "robot": held.robot.name,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from spirillum.dynamics.integration import INTEGRATOR, Reach, Trajectory
 from spirillum.dynamics.sampling import late_averages
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.kernels import two_links as kernel
+from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
 
@@ -24,13 +25,9 @@ __all__ = ["dataset_of"]
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 
 
-class _Series(NamedTuple):
-    """A variable of the dataset."""
-
-    values: Samples
-    unit: str
-    meaning: str
-    source: str = "two rigid links, (15) with all rows"
+_SOURCE = "two rigid links, (15) with all rows"
+_MEANINGS = {"wobble_angle": "angle between the motor axis and the axis about which the field turns"}
+"""Meanings of quantities that a run in time defines otherwise than steady motion does."""
 
 
 def dataset_of(
@@ -56,35 +53,30 @@ def dataset_of(
         series |= _magnetics(links, run, rotation)
     if np.isfinite(links.wall[0]):
         gap = run.observed[:, 8] + links.wall[1]
-        series["wall_gap"] = _Series(gap, "m", "smallest distance of body and tail to the channel's wall")
+        series["wall_gap"] = gap
     stored = _potential(links, run, rotation) + run.observed[:, 12]
-    series["potential_energy"] = _Series(stored, "J", "energy of weight and buoyancy, and of roughness that is pressed")
+    series["potential_energy"] = stored
     attitude = run.states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
     velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, :3])
     spin = np.einsum("nij,nj->ni", rotation, run.observed[:, 3:6])
     vectors = {
-        "position": ("axis", run.states[:, :3], "m", "place of the body's mid-length; the channel's axis is y = z = 0"),
-        "velocity": ("axis", velocity, "m/s", "velocity of the body's mid-length in the lab"),
-        "angular_velocity": ("axis", spin, "rad/s", "rotation rate of the body in the lab"),
-        "attitude": ("quaternion", attitude, "1", "unit quaternion, body axes to lab"),
+        "position": ("axis", run.states[:, :3]),
+        "velocity": ("axis", velocity),
+        "angular_velocity": ("axis", spin),
+        "attitude": ("quaternion", attitude),
     }
     data: dict[str, Any] = {
-        name: (
-            ("time", along),
-            values,
-            {"units": unit, "long_name": meaning, "source": _Series._field_defaults["source"]},
-        )
-        for name, (along, values, unit, meaning) in vectors.items()
+        name: (("time", along), values, attributes(name, source=_SOURCE)) for name, (along, values) in vectors.items()
     }
     data |= {
-        name: ("time", s.values, {"units": s.unit, "long_name": s.meaning, "source": s.source})
-        for name, s in series.items()
+        name: ("time", values, attributes(name, meaning=_MEANINGS.get(name), source=_SOURCE))
+        for name, values in series.items()
     }
     dataset = xr.Dataset(
         data,
         coords={
-            "time": ("time", run.time, {"units": "s", "long_name": "time"}),
+            "time": ("time", run.time, attributes("time")),
             "axis": ("axis", list(_AXES), {"long_name": "axis of the lab"}),
             "quaternion": ("quaternion", list(_QUATERNION), {"long_name": "part of the quaternion"}),
         },
@@ -124,27 +116,25 @@ def _rotations(states: Samples) -> Samples:
     return np.asarray(Rotation.from_quat(attitude, scalar_first=True).as_matrix())
 
 
-def _motion(run: Trajectory, rotation: Samples) -> dict[str, _Series]:
+def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     axis = rotation[:, :, 0]
     roll, phase = states[:, kernel.ROLL], states[:, kernel.PHASE]
     return {
-        "tail_phase": _Series(phase, "rad", "angle of the tail against the body: phase of the wire's equation"),
-        "tail_angle": _Series(roll + phase - phase[0], "rad", "integral of the tail's rate about the motor axis"),
-        "body_angle": _Series(roll, "rad", "integral of the body's rate about the motor axis"),
-        "forward_velocity": _Series(
-            np.sum(rotation[:, 0, :] * rates[:, :3], axis=1), "m/s", "velocity along the channel"
-        ),
-        "tail_rotation_rate": _Series(rates[:, 3] + rates[:, 6], "rad/s", "rate of the tail about the motor axis"),
-        "body_rotation_rate": _Series(rates[:, 3], "rad/s", "rate of the body about the motor axis"),
-        "motor_rotation_rate": _Series(rates[:, 6], "rad/s", "motor rate omega_m = omega - Omega_x", "(18)"),
-        "pitch": _Series(np.arcsin(np.clip(axis[:, 2], -1.0, 1.0)), "rad", "angle by which the nose is raised"),
-        "yaw": _Series(np.arctan2(axis[:, 1], axis[:, 0]), "rad", "angle of the motor axis to the left, towards +y"),
-        "duty": _Series(run.duty, "1", "duty of the drive; 0 while the remote is off"),
+        "tail_phase": phase,
+        "tail_angle": roll + phase - phase[0],
+        "body_angle": roll,
+        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, :3], axis=1),
+        "tail_rotation_rate": rates[:, 3] + rates[:, 6],
+        "body_rotation_rate": rates[:, 3],
+        "motor_rotation_rate": rates[:, 6],
+        "pitch": np.arcsin(np.clip(axis[:, 2], -1.0, 1.0)),
+        "yaw": np.arctan2(axis[:, 1], axis[:, 0]),
+        "duty": run.duty,
     }
 
 
-def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, _Series]:
+def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     drive = rates[:, 7]
     if links.drive[1]:  # one piece, driven from outside
@@ -154,16 +144,14 @@ def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, _S
         torque = drive - links.friction[6, 3] * rates[:, 3] - links.friction[6, 6] * rates[:, 6]
         shaft = torque * rates[:, 6]
     return {
-        "drive_torque": _Series(
-            torque, "N m", "torque that turns the rotor (one piece: the robot) against the fluid", "(18)"
-        ),
-        "drive_power": _Series(rates[:, 11], "W", "power of the drive's torque, before friction", "(18)"),
-        "shaft_power": _Series(shaft, "W", "drive torque times motor rate (one piece: power from outside)", "(18)"),
-        "friction_power": _Series(rates[:, 9], "W", "power lost to friction", "(18), (19)"),
-        "dissipated_power": _Series(rates[:, 10], "W", "viscous dissipation, films at the wall included", "(9)"),
-        "drive_energy": _Series(states[:, kernel.DRIVEN], "J", "work of the drive's torque, before friction"),
-        "friction_energy": _Series(states[:, kernel.FRICTION], "J", "energy lost to friction"),
-        "dissipated_energy": _Series(states[:, kernel.DISSIPATED], "J", "energy dissipated in the fluid"),
+        "drive_torque": torque,
+        "drive_power": rates[:, 11],
+        "shaft_power": shaft,
+        "friction_power": rates[:, 9],
+        "dissipated_power": rates[:, 10],
+        "drive_energy": states[:, kernel.DRIVEN],
+        "friction_energy": states[:, kernel.FRICTION],
+        "dissipated_energy": states[:, kernel.DISSIPATED],
     }
 
 
@@ -176,7 +164,7 @@ def _field_torque(links: TwoLinks, run: Trajectory, rotation: Samples) -> Sample
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
-def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, _Series]:
+def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
     motor = prediction.batch.electrics
     assert motor is not None  # noqa: S101 - a dc-motor has one
     sign, inductance = float(motor.polarity[0]), float(motor.inductance[0])
@@ -184,27 +172,20 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, _Series]:
     current = states[:, kernel.CURRENT]
     voltage = battery_voltage(motor, current)
     return {
-        "motor_torque": _Series(run.observed[:, 7], "N m", "motor torque K_m I, before friction", "(18)"),
-        "motor_current": _Series(sign * current, "A", "motor current I", "(17)"),
-        "motor_resistance": _Series(
-            winding_resistance(motor, current), "ohm", "equivalent resistance R(I)", "Table II"
-        ),
-        "battery_voltage": _Series(voltage, "V", "battery voltage V(I)", "Table II"),
-        "electrical_power": _Series(run.duty * voltage * current, "W", "electrical power at the battery's terminals"),
-        "electrical_energy": _Series(states[:, kernel.ELECTRICAL], "J", "energy from the battery's terminals"),
-        "resistive_energy": _Series(states[:, kernel.RESISTIVE], "J", "energy lost in R(I)", "(17)"),
-        "magnetic_energy": _Series(0.5 * inductance * current**2, "J", "energy L I^2/2", "(17)"),
-        "conversion_energy": _Series(
-            states[:, kernel.CONVERSION],
-            "J",
-            "unmodelled conversion loss: integral of (K_b - K_m) omega_m I",
-            "(17), (18)",
-        ),
-        "battery_charge_used": _Series(states[:, kernel.CHARGE], "C", "charge drawn from the battery"),
+        "motor_torque": run.observed[:, 7],
+        "motor_current": sign * current,
+        "motor_resistance": winding_resistance(motor, current),
+        "battery_voltage": voltage,
+        "electrical_power": run.duty * voltage * current,
+        "electrical_energy": states[:, kernel.ELECTRICAL],
+        "resistive_energy": states[:, kernel.RESISTIVE],
+        "magnetic_energy": 0.5 * inductance * current**2,
+        "conversion_energy": states[:, kernel.CONVERSION],
+        "battery_charge_used": states[:, kernel.CHARGE],
     }
 
 
-def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, _Series]:
+def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     """Where the moment and the robot's axis point against the field."""
     moment = rotation @ links.drive[3:6]
     field = 0.5 * np.pi + links.drive[7] * run.time
@@ -212,14 +193,8 @@ def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str,
     behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
     behind = np.where(run.duty > 0, behind, np.nan)
     return {
-        "phase_lag": _Series(
-            behind, "rad", "angle of the moment behind the turning field, slips counted; NaN while it is off", "m x B"
-        ),
-        "wobble_angle": _Series(
-            np.arccos(np.clip(np.abs(rotation[:, 0, 0]), 0.0, 1.0)),
-            "rad",
-            "angle between the motor axis and the axis about which the field turns",
-        ),
+        "phase_lag": behind,
+        "wobble_angle": np.arccos(np.clip(np.abs(rotation[:, 0, 0]), 0.0, 1.0)),
     }
 
 

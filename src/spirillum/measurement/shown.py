@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from spirillum.units import shown_in
+from spirillum.units import for_people, shown_in
 
-__all__ = ["UNITS", "Shown", "shown"]
+__all__ = ["Shown", "shown"]
 
-UNITS = {"m/s": "mm/s", "rad/s": "Hz", "m": "mm", "rad": "deg", "s": "s"}
-"""Units in which people read what was measured, by the SI unit."""
 _MOST_DIGITS = 7
 """Digits of a value at most, however narrow its interval is."""
 _MOST_DECIMALS = 9
@@ -40,7 +38,7 @@ def shown(value: float | None, low: float | None, high: float | None, unit: str)
     """
     if value is None or not math.isfinite(value):
         return Shown("-", "-", "-", "")
-    read = UNITS[unit]
+    read = for_people(unit)
     number = shown_in(value, read)
     if low is None or high is None or not math.isfinite(low):
         return Shown(f"{number:.4g}", "-", "-", read)

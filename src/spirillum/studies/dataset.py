@@ -12,10 +12,11 @@ import numpy as np
 from spirillum.answer import versions
 from spirillum.arrays import Values
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.places import PlaceTask, placed_at, with_band
 from spirillum.studies.spec import LoadedStudy
-from spirillum.studies.work import QUANTITIES, REASONS, Part, Task
+from spirillum.studies.work import REASONS, Part, Task
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,12 +25,8 @@ __all__ = ["assembled", "read_dataset"]
 
 _PAPER = "BioRob 2012"
 _PLACED = {
-    "gap_at_place": {"units": "m", "long_name": "smallest distance of body and glass", "source": "places of the band"},
-    "pitch_at_place": {
-        "units": "rad",
-        "long_name": "angle by which the nose is raised",
-        "source": "places of the band: level, half and all that gap and tail allow",
-    },
+    "gap_at_place": attributes("gap", source="places of the band"),
+    "pitch_at_place": attributes("pitch", source="places of the band: level, half and all that gap and tail allow"),
 }
 _BAND = {
     "_at_place": ("at a place of the band", "places of the band"),
@@ -62,11 +59,11 @@ def assembled(
         axis_last = np.moveaxis(values, 0, 1)  # (robots, models, friction[, rates or places])
         laid = axis_last.reshape(*shape, *axis_last.shape[1:])
         more = ("place" if name.endswith("_at_place") else "assumed_motor_rate",)[: axis_last.ndim - 3]
-        data[name] = ((*robots, "model", "friction", *more), laid, _attributes(name))
+        data[name] = ((*robots, "model", "friction", *more), laid, _attributes_of(name))
     if band:
         for name, values in placed_at(band, count).items():
             data[name] = ((*robots, "place"), values.reshape(*shape, -1), _PLACED[name])
-    data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes("outside"))
+    data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes_of("outside"))
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
     dataset = xr.Dataset(data, coords=_coordinates(loaded))
@@ -111,7 +108,7 @@ def _coordinates(loaded: LoadedStudy) -> dict[str, Any]:
     first = "channel" if study.grid else "robot"
     coordinates: dict[str, Any] = {
         first: (first, _text(loaded.names), {"units": "1", "long_name": f"name of the {first}", "source": source}),
-        "channel_diameter": (first, channel, {"units": "m", "long_name": "channel diameter D_ch", "source": "Table I"}),
+        "channel_diameter": (first, channel, attributes("channel_diameter")),
         "model": ("model", _text(study.models), {"units": "1", "long_name": "hydrodynamic model", "source": source}),
         "friction": (
             "friction",
@@ -120,15 +117,14 @@ def _coordinates(loaded: LoadedStudy) -> dict[str, Any]:
         ),
     }
     tail = {
-        "wavelength": (study.grid.wavelengths if study.grid else [r.tail.wavelength for r in robots], "lambda"),
-        "amplitude": (study.grid.amplitudes if study.grid else [r.tail.amplitude for r in robots], "B_o"),
+        "wavelength": study.grid.wavelengths if study.grid else [r.tail.wavelength for r in robots],
+        "amplitude": study.grid.amplitudes if study.grid else [r.tail.amplitude for r in robots],
     }
-    for name, (values, symbol) in tail.items():
-        attributes = {"units": "m", "long_name": f"tail {name} {symbol}", "source": source}
-        coordinates[name] = (name if study.grid else first, values, attributes)
+    for name, values in tail.items():
+        coordinates[name] = (name if study.grid else first, values, attributes(name, source=source))
     if study.assumed_motor_rates:
-        attributes = {"units": "rad/s", "long_name": "assumed motor rate omega_m", "source": source}
-        coordinates["assumed_motor_rate"] = ("assumed_motor_rate", list(study.assumed_motor_rates), attributes)
+        rates, name = list(study.assumed_motor_rates), "assumed_motor_rate"
+        coordinates[name] = (name, rates, attributes(name))
     return coordinates
 
 
@@ -136,7 +132,7 @@ def _text(names: Sequence[str]) -> Values:
     return np.array(list(names), dtype=str)
 
 
-def _attributes(name: str) -> dict[str, Any]:
+def _attributes_of(name: str) -> dict[str, Any]:
     if name == "outside":
         return {
             "units": "1",
@@ -146,25 +142,16 @@ def _attributes(name: str) -> dict[str, Any]:
             "flag_meanings": " ".join(REASONS),
         }
     if name == "error_estimate":
-        return {
-            "units": "1",
-            "long_name": "relative difference of the forward velocity from another resolution",
-            "source": "models that solve for the flow; NaN for those in closed form",
-        }
+        return attributes(name)
     for ending, (words, source) in _BAND.items():
         if name.endswith(ending):
-            field = next(f for f in QUANTITIES if f.name == name.removesuffix(ending))
-            meaning = f"{field.metadata['meaning']}, {words}"
-            return {"units": field.metadata["unit"], "long_name": meaning, "source": source}
+            base = name.removesuffix(ending)
+            return attributes(base, meaning=f"{QUANTITIES[base].meaning}, {words}", source=source)
     base, _, at = name.partition("_at_")
-    field = next(f for f in QUANTITIES if f.name == base)
-    source = field.metadata["source"]
+    item = QUANTITIES[base]
     suffix = f", at the {at.replace('_rate', '').replace('_', ' ')} rate" if at else ", driven by its own drive"
-    return {
-        "units": field.metadata["unit"],
-        "long_name": field.metadata["meaning"] + suffix,
-        "source": f"{source} of {_PAPER}" if source.startswith(("eq", "Table")) else source,
-    }
+    source = f"{item.source} of {_PAPER}" if item.source.startswith(("eq", "Table")) else item.source
+    return attributes(base, meaning=item.meaning + suffix, source=source)
 
 
 def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: Sequence[int]) -> dict[str, Any]:
@@ -177,9 +164,9 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
     source = f"observations file {observed.source}"
     found: dict[str, Any] = {}
     for name, (unit, meaning) in meanings.items():
-        attributes = {"units": unit, "long_name": meaning, "source": source}
-        found[f"observed_{name}"] = (robots, getattr(observed, name).reshape(shape), attributes)
-        interval = {**attributes, "long_name": f"half width of the 95 % interval of the {meaning}"}
+        about = {"units": unit, "long_name": meaning, "source": source}
+        found[f"observed_{name}"] = (robots, getattr(observed, name).reshape(shape), about)
+        interval = {**about, "long_name": f"half width of the 95 % interval of the {meaning}"}
         found[f"observed_{name}_ci95"] = (robots, observed.intervals[name].reshape(shape), interval)
     trials = {"units": "1", "long_name": "number of trials", "source": source}
     found["trials"] = (robots, observed.trials.reshape(shape).astype("int32"), trials)

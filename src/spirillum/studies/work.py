@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, cast
 
@@ -20,14 +20,13 @@ from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.intervals import intervals_of
 from spirillum.swimming.prediction import accuracy_limits
 from spirillum.swimming.steady import requirements, speed_difference, swim
 
 __all__ = [
     "AT_RATES",
-    "QUANTITIES",
     "REASONS",
     "WITH_INTERVALS",
     "Caution",
@@ -42,7 +41,6 @@ __all__ = [
     "tasks",
 ]
 
-QUANTITIES = tuple(f for f in fields(Swimming) if f.name != "valid")
 """Quantities of free swimming."""
 AT_RATES = (
     "forward_velocity",
@@ -130,13 +128,13 @@ class Task:
     @property
     def needed(self) -> set[str]:
         """Names of the arrays that every answer has."""
-        return {"outside", *(f.name for f in QUANTITIES)}
+        return {"outside", *(item.name for item in STEADY)}
 
     @property
     def allowed(self) -> set[str]:
         """Names of the arrays that an answer may have."""
         endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
-        return {"outside", "error_estimate", *(f.name + at for f in QUANTITIES for at in endings)}
+        return {"outside", "error_estimate", *(item.name + at for item in STEADY for at in endings)}
 
 
 def tasks(loaded: LoadedStudy) -> Iterator[Task]:
@@ -186,7 +184,7 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     study = loaded.study
     readings = study.friction
     free = [swim(task.batch, task.model, friction=reading) for reading in readings]
-    part: Part = {f.name: _stacked(free, f.name) for f in QUANTITIES}
+    part: Part = {item.name: _stacked(free, item.name) for item in STEADY}
     check = find_swimmer_model(task.model).checked_by(task.batch.options)
     if check is not None:
         checked = [swim(task.batch, check, friction=reading) for reading in readings]
@@ -268,7 +266,7 @@ class Caution(NamedTuple):
 def cautions(task: Task, part: Part) -> list[Caution]:
     """What to be careful about in a task's answer, one for each kind."""
     size = task.batch.size
-    first = Swimming(**{f.name: part[f.name][:, 0] for f in QUANTITIES}, valid=part["outside"][:, 0] == 0)
+    first = Swimming(**{item.name: part[item.name][:, 0] for item in STEADY}, valid=part["outside"][:, 0] == 0)
     found = []
     for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))

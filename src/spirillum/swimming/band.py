@@ -31,7 +31,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.placement import Placement
 from spirillum.robot.seat import contact_pitch, largest_gap
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
 
@@ -92,7 +92,7 @@ class Band:
 
     def to_dict(self) -> dict[str, Any]:
         """All places with their answers, as quantities whose values are lists."""
-        units = {f.name: f.metadata["unit"] for f in fields(Swimming) if f.name != "valid"}
+        units = {item.name: item.unit for item in STEADY}
         found = {"gap": quantity(self.gap, "m"), "pitch": quantity(self.pitch, "rad")}
         return found | {name: quantity(getattr(self.swimming, name), unit) for name, unit in units.items()}
 

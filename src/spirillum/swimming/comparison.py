@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,13 +17,13 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.answer import STEADY
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import friction_reading
 
 __all__ = ["ModelComparison", "compare_models", "estimated_error", "uneven_models"]
 
-_UNITS: dict[str, str] = {f.name: f.metadata["unit"] for f in fields(Swimming) if f.name != "valid"}
+_UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}
 
 
 @dataclass(frozen=True)

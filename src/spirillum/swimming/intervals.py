@@ -10,7 +10,7 @@ leaves. An interval is of the robot's own motion, not of a single measured trial
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.steady import friction_reading, swim
@@ -202,7 +202,7 @@ def _with_discrepancy(
     friction: str,
 ) -> dict[str, Samples]:
     """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
-    values = {f.name: getattr(swum, f.name) for f in fields(Swimming) if f.name != "valid"}
+    values = {item.name: getattr(swum, item.name) for item in STEADY}
     size = swum.forward_velocity.size
     one = np.ones(size)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ from spirillum.robot.limits import Limit, broken
 from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import Swimming
+from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.freedom import Motion, motion_of
@@ -112,9 +112,7 @@ class Prediction:
         return envelope("prediction", content, self.warnings)
 
 
-_QUANTITIES: dict[str, tuple[str, str]] = {
-    f.name: (f.metadata["unit"], f.metadata["meaning"]) for f in fields(Swimming) if f.name != "valid"
-}
+_QUANTITIES: dict[str, tuple[str, str]] = {item.name: (item.unit, item.meaning) for item in STEADY}
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
     "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
