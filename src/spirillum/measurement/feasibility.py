@@ -16,7 +16,7 @@ from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
 from spirillum.vision.setup import Setup, load_setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
-from spirillum.vision.track.unwrapping import LARGEST_STEP
+from spirillum.vision.track.constants import UNWRAPPING
 
 __all__ = ["Check", "Feasibility", "feasibility"]
 
@@ -262,11 +262,17 @@ def _pixel(
 def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tuple[str, ...]) -> list[Check]:
     found = []
     tail, body = abs(expected["tail_rotation_rate"][0]), abs(expected["body_rotation_rate"][0])
-    limits = [("tail-rate", "tail", tail, LARGEST_STEP * rate * Hz, "a helix looks the same after a turn")]
+    limits = [("tail-rate", "tail", tail, UNWRAPPING.largest_step * rate * Hz, "a helix looks the same after a turn")]
     if stripes:
         share = pattern_period(stripes) / Hz
         limits.append(
-            ("body-rate", "body", body, LARGEST_STEP * rate * share * Hz, f"the stripes repeat after {share:.3g} turns")
+            (
+                "body-rate",
+                "body",
+                body,
+                UNWRAPPING.largest_step * rate * share * Hz,
+                f"the stripes repeat after {share:.3g} turns",
+            )
         )
     else:
         sentence = "the robot has no stripes: the body's rotation cannot be seen"

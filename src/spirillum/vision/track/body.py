@@ -11,32 +11,10 @@ from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.constants import OUTLINE
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
 
 __all__ = ["BodyFinder", "Placed", "grey_part"]
-
-_HALF = 6
-"""Reach of the brightness that is compared, pixels on either side of an edge."""
-_BLUR = 0.8
-"""Width of the blur that makes a picture smooth between its pixels."""
-_TOGETHER = 2.8
-"""Length along an edge over which the blurred noise is one, pixels."""
-_CAPTURE = 2.5
-"""Largest shift that one step can tell, pixels."""
-_ROUNDING = 1.5
-"""What brightness is never known better than in a compressed film, of 255."""
-_STEPS = 5
-_ROUNDS = 5
-"""Rounds of learning: edges look like the mean of the frames, frames lie where edges look so."""
-_SMOOTHED = 2
-"""Rounds after which places still lie on a smooth path: a robot neither jumps nor turns."""
-_NEIGHBOURS = 2
-_FEWEST = 0.3
-"""Least share of the edges that have to fit."""
-_TRUSTED_EDGE, _CLEAR_EDGE = 0.6, 10.0
-"""An edge whose place is less sure than this says nothing of the size, pixels; stronger ones than this weigh alike."""
-_WORST = 0.7
-"""Largest standard error of a place that is kept, pixels."""
 
 
 class Placed(NamedTuple):
@@ -69,17 +47,18 @@ class BodyFinder:
         """
         self.robot, self.optics, self.bounds = robot, optics, bounds
         self.contour: Contour = contour_of(robot, optics)
-        self.half, self.offsets = _HALF, np.arange(-_HALF, _HALF + 1, dtype=float)
+        self.half = OUTLINE.half_profile
+        self.offsets = np.arange(-self.half, self.half + 1, dtype=float)
         self._usual: Samples | None = None
         self._slopes: Samples = np.empty((0, 0))
         self._strength: Samples = np.empty(0)
         self._steep: Samples = np.empty(0)
         self._offset = np.zeros(len(self.contour.group))
         self._trust = self.contour.floor.copy()
-        self.margin = int(_HALF + 4 * _BLUR + 4)
+        self.margin = int(self.half + 4 * OUTLINE.blur + 4)
         middle = self.contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
         spacing = float(np.median(np.hypot(*np.diff(middle, axis=0).T)))
-        self._together = max(1.0, _TOGETHER / max(spacing, 0.1))
+        self._together = max(1.0, OUTLINE.noise_correlation / max(spacing, 0.1))
 
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
         """Learn the edges' looks from frames with about known places; the places again, better.
@@ -93,17 +72,17 @@ class BodyFinder:
         self._offset, self._trust = np.zeros(len(self.contour.group)), self.contour.floor.copy()
         found: list[Placed] = []
         parts = [self._part(image, pose) for image, pose in zip(images, poses, strict=True)]
-        for turn in range(_ROUNDS):
+        for turn in range(OUTLINE.learning_rounds):
             stack = []
             for part, pose in zip(parts, poses, strict=True):
                 pixels, normals, _, _ = self.contour.places(pose, self.optics)
                 stack.append(self._profiles(part, pixels, normals))
             self._take_looks(np.stack(stack))
             found = [self._place(part, pose) for part, pose in zip(parts, poses, strict=True)]
-            if turn >= _SMOOTHED:
+            if turn >= OUTLINE.smoothed_rounds:
                 self._take_trust(parts, found)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
-            if turn < _SMOOTHED:
+            if turn < OUTLINE.smoothed_rounds:
                 poses = _smooth(poses, times)
         return found
 
@@ -120,7 +99,7 @@ class BodyFinder:
         from scipy.interpolate import CubicSpline
 
         steep = CubicSpline(self.offsets, self._usual, axis=1)(offsets, 1) ** 2
-        weight = np.where(self._trust < _TRUSTED_EDGE, np.minimum(self._strength, _CLEAR_EDGE), 0.0)
+        weight = np.where(self._trust < OUTLINE.trusted_error, np.minimum(self._strength, OUTLINE.strength_cap), 0.0)
         return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
     def place(self, image: np.ndarray, guess: BodyPose) -> Placed:
@@ -140,7 +119,7 @@ class BodyFinder:
         stops = [int(np.clip(value, a, b)) for value, a, b in ((high[0] + 2, left, right), (high[1] + 2, top, bottom))]
         if stops[0] - ends[0] < 4 or stops[1] - ends[1] < 4:
             return np.zeros((1, 1)), np.zeros(2)
-        return grey_part(image, (ends[0], ends[1], stops[0], stops[1]), _BLUR), np.array(ends, dtype=float)
+        return grey_part(image, (ends[0], ends[1], stops[0], stops[1]), OUTLINE.blur), np.array(ends, dtype=float)
 
     def _profiles(self, part: tuple[Samples, Samples], pixels: Samples, normals: Samples) -> Samples:
         out = np.empty((len(pixels), self.offsets.size))
@@ -165,7 +144,7 @@ class BodyFinder:
                         usual[point] = usual[inside[0]]
                         continue
                 else:
-                    together = inside[max(0, place - _NEIGHBOURS) : place + _NEIGHBOURS + 1]
+                    together = inside[max(0, place - OUTLINE.neighbours) : place + OUTLINE.neighbours + 1]
                 usual[point] = np.linalg.eigh(products[together].sum(axis=0))[1][:, -1]
         self._usual = usual
         self._slopes = np.gradient(usual, axis=1)
@@ -201,8 +180,12 @@ class BodyFinder:
         shifts, strengths, misses = np.empty(count), np.empty(count), np.empty(count)
         profiles = self._profiles(part, pixels, normals)
         shifts_of_profiles(profiles, self._usual, self._slopes, shifts, strengths, misses)
-        known = np.isfinite(shifts) & (np.abs(shifts) < _CAPTURE) & (np.abs(strengths) > 0.2 * self._strength)
-        variance = (np.maximum(misses, _ROUNDING) / np.maximum(np.abs(strengths) * self._steep, 1e-9)) ** 2
+        known = (
+            np.isfinite(shifts)
+            & (np.abs(shifts) < OUTLINE.largest_shift)
+            & (np.abs(strengths) > OUTLINE.least_strength * self._strength)
+        )
+        variance = (np.maximum(misses, OUTLINE.rounding_noise) / np.maximum(np.abs(strengths) * self._steep, 1e-9)) ** 2
         return shifts - self._offset, known, np.where(known, variance + self._trust**2, np.inf)
 
     def _place(self, part: tuple[Samples, Samples], guess: BodyPose) -> Placed:
@@ -210,7 +193,7 @@ class BodyFinder:
         used, change, level = np.empty(count), np.empty(3), 1.0
         pose = np.array(guess)
         lost = Placed(guess, BodyPose(np.nan, np.nan, np.nan), 0.0, 0.0)
-        for step in range(_STEPS):
+        for step in range(OUTLINE.iterations):
             pixels, normals, _, slopes = self.contour.places(BodyPose(*pose), self.optics)
             shifts, known, variance = self._shifts(part, pixels, normals)
             inside = np.isfinite(shifts)
@@ -228,7 +211,11 @@ class BodyFinder:
         except np.linalg.LinAlgError:  # edges of one direction only
             return Placed(found, lost.error, fitting, share)
         errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(scatter), 0.0)).tolist())
-        if fitting < _FEWEST or not 0.0 < errors.x < _WORST * self.optics.length_per_pixel or share < 0.2:
+        if (
+            fitting < OUTLINE.least_share
+            or not 0.0 < errors.x < OUTLINE.largest_error * self.optics.length_per_pixel
+            or share < 0.2
+        ):
             return Placed(found, lost.error, fitting, share)
         return Placed(found, errors, fitting, share)
 

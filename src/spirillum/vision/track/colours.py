@@ -9,6 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.mesh import STRIPE_COLOURS
+from spirillum.vision.track.constants import COLOURS
 
 __all__ = [
     "colour_classes",
@@ -22,18 +23,6 @@ __all__ = [
 
 _MANY = 6
 """More classes than this are matched to names by the least total distance alone."""
-_PAIRS = 3
-"""Kinds of neighbouring stripes that have to be seen before their order is judged."""
-_WHOLE = 4
-"""Angles that a stripe and those beside it have at least, when its width is taken."""
-_EDGE = 0.3
-"""Width over that of a stripe below which a colour between two others is their blurred edge."""
-_GLARE = 240.0
-"""Brightness of glare to begin with."""
-_PALE = 0.7
-"""Share of the strongest channel in the weakest one from which on a bright colour is glare."""
-_FITS = 0.7
-"""Share of neighbouring stripes that have to stand in a given order."""
 
 
 def named_colours(names: Sequence[str]) -> Samples:
@@ -77,7 +66,7 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
     lamp = np.mean(lamp) * (lamp / np.mean(lamp)) ** 0.5  # not all stripes show: believe half of the tint
     start = named * lamp
     palette = start.copy()
-    glare = np.full((0 if "white" in names else 1, 3), _GLARE)
+    glare = np.full((0 if "white" in names else 1, 3), COLOURS.glare)
     held = 0.02 * len(samples) / len(names)
     for _ in range(12):
         nearest = _nearest(samples, np.concatenate([palette, glare]))
@@ -87,7 +76,7 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
             palette[index] = (total + held * start[index]) / (len(mine) + held)
         shining = samples[nearest == len(names)]
         if len(glare) and len(shining):
-            glare[0] = (shining.sum(axis=0) + held * _GLARE) / (len(shining) + held)
+            glare[0] = (shining.sum(axis=0) + held * COLOURS.glare) / (len(shining) + held)
     return palette, start, glare
 
 
@@ -106,7 +95,7 @@ def without_glare(profiles: Samples, palettes: tuple[Samples, Samples, Samples])
 def _glary(samples: Samples) -> np.ndarray:
     """Which samples are bright without a colour; none if all are."""
     brightest, least = samples.max(axis=1), samples.min(axis=1)
-    found = (least > _PALE * brightest) & (brightest > np.median(brightest))
+    found = (least > COLOURS.pale * brightest) & (brightest > np.median(brightest))
     return np.asarray(found if not found.all() else np.zeros(len(samples), dtype=bool))
 
 
@@ -138,7 +127,7 @@ def order_seen(
     palette, start, glare = palettes
     count = len(names)
     seen = _neighbours(profiles, angles, palette, glare, 2.0 * np.pi / len(stripes))
-    if seen.sum() < 3 or np.count_nonzero(seen) < min(_PAIRS, count):
+    if seen.sum() < 3 or np.count_nonzero(seen) < min(COLOURS.pairs, count):
         return palette, "unseen"
     order = [names.index(name) for name in stripes]
     forward = np.zeros((count, count), dtype=bool)
@@ -159,12 +148,12 @@ def order_seen(
     costs = np.array([cost[np.arange(count), trial].sum() for trial in trials])
     shares = np.array([share(trial, forward) for trial in trials])
     best = int(np.argmin(costs))
-    fitting = shares >= _FITS
+    fitting = shares >= COLOURS.fits
     if fitting.any():
         chosen = int(np.argmin(np.where(fitting, costs, np.inf)))
         if costs[chosen] <= 1.5 * costs[best]:
             return _renamed(palette, trials[chosen]), "given"
-    backward = share(trials[best], forward.T) >= _FITS
+    backward = share(trials[best], forward.T) >= COLOURS.fits
     return _renamed(palette, trials[best]), "reversed" if backward else "other"
 
 
@@ -200,7 +189,7 @@ def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samp
     """
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
-    least = max(_WHOLE, _EDGE * stated / step)
+    least = max(COLOURS.whole_samples, COLOURS.blurred_width * stated / step)
     for profile in profiles:
         runs = _runs(profile, palette, glare)
         for before, run, after in zip(runs, runs[1:], runs[2:], strict=False):
@@ -208,11 +197,11 @@ def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samp
                 before[0] >= 0
                 and run[0] >= 0
                 and after[0] >= 0
-                and min(len(before), len(after)) >= _WHOLE
+                and min(len(before), len(after)) >= COLOURS.whole_samples
                 and len(run) >= least
             ):
                 widths.append(len(run) * step)
-    return float(np.median(widths)) if len(widths) >= _PAIRS else float("nan")
+    return float(np.median(widths)) if len(widths) >= COLOURS.pairs else float("nan")
 
 
 def _runs(profile: Samples, palette: Samples, glare: Samples) -> list[np.ndarray]:

@@ -18,31 +18,18 @@ from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Line, Outline
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, placed
+from spirillum.vision.track.constants import CONTOUR
 
 __all__ = ["GROUPS", "Contour", "contour_of"]
 
 GROUPS = ("front", "rear", "left", "right", "seal")
 """Kinds of edges: front and rear end, the sides at +y and -y, and where the seal begins."""
 
-_TRUSTED = {
-    "front": 0.04,
-    "rear": 0.06,
-    "side": 0.04,
-    "striped side": 0.3,
-    "coupling": 0.15,
-    "seal": 0.03,
-    "bare rear": 0.5,
-}
-"""What places of edges are never known better than, pixels."""
 _ORDERS = 7, 4
 """Orders of the polynomials along and across."""
 _NODES = 8, 5
 _AROUND, _PER_TURN = 128, 144
 """Points around the axis, and along an arc that goes all the way round, from which a silhouette is made."""
-_WIDE = 0.9
-"""Half width of the ends that is used, over the body's radius."""
-_SEEN_ARC = 1.0
-"""Angle from the top up to which the seal's edge is used, rad."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +101,7 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
 
     seal = _seal(robot, radius, max(spacing, 1.8 * radius / 80))
     striped = len(seal) > 0
-    wide = np.arange(-_WIDE * radius, _WIDE * radius, max(spacing, 1.8 * radius / 80))
+    wide = np.arange(-CONTOUR.end_width * radius, CONTOUR.end_width * radius, max(spacing, 1.8 * radius / 80))
     behind = wide[np.abs(wide) > 0.5 * robot.coupling.diameter + 1e-3]
     sides = _sides(robot, outlines, spacing)
     kinds = [("front", wide.size), ("rear", behind.size)]
@@ -151,8 +138,8 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     factors = np.ascontiguousarray(factors).reshape(*(order + 1 for order in _ORDERS), 4, count)
     group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
     # The near and the far rim of a flat end without stripes look alike, and move otherwise.
-    rear = "rear" if striped or _flat(outline, -1) is None else "bare rear"
-    trusted = [_TRUSTED[name] for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
+    rear = "rear" if striped or _flat(outline, -1) is None else "bare_rear"
+    trusted = [getattr(CONTOUR, name) for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
     floor = np.repeat(trusted, [size for _, size in kinds])
     middle = found[_NODES[0] // 2, _NODES[1] // 2, 0].T
     return Contour(group, _normals(middle, group), floor, factors, np.array(reach))
@@ -200,7 +187,7 @@ def _sides(robot: Robot, outlines: dict[str, Outline], spacing: float) -> list[t
     low, high = _straight(outlines["body"])
     if seal is not None and seal.stripes and low < seal.length - half:
         middle, gap = seal.length - half, 0.05 * robot.body.length
-        found.append(("body", "striped side", _stations(low + 0.5 * gap, middle - 0.5 * gap, spacing)))
+        found.append(("body", "striped_side", _stations(low + 0.5 * gap, middle - 0.5 * gap, spacing)))
         low = middle + gap
     found.append(("body", "side", _stations(low, max(high - 0.03 * robot.body.length, low), spacing)))
     if "coupling" in outlines and robot.coupling.diameter > 0.15 * robot.body.diameter:
@@ -235,7 +222,7 @@ def _seal(robot: Robot, radius: float, spacing: float) -> Samples:
     """The visible front edge of the seal, (k, 3), m."""
     if robot.seal is None or not robot.seal.stripes:
         return np.empty((0, 3))
-    place = np.arange(-_SEEN_ARC, _SEEN_ARC, spacing / radius)
+    place = np.arange(-CONTOUR.seal_arc, CONTOUR.seal_arc, spacing / radius)
     front = np.full(place.size, robot.seal.length - 0.5 * robot.body.length)
     return np.stack([front, radius * np.sin(place), radius * np.cos(place)], axis=1)
 

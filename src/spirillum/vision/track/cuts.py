@@ -14,24 +14,10 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
 from spirillum.vision.flag import Flag
+from spirillum.vision.track.constants import CUTS
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["cuts_in", "jumps_of_time"]
-
-_AROUND = 8
-"""Frames before and after, through which the lines go that do not meet at a jump."""
-_CLEAR = 8.0
-"""Jump over the standard deviation of what is found elsewhere."""
-_PLACE, _ANGLE = 1.0, 0.12
-"""Least jump of the place, pixels, and of an angle, rad."""
-_GAP = 3.0
-"""Times between frames over the usual one, from which on a gap is honest and no line goes across."""
-_LONG = 30
-"""Readings before and after a gap, through which the lines go that tell whether time has passed."""
-_TOGETHER = 0.5
-"""Share of the least jump below which lines meet."""
-_UNSEEN = 20
-"""Frames without the robot over which lines go on, as it may be lost where it jumps."""
 
 
 def cuts_in(
@@ -49,11 +35,11 @@ def cuts_in(
     if time.size < 2:
         return ()
     usual = float(np.median(np.diff(time)))
-    jumps = [_jump(time, x, _PLACE * length_per_pixel, usual)]
-    jumps += [_jump(time, angle, _ANGLE, usual) for angle in (body_angle, tail_phase)]
+    jumps = [_jump(time, x, CUTS.place * length_per_pixel, usual)]
+    jumps += [_jump(time, angle, CUTS.angle, usual) for angle in (body_angle, tail_phase)]
     moments = sorted(moment for moment in jumps if moment is not None)
     for one, other in pairwise(moments):
-        if other - one < _GAP * usual:
+        if other - one < CUTS.gap * usual:
             sentence = (
                 f"robot, body and tail jump at {one:.2f} s while the times of the frames go on evenly: a piece of the "
                 "video is missing there; nothing is given (start and end of the setup choose a part of the video)"
@@ -79,16 +65,16 @@ def jumps_of_time(
         return ()
     steps = np.diff(time)
     usual, gap = float(np.median(steps)), int(np.argmax(steps))
-    if not steps[gap] > _GAP * usual:
+    if not steps[gap] > CUTS.gap * usual:
         return ()
     closed = np.where(np.arange(time.size) > gap, time - (steps[gap] - usual), time)
     series = (
-        (x, _PLACE * length_per_pixel, math.inf),
-        (body_angle, _ANGLE, period),
-        (tail_phase, _ANGLE, 2.0 * math.pi),
+        (x, CUTS.place * length_per_pixel, math.inf),
+        (body_angle, CUTS.angle, period),
+        (tail_phase, CUTS.angle, 2.0 * math.pi),
     )
     true, even = ([_miss(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
-    if sum(one > 1.0 for one in true) < 2 or not max(even) < _TOGETHER:
+    if sum(one > 1.0 for one in true) < 2 or not max(even) < CUTS.meeting:
         return ()
     sentence = (
         f"the times of the frames jump by {steps[gap]:.2f} s at {time[gap]:.2f} s, but body and tail go on as if no "
@@ -106,8 +92,8 @@ def _miss(time: Samples, values: Samples, gap: int, least: float, period: float)
     middle, far, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, []
     for part in (slice(None, gap + 1), slice(gap + 1, None)):
         known = np.flatnonzero(np.isfinite(values[part]))
-        known = known[-_LONG:] if part.start is None else known[:_LONG]
-        if known.size < _AROUND:
+        known = known[-CUTS.long_window :] if part.start is None else known[: CUTS.long_window]
+        if known.size < CUTS.window:
             return 0.0
         t, v = time[part][known], values[part][known]
         spans = t - t.mean()
@@ -121,31 +107,31 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> float |
     """When a series jumps most, s; None if it nowhere does."""
     known = np.isfinite(values)
     t, v = time[known], values[known]
-    if t.size < 4 * _AROUND:
+    if t.size < 4 * CUTS.window:
         return None
-    windows_t, windows_v = sliding_window_view(t, _AROUND), sliding_window_view(v, _AROUND)
+    windows_t, windows_v = sliding_window_view(t, CUTS.window), sliding_window_view(v, CUTS.window)
     middle_t, middle_v = windows_t.mean(axis=1), windows_v.mean(axis=1)
     spans = windows_t - middle_t[:, None]
     squares = np.sum(spans**2, axis=1)
     slopes = np.sum(spans * windows_v, axis=1) / squares
-    splits = 0.5 * (t[_AROUND:-_AROUND] + t[_AROUND - 1 : -_AROUND - 1])
-    before, after = slice(None, splits.size), slice(_AROUND, _AROUND + splits.size)
+    splits = 0.5 * (t[CUTS.window : -CUTS.window] + t[CUTS.window - 1 : -CUTS.window - 1])
+    before, after = slice(None, splits.size), slice(CUTS.window, CUTS.window + splits.size)
     far = [splits - middle_t[part] for part in (before, after)]
     reached = [middle_v[part] + slopes[part] * away for part, away in zip((before, after), far, strict=True)]
     # In units of what two lines miss each other by that end half a frame before and after the split.
-    unsure = sum(1.0 / _AROUND + away**2 / squares[part] for part, away in zip((before, after), far, strict=True))
+    unsure = sum(1.0 / CUTS.window + away**2 / squares[part] for part, away in zip((before, after), far, strict=True))
     steps = (reached[1] - reached[0]) / np.sqrt(unsure / np.min(unsure))
-    longest = sliding_window_view(np.diff(t), 2 * _AROUND - 1).max(axis=1)[: splits.size]
-    steps = np.where(_even(time, t, usual) & (longest < _UNSEEN * usual), steps, 0.0)
+    longest = sliding_window_view(np.diff(t), 2 * CUTS.window - 1).max(axis=1)[: splits.size]
+    steps = np.where(_even(time, t, usual) & (longest < CUTS.unseen * usual), steps, 0.0)
     if not steps.any():
         return None
     spread = 1.4826 * float(np.median(np.abs(steps[steps != 0.0])))
     largest = int(np.argmax(np.abs(steps)))
-    return float(splits[largest]) if abs(steps[largest]) > max(least, _CLEAR * spread) else None
+    return float(splits[largest]) if abs(steps[largest]) > max(least, CUTS.clear * spread) else None
 
 
 def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:
-    """Splits of the known frames at `t` about which the times of all frames go on evenly, (len(t) - 2 _AROUND,)."""
-    gaps = np.concatenate([[0], np.cumsum(np.diff(time) > _GAP * usual)])
+    """Splits of the known frames at `t` about which the times of all frames go on evenly, (len(t) - 2 CUTS.window,)."""
+    gaps = np.concatenate([[0], np.cumsum(np.diff(time) > CUTS.gap * usual)])
     place = np.searchsorted(time, t)
-    return np.asarray(gaps[place[2 * _AROUND - 1 : -1]] == gaps[place[: -2 * _AROUND]])
+    return np.asarray(gaps[place[2 * CUTS.window - 1 : -1]] == gaps[place[: -2 * CUTS.window]])

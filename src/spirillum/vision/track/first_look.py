@@ -14,26 +14,15 @@ from spirillum.errors import InputError
 from spirillum.vision.camera.optics import BodyPose, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import FIRST_LOOK, VISIBILITY
 from spirillum.vision.track.search import Candidate, close_places, most_likely, refined
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
-from spirillum.vision.track.warnings import FULL_VIEW, rivals_in, turned_flags
+from spirillum.vision.track.warnings import rivals_in, turned_flags
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["Start", "first_look", "on_the_way"]
 
 _THREADS = 2
-_SEARCHED = 8
-"""How many of the frames are searched for the robot without knowing anything."""
-_CLEAR = 1.6
-"""How much clearer the robot's edges are than those of anything else: score over that of the third best place."""
-_OFTEN = 0.25
-"""Share of the frames on which it has to be as clear as that."""
-_FAINT = 0.4
-"""Score of a robot over that on its best frames, below which it is not learnt from: it is partly out of view."""
-_WHOLE = 4
-"""Frames in full view that are enough to learn stripes and tail from."""
-_AGAIN = 3
-"""How often a body is learnt again at the size and place at which its outline lies."""
 _ALLOWED = "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
 
 
@@ -63,7 +52,7 @@ class Start:
 
     def as_clear(self, score: float) -> bool:
         """Whether edges are as clear as a robot's."""
-        return score > _FAINT * self.score
+        return score > FIRST_LOOK.faint * self.score
 
 
 class _Learnt(NamedTuple):
@@ -94,7 +83,9 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     Raises:
         InputError: if there is no robot.
     """
-    every = np.unique(np.linspace(0, len(frames) - 1, min(_SEARCHED, len(frames))).round().astype(int)).tolist()
+    every = np.unique(
+        np.linspace(0, len(frames) - 1, min(FIRST_LOOK.searched, len(frames))).round().astype(int)
+    ).tolist()
     images, focal = [frames[k].image for k in every], body.optics.focal
     found = _places(body, images, still)
     if not _clear(found):
@@ -104,7 +95,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
     learnt = _learnt(name, body, _roughly(body, known, frames, still))
     outline = outline_seen(body, learnt.typical)
-    for _ in range(_AGAIN):
+    for _ in range(FIRST_LOOK.relearning):
         if outline.fits(body.optics.length_per_pixel):
             break
         body, learnt = _relearnt(name, body, learnt, outline)
@@ -112,7 +103,9 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     size = body.optics.focal / focal * outline.size
     every = range(len(learnt.poses))
     whole = [k for k in every if learnt.whole[k]]
-    seen = [(learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= _WHOLE else every)]
+    seen = [
+        (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= FIRST_LOOK.whole_frames else every)
+    ]
     path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
     return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
 
@@ -132,7 +125,9 @@ def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequ
         for frame in frames
     ]
     usual = float(np.quantile([one.score for one in found], 0.8))
-    clear = [(frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > _FAINT * usual]
+    clear = [
+        (frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > FIRST_LOOK.faint * usual
+    ]
     return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
 
 
@@ -147,7 +142,7 @@ def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
     good = [(frame, one) for frame, one in zip(about.frames, found, strict=True) if one.known]
     if not good:
         raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {_ALLOWED}")
-    whole = [one.inside >= FULL_VIEW for _, one in good]
+    whole = [one.inside >= VISIBILITY.full_view for _, one in good]
     return _Learnt([frame for frame, _ in good], [one.pose for _, one in good], about.score, whole)
 
 
@@ -162,8 +157,10 @@ def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit)
 
 def _clear(found: Sequence[list[Candidate]]) -> bool:
     """Whether something stands out of the pictures as a robot does."""
-    clear = [len(some) > 0 and (len(some) < 3 or some[0].score > _CLEAR * some[2].score) for some in found]
-    return float(np.mean(clear)) >= _OFTEN
+    clear = [
+        len(some) > 0 and (len(some) < 3 or some[0].score > FIRST_LOOK.clearness * some[2].score) for some in found
+    ]
+    return float(np.mean(clear)) >= FIRST_LOOK.clear_share
 
 
 def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:

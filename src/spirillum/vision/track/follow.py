@@ -19,6 +19,7 @@ from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
+from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.first_look import Start, on_the_way
 from spirillum.vision.track.identity import Introduced, introduced
@@ -31,11 +32,6 @@ from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
 from spirillum.vision.video.frames import Frame, Video
 
 __all__ = ["Seen", "Watcher", "follow", "scale_of"]
-
-_LOOK_AGAIN = 15
-"""Frames between two searches of the whole picture for a robot that was lost."""
-_MEMORY = 12
-"""Frames from which the next place is guessed."""
 
 
 class Seen(NamedTuple):
@@ -105,7 +101,7 @@ def follow(
     total = video.count
     for frame in video.frames(setup.start, setup.end):
         found = _placed(body, frame, _guess(rows, frame.time), start)
-        if not found.known and len(rows.time) % _LOOK_AGAIN == 0:
+        if not found.known and len(rows.time) % FOLLOWING.search_interval == 0:
             found = _searched(body, frame.image, still, start, found)
         read = (np.nan, np.nan), (np.nan, np.nan)
         if found.known:
@@ -126,7 +122,11 @@ def follow(
 
 def _guess(rows: _Row, time: float) -> BodyPose | None:
     """Where the body should be, from the frames before; None where it was not seen on the last one."""
-    last = [(at, one.pose) for at, one in zip(rows.time[-_MEMORY:], rows.placed[-_MEMORY:], strict=True) if one.known]
+    last = [
+        (at, one.pose)
+        for at, one in zip(rows.time[-FOLLOWING.memory :], rows.placed[-FOLLOWING.memory :], strict=True)
+        if one.known
+    ]
     if len(last) < 2 or not rows.placed[-1].known:
         return None
     return on_the_way(last, time)
@@ -134,7 +134,7 @@ def _guess(rows: _Row, time: float) -> BodyPose | None:
 
 def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start) -> Placed:
     """The body near a guess, or else where it should be; not seen if it would have jumped."""
-    found, far = None, 4.0 * body.optics.length_per_pixel
+    found, far = None, FOLLOWING.largest_jump * body.optics.length_per_pixel
     if guess is not None:
         found = body.place(frame.image, guess)
         if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:

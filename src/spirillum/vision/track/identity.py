@@ -15,23 +15,15 @@ from spirillum.vision.camera.optics import BodyPose
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import IDENTITY, SIZE
 from spirillum.vision.track.first_look import Start, first_look
-from spirillum.vision.track.size import LENGTHS, SURE, another_size, resized
+from spirillum.vision.track.size import LENGTHS, another_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["Introduced", "introduced"]
-
-_READ = 0.5
-"""Share of the frames looked at on which stripes or tail have to be read."""
-_ALIKE = 0.03
-"""Relative difference from the stated size beyond which both have to be read: chance makes stripes of many things."""
-_SURELY = 0.75
-"""Share on which the tail has to be read then, and on which it says where the nose is.
-
-It was 0.83 and more of a hundred robots, 0.52 of one at half the size."""
 
 
 class Introduced(NamedTuple):
@@ -56,7 +48,7 @@ class Introduced(NamedTuple):
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals
-        if rivals and np.mean([self._like_it(image, pose) for image, pose in rivals]) > _READ:
+        if rivals and np.mean([self._like_it(image, pose) for image, pose in rivals]) > IDENTITY.least_share:
             sentence = (
                 f"more than one robot is in view (on {len(rivals)} of the frames looked at): it is not known which is "
                 "meant, so that nothing is given; a [region] around one of them in the setup would say"
@@ -105,11 +97,13 @@ def _looked(name: str, setup: Setup, body: BodyFinder, frames: list[Frame], stil
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops run side by side
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))
-    if wire.readable > _SURELY:  # the tail is at the end where it should be
+    if wire.readable > IDENTITY.sure_share:  # the tail is at the end where it should be
         start = replace(start, flags=())
     read = float(np.mean([np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]))
-    striped = stripes.fits and read > _READ
+    striped = stripes.fits and read > IDENTITY.least_share
     total = size * start.size
-    if abs(np.log(total)) <= _ALIKE and start.clearness > SURE:
-        return Introduced(start, stripes, wire, total, striped or wire.readable > _READ)
-    return Introduced(start, stripes, wire, total, wire.readable > _SURELY and (striped or not stripes.stripes))
+    if abs(np.log(total)) <= IDENTITY.size_tolerance and start.clearness > SIZE.clearness:
+        return Introduced(start, stripes, wire, total, striped or wire.readable > IDENTITY.least_share)
+    return Introduced(
+        start, stripes, wire, total, wire.readable > IDENTITY.sure_share and (striped or not stripes.stripes)
+    )

@@ -11,26 +11,10 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.constants import SEARCH
 from spirillum.vision.track.contour import GROUPS, Contour
 
 __all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined"]
-
-_WIDTH = 16.0
-"""Width of a body in the picture that is searched first, pixels."""
-_HEADINGS = np.deg2rad([-8.0, -4.0, 0.0, 4.0, 8.0])
-_STILL = 0.8
-"""How much of what stands still is taken off a picture; not all, or a robot that hardly moves would vanish too."""
-_EVERY = 2
-"""Of how many edge points one is used."""
-_STEP = 6
-"""Columns of the smaller picture for which the outline is computed once."""
-_BEST = 3
-"""Places of each heading among them that are kept."""
-_KEPT = 5
-_REACH = 6
-"""How far a candidate is moved to place it better, pixels."""
-_ROOM = 24
-"""Pixels around a candidate that are looked at to place it better."""
 
 
 class Candidate(NamedTuple):
@@ -63,15 +47,15 @@ def candidates(
     left, top, _, bottom = bounds
     middle = contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
     width = float(np.ptp(middle[:, 1]))
-    factor = max(1, int(width / _WIDTH))
-    slope_u, slope_v, usual = _slopes(image, still, bounds, factor, 1.0)
+    factor = max(1, int(width / SEARCH.body_width))
+    slope_u, slope_v, usual = _slopes(image, still, bounds, factor, SEARCH.coarse_blur)
     length, height = slope_u.shape
-    thin = np.arange(0, len(contour.group), _EVERY)
-    group, shift = contour.group[thin], np.array([-0.5 * _STEP, -0.5 * height])
-    scores = np.empty((_STEP, height + 1))
+    thin = np.arange(0, len(contour.group), SEARCH.edge_stride)
+    group, shift = contour.group[thin], np.array([-0.5 * SEARCH.column_step, -0.5 * height])
+    scores = np.empty((SEARCH.column_step, height + 1))
     found: list[tuple[float, BodyPose]] = []
-    for column in range(_STEP // 2, length + _STEP // 2, _STEP):
-        for heading in _HEADINGS:
+    for column in range(SEARCH.column_step // 2, length + SEARCH.column_step // 2, SEARCH.column_step):
+        for heading in np.deg2rad(SEARCH.headings):
             start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
             at = optics.points(start, optics.axis_height)[0]
             if not np.isfinite(at).all():
@@ -80,7 +64,7 @@ def candidates(
             pixels, normals, _, _ = contour.places(pose, optics)
             small = (pixels[thin] - np.array([left, top])) / factor - 0.5 + 0.5 / factor
             edge_scores(slope_u, slope_v, small, normals[thin], group, len(GROUPS), tuple(shift), scores)
-            best = np.argpartition(scores, -_BEST, axis=None)[-_BEST:]
+            best = np.argpartition(scores, -SEARCH.peaks, axis=None)[-SEARCH.peaks :]
             places = start + factor * (shift + np.column_stack(np.unravel_index(best, scores.shape)))
             for k, there in zip(best, optics.points(places, optics.axis_height), strict=True):
                 pose = BodyPose(float(there[0]), float(there[1]), float(heading) + turn)
@@ -93,7 +77,7 @@ def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) ->
     far = width * optics.length_per_pixel
     kept: list[Candidate] = []
     for score, pose in sorted(found, key=lambda entry: -entry[0]):
-        if score <= 0.0 or len(kept) == _KEPT:
+        if score <= 0.0 or len(kept) == SEARCH.candidates:
             break
         if all(np.hypot(pose.x - other.pose.x, pose.y - other.pose.y) > far for other in kept):
             kept.append(Candidate(pose, score))
@@ -145,15 +129,16 @@ def refined(
     first = contour.places(start.pose, optics)[0]
     if not np.isfinite(first).all():
         return Candidate(start.pose, 0.0)
-    low = np.maximum(first.min(axis=0) - _ROOM, bounds[:2]).astype(int)
-    high = np.minimum(first.max(axis=0) + _ROOM, bounds[2:]).astype(int)
-    if np.any(high - low < 2 * _ROOM):
+    low = np.maximum(first.min(axis=0) - SEARCH.margin, bounds[:2]).astype(int)
+    high = np.minimum(first.max(axis=0) + SEARCH.margin, bounds[2:]).astype(int)
+    if np.any(high - low < 2 * SEARCH.margin):
         return Candidate(start.pose, 0.0)
     part = int(low[0]), int(low[1]), int(high[0]), int(high[1])
-    slope_u, slope_v, _ = _slopes(image, still, part, 1, 1.2, bounded=False)
-    thin = np.arange(0, len(contour.group), _EVERY)
+    slope_u, slope_v, _ = _slopes(image, still, part, 1, SEARCH.fine_blur, bounded=False)
+    thin = np.arange(0, len(contour.group), SEARCH.edge_stride)
     group, best = contour.group[thin], Candidate(start.pose, 0.0)
-    scores, shift = np.empty((2 * _REACH + 1, 2 * _REACH + 1)), np.full(2, -float(_REACH))
+    reach = SEARCH.reach
+    scores, shift = np.empty((2 * reach + 1, 2 * reach + 1)), np.full(2, -float(reach))
     for _ in range(2):
         pose = best.pose
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
@@ -185,7 +170,7 @@ def most_likely(found: list[list[Candidate]], size: float) -> list[Candidate | N
     for before, now in pairwise(seen):
         a, b = (np.array([entry.pose for entry in found[index]]) for index in (before, now))
         ways = np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]) / size
-        through = totals[-1][:, None] - 0.5 * ways
+        through = totals[-1][:, None] - SEARCH.travel_penalty * ways
         came.append(np.argmax(through, axis=0))
         totals.append(np.max(through, axis=0) + np.array([entry.score / typical for entry in found[now]]))
     last = int(np.argmax(totals[-1]))
@@ -211,7 +196,8 @@ def _slopes(
     """
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
-    part = image[top:bottom, left:right].astype(np.float32) - _STILL * still[top:bottom, left:right].astype(np.float32)
+    whole, background = (picture[top:bottom, left:right].astype(np.float32) for picture in (image, still))
+    part = whole - SEARCH.background_share * background
     part = cv2.cvtColor(part, cv2.COLOR_RGB2GRAY)
     if factor > 1:
         size = max(1, part.shape[1] // factor), max(1, part.shape[0] // factor)

@@ -21,38 +21,19 @@ from spirillum.vision.camera.optics import BodyPose
 from spirillum.vision.camera.scale import Scale, with_source
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import SIZE
 from spirillum.vision.track.search import Candidate, close_places
 
-__all__ = ["LENGTHS", "SURE", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
+__all__ = ["LENGTHS", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
 """Sizes that are tried over the stated one; those between are found from the edges."""
-_LOOKED_AT = 3
-"""Frames on which they are tried."""
-SURE = 3.0
-"""Clearness from which on a robot is one: score over that of the third best place."""
-_STATED = 1.25
-"""How much better an outline has to fit that is a little larger or smaller than stated."""
-_BUILT, _EDGE = 0.005, 0.2
-"""Standard errors of the apparent size: how well a robot is built, relative, and where its edges appear, pixels.
-
-Assumed; on a hundred rendered and degraded films (70 pixels from the middle to the nose) it was 0.2 %."""
-_DOUBT = 2.0
-"""Standard errors from which on size and scale are said to differ."""
-_LARGEST = 0.1
-"""Relative difference beyond which no length is given."""
 _FINE = 8
 """Samples of the edges' steepness in a pixel."""
-_WIDTH = 0.6
-"""Width to which edges agree, pixels."""
 _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002)
 """Reach of size, place (pixels) and heading (rad) in each round of the search."""
 _COUNTS = 13, 9, 5
-_NEAR = 0.007
-"""Sizes that are as stated in the first round."""
-_ALIKE = np.array([0.0125, 0.5, 0.5, 0.006])
-"""Differences up to which a body is taken as it is stated or was found."""
 
 LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
 """What rests on the scale."""
@@ -83,7 +64,7 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
     Returns:
         The size over the stated one; None if nothing stands out as a robot does.
     """
-    few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, _LOOKED_AT).round().astype(int))]
+    few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, SIZE.looked_at).round().astype(int))]
 
     def at(size: float) -> list[list[Candidate]]:
         other = resized(body, float(size))
@@ -91,7 +72,7 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
 
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
         tried = list(pool.map(at, _SIZES))
-    alike = [_likeness(places) if clearness(places) > SURE else 0.0 for places in tried]
+    alike = [_likeness(places) if clearness(places) > SIZE.clearness else 0.0 for places in tried]
     best = int(np.argmax(alike))
     return float(_SIZES[best]) if alike[best] > 0.0 else None
 
@@ -117,12 +98,12 @@ class OutlineFit(NamedTuple):
     @property
     def resizes(self) -> bool:
         """Whether it is of another size, beyond what light and glare do to edges."""
-        return bool(abs(self.size - 1.0) > _ALIKE[0])
+        return bool(abs(self.size - 1.0) > SIZE.tolerance[0])
 
     def fits(self, pixel: float) -> bool:
         """Whether it lies as it was taken, to what light and glare do to edges; `pixel` is the length of one, m."""
         off = np.abs([self.size - 1.0, self.move.x / pixel, self.move.y / pixel, self.move.heading])
-        return bool(np.all(off <= _ALIKE))
+        return bool(np.all(off <= SIZE.tolerance))
 
 
 def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
@@ -151,14 +132,14 @@ def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
         scores = np.empty(len(tried))
         sums_along(steep, design * _FINE, float(body.half * _FINE), tried, scores)
         if not best.any():  # the stated size is believed before all others
-            scores[np.abs(tried[:, 0]) <= _NEAR] *= _STATED
+            scores[np.abs(tried[:, 0]) <= SIZE.stated_range] *= SIZE.stated_preference
         best = tried[int(np.argmax(scores))]
     return OutlineFit(1.0 + float(best[0]), BodyPose(*(best[1:] * units).tolist()))
 
 
 def _blurred(steep: Samples) -> Samples:
     """Steepness with the width to which edges are one."""
-    sigma = _FINE * _WIDTH
+    sigma = _FINE * SIZE.edge_width
     far = int(np.ceil(4.0 * sigma))
     bell = np.exp(-0.5 * (np.arange(-far, far + 1) / sigma) ** 2)
     around = np.lib.stride_tricks.sliding_window_view(np.pad(steep, ((0, 0), (far, far))), 2 * far + 1, axis=1)
@@ -176,15 +157,15 @@ def doubted(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, tuple[F
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel
     off = float(abs(np.log(size)))
-    if off < _DOUBT * np.sqrt(scale.relative_uncertainty**2 + _BUILT**2 + (_EDGE / half) ** 2):
+    if off < SIZE.doubt * np.sqrt(scale.relative_uncertainty**2 + SIZE.build_error**2 + (SIZE.edge_error / half) ** 2):
         return scale, ()
     how = f"{100 * abs(size - 1.0):.1f} % {'larger' if size > 1.0 else 'smaller'} than its file says"
-    if off > _LARGEST:
+    if off > SIZE.largest_difference:
         how = f"{size:.3g} times as large as its file says"
     sentence = (
         f"the body looks {how} at this scale: spacing, heights or index of the setup, or the robot's size, are wrong; "
     )
-    if off > _LARGEST:
+    if off > SIZE.largest_difference:
         return scale, (Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS),)
     wider = with_source(scale, "size of the body", off)
     return wider, (Flag("size-does-not-fit", sentence + "the intervals of lengths and speeds are wider for it"),)

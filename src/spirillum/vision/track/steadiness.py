@@ -13,34 +13,15 @@ from spirillum.extras import required
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
+from spirillum.vision.track.constants import STEADINESS
 from spirillum.vision.track.first_look import Start
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["camera_flags", "shift_between"]
 
-_PARTS = 4
-"""Stretches of the film, whose still pictures are compared."""
-_FEWEST = 3
-"""Fewest frames of a stretch."""
-_REACH = 12
-"""Largest shift that is looked for, pixels."""
-_PEAKS = 0.25
-"""Correlation below the best one down to which a shift is looked at closely: a ruler fits at many."""
-_EDGES = 0.8
-"""Share of the picture that is too smooth to tell a shift."""
-_MOST = 6
-"""Most shifts that are looked at closely, beside none."""
 _STEPS, _STILL = 8, 0.01
 """Steps of least squares at most, and the change, pixels, at which they end."""
-_CLEARER = 0.7
-"""What is left of the edges at a shift over what is left near none, below which it is believed."""
-_AROUND = 6
-"""Rows beside the robot that its edges change, pixels."""
 _THREADS = 2
-_MOVED, _MOVED_ROUGHLY = 0.2, 2.0
-"""Shift from which on the camera has moved, pixels: by the lines of a ruler, and by the picture alone.
-
-On rendered films of cameras at rest, also under a drifting lamp, they were within 0.05 and 1 pixel."""
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
@@ -51,7 +32,11 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
         start: what the first look at them has told.
         ruled: whether a ruler is in the picture.
     """
-    parts = [part for part in np.array_split(np.arange(len(frames)), _PARTS) if len(part) >= _FEWEST]
+    parts = [
+        part
+        for part in np.array_split(np.arange(len(frames)), STEADINESS.parts)
+        if len(part) >= STEADINESS.fewest_frames
+    ]
     if len(parts) < 2:
         return ()
     bounds, rows = start.body.bounds, _rows_of(start)
@@ -63,7 +48,7 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     first, shifts = lines[0], [0.0]
     for rough, found in zip(roughly, lines[1:], strict=True):
         shifts.append(rough if first is None or found is None else _by_lines(first, found, rough))
-    bound = _MOVED if first is not None else _MOVED_ROUGHLY
+    bound = STEADINESS.moved if first is not None else STEADINESS.moved_roughly
     if np.ptp(shifts) < bound:
         return ()
     step = int(np.argmax([abs(b - a) for a, b in pairwise(shifts)]))
@@ -82,7 +67,7 @@ def _rows_of(start: Start) -> tuple[int, int]:
     wide = max(0.5 * body.robot.body.diameter, body.robot.tail.amplitude) + body.robot.tail.wire_diameter
     sides = np.array([[0.0, -wide, 0.0], [0.0, wide, 0.0]])
     rows = [seen(sides, pose, body.optics)[:, 1] for _, pose in start.path]
-    low, high = np.nanmin(rows) - _AROUND, np.nanmax(rows) + _AROUND
+    low, high = np.nanmin(rows) - STEADINESS.rows_beside, np.nanmax(rows) + STEADINESS.rows_beside
     return max(0, int(low)), max(0, int(high))
 
 
@@ -96,17 +81,17 @@ def shift_between(one: Samples, other: Samples) -> float:
         other: the second one.
     """
     cv2 = required("cv2", "measuring a video", "video")
-    inside = slice(_REACH, -_REACH), slice(_REACH, -_REACH)
+    inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
     alike = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
-    peaks = np.argwhere((alike >= cv2.dilate(alike, np.ones((3, 3)))) & (alike > alike.max() - _PEAKS))
-    peaks = peaks[np.argsort(-alike[tuple(peaks.T)])[:_MOST]].tolist()
+    peaks = np.argwhere((alike >= cv2.dilate(alike, np.ones((3, 3)))) & (alike > alike.max() - STEADINESS.peak_range))
+    peaks = peaks[np.argsort(-alike[tuple(peaks.T)])[: STEADINESS.most_peaks]].tolist()
     slope_u, slope_v = (0.5 * cv2.Sobel(one, cv2.CV_32F, *order, ksize=1)[inside] for order in ((1, 0), (0, 1)))
     steep = np.hypot(slope_u, slope_v)
-    edge = steep > np.quantile(steep, _EDGES)
+    edge = steep > np.quantile(steep, STEADINESS.smooth_share)
     slopes, there = np.stack([slope_u[edge], slope_v[edge]], axis=1), one[inside][edge]
     found = []
-    for row, column in [*peaks, [_REACH, _REACH]]:
-        shift = np.array([column, row], dtype=float) - _REACH
+    for row, column in [*peaks, [STEADINESS.reach, STEADINESS.reach]]:
+        shift = np.array([column, row], dtype=float) - STEADINESS.reach
         rest = np.zeros(0)
         for _ in range(_STEPS):
             back = np.array([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]])
@@ -121,7 +106,7 @@ def shift_between(one: Samples, other: Samples) -> float:
                 break
         found.append((float(np.median(np.abs(rest))), float(shift[0])))
     best, near = min(found), min(found, key=lambda one: abs(one[1]))
-    return best[1] if best[0] < _CLEARER * near[0] else near[1]
+    return best[1] if best[0] < STEADINESS.clearly_better * near[0] else near[1]
 
 
 def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, int]) -> Samples:
@@ -140,7 +125,7 @@ def _by_lines(one: Lines, other: Lines, rough: float) -> float:
     at = {(u, v): number for (u, v), number in zip(one.pixels.tolist(), one.number.tolist(), strict=True)}
     pairs = zip(other.pixels.tolist(), other.number.tolist(), strict=True)
     turns = np.array([number - at[u, v] for (u, v), number in pairs if (u, v) in at])
-    if turns.size < _FEWEST:
+    if turns.size < STEADINESS.fewest_frames:
         return rough
     middle = np.angle(np.mean(np.exp(2j * np.pi * turns))) / (2.0 * np.pi)
     lines = -(middle + float(np.median((turns - middle + 0.5) % 1.0 - 0.5)))

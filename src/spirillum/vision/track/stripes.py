@@ -21,54 +21,16 @@ from spirillum.vision.track.colours import (
     width_seen,
     without_glare,
 )
+from spirillum.vision.track.constants import STRIPES
 
 __all__ = ["Stripes"]
 
-_REACH = np.deg2rad(78.0)
-"""Angles from the direction towards the camera up to which the surface is looked at."""
-_STEP = np.deg2rad(1.5)
 _ROWS = 16
 """Samples along the axis."""
-_MARGIN = 0.12
-"""Share of the seal's length that is left out at either end."""
-_TINT = 3.0
-"""How strongly the three channels of the lamp are held together within a frame."""
-_BLURS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0)
-"""Standard deviations of the picture's blur that are tried, pixels."""
 _BLURRED = 2
 """Of how many frames one is asked for the blur."""
-_CUT, _EDGE = 4.7, 0.35
-"""Residual at which a sample no longer counts: over the typical one, and at least this share of the step between two
-stripes, so that edges a part of a pixel away still pull."""
-_FIRST_RESIDUAL = 18.0
-_REPEATS = 6
-_WITHOUT_GLARE = 2
-"""Repeats in which what looks like glare is left out."""
 _HUMPS = 15
 """Humps of what shines along the angle."""
-_HELD, _TINTED, _ROUGH = 0.05, 2.0, 0.2
-"""How strongly what shines is held to nothing, its tint to white, and both to change evenly along the angle."""
-_FLOOR = np.deg2rad(0.05)
-"""What the geometry of seal and stripes is trusted to, rad."""
-_LOCKED = 0.05
-"""How far an edge's place depends on where it lies within a pixel, pixels."""
-_UNREADABLE = 0.6
-"""Loss over that of one even colour, above which nothing is read."""
-_GOOD = 0.3
-"""The same, below which the colours found are believed without trying the named ones."""
-_FITS = 0.25
-"""The same, from which on the stripes are not those that are stated: wrong ones had 0.26 and more, right ones on a
-hundred degraded films at most 0.19."""
-_WIDER = 0.3
-"""Logarithm of the stripes' width over the stated one, from which on there are more or fewer of them."""
-_DOUBT = 1.0
-"""How much less an angle counts at which frames differ from what is expected by more than usual."""
-_WHITE = 228.0
-"""Brightness of the darkest channel from which on no colour is left."""
-_WIDE, _HALO = 10, 8
-"""Angles, `_STEP` each, from which on glare is wide, and those beside it that it makes paler than a lamp does."""
-_AMBIGUOUS = 1.15
-"""Least ratio of the next best loss to the best one."""
 
 
 @dataclass
@@ -104,13 +66,13 @@ class Stripes:
         self.look: _Look | None = None
         self.fits = False
         self.flags: tuple[Flag, ...] = ()
-        count = 1 + 2 * round(_REACH / _STEP)
-        self.angles = np.linspace(-_REACH, _REACH, count)
-        coarse = np.linspace(-_REACH, _REACH, 27)
+        count = 1 + 2 * round(STRIPES.reach / STRIPES.step)
+        self.angles = np.linspace(-STRIPES.reach, STRIPES.reach, count)
+        coarse = np.linspace(-STRIPES.reach, STRIPES.reach, 27)
         self._between, self._slope = _spline(coarse, self.angles)
         length = robot.seal.length if robot.seal is not None else 0.0
         rear, radius = -0.5 * robot.body.length, 0.5 * robot.body.diameter
-        ends = rear + length * np.array([_MARGIN, 1.0 - _MARGIN])
+        ends = rear + length * np.array([STRIPES.margin, 1.0 - STRIPES.margin])
         self._surface = np.concatenate(
             [
                 np.stack([np.full(coarse.size, x), -radius * np.sin(coarse), radius * np.cos(coarse)], axis=1)
@@ -144,15 +106,15 @@ class Stripes:
         clear = without_glare(profiles, (palette, *palettes[1:]))
         self.look = self._refined(profiles, clear, scales, palette)
         least = self._typical_loss(profiles, scales, self.look)
-        if least > _GOOD:
+        if least > STRIPES.good:
             other = self._refined(profiles, clear, scales, start)
             loss = self._typical_loss(profiles, scales, other)
             self.look, least = (other, loss) if loss < least else (self.look, least)
         rightly = named_rightly(self.look.palette, start)
         stated = 2.0 * np.pi / len(self.stripes)
         wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:]), stated) / stated
-        counted = not abs(np.log(wide)) > _WIDER
-        if least < _FITS and rightly and counted:
+        counted = not abs(np.log(wide)) > STRIPES.width_range
+        if least < STRIPES.fits and rightly and counted:
             self.fits = True
             return  # the order given fits, with the colours that belong to its names
         if verdict in ("reversed", "other"):
@@ -162,7 +124,7 @@ class Stripes:
                 "check robot.stripes"
             )
             self.flags = (Flag("stripe-order", sentence, ("body_rotation_rate",)),)
-        elif least >= _FITS or not counted:
+        elif least >= STRIPES.fits or not counted:
             sentence = (
                 f"what is seen on the seal does not look like {len(self.stripes)} stripes, {', '.join(self.stripes)}; "
                 "the body's rotation is not given: check robot.stripes"
@@ -190,9 +152,11 @@ class Stripes:
         profile, scale = self._profile(image, pose)
         answer = self._fit(profile, scale, self.look)
         loss, other, flat = answer[2:5]
-        if not np.isfinite(answer).all() or loss > _UNREADABLE * flat or other < _AMBIGUOUS * loss:
+        if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
             return np.nan, np.nan
-        return float(answer[0]), float(np.sqrt(answer[1] ** 2 + _FLOOR**2 + (_LOCKED / scale.max()) ** 2))
+        return float(answer[0]), float(
+            np.sqrt(answer[1] ** 2 + STRIPES.floor**2 + (STRIPES.pixel_locking / scale.max()) ** 2)
+        )
 
     def _unreadable(self) -> Flag:
         sentence = "the stripes are in no frame's view, so that the body's rotation is not given"
@@ -215,17 +179,17 @@ class Stripes:
 
     def _dazzled(self, profile: Samples) -> np.ndarray:
         """Angles at which wide glare hides every colour, and its halo, (n,)."""
-        white = profile.min(axis=1) > _WHITE
-        if np.count_nonzero(white) < _WIDE:
+        white = profile.min(axis=1) > STRIPES.white
+        if np.count_nonzero(white) < STRIPES.wide_glare:
             return np.zeros(white.shape, dtype=bool)
-        return np.asarray(np.convolve(white, np.ones(2 * _HALO + 1), mode="same") > 0.5)
+        return np.asarray(np.convolve(white, np.ones(2 * STRIPES.halo + 1), mode="same") > 0.5)
 
     def _fit(self, profile: Samples, scale: Samples, look: _Look) -> Samples:
         """The answer of `stripe_fit`; NaN where too little is in view."""
         edges = np.diff(look.palette[np.append(self.order, self.order[0])], axis=0)
-        cut = max(_CUT * 1.7 * look.residual, _EDGE * float(np.median(np.linalg.norm(edges, axis=1))))
+        cut = max(STRIPES.cut * look.residual, STRIPES.edge_cut * float(np.median(np.linalg.norm(edges, axis=1))))
         answer, losses = np.full(8, np.nan), np.empty(max(24, round(self.period / np.deg2rad(4.0))))
-        settings = self.period, _TINT, cut, 0.3 * look.residual, look.blur
+        settings = self.period, STRIPES.lamp_tint, cut, 0.3 * look.residual, look.blur
         known = profile, scale, look.trust, self.angles, look.shade, self.order, look.palette
         stripe_fit(*known, settings, losses, answer)
         return answer
@@ -233,16 +197,16 @@ class Stripes:
     def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Look:
         """Colours, shading and blur with which the stripes fit best; what shines is learnt once the stripes are."""
         even = np.column_stack([np.ones((self.angles.size, 3)), np.zeros((self.angles.size, 3))])
-        look = _Look(palette, even, 1.0, _FIRST_RESIDUAL, np.ones(self.angles.size))
-        for repeat in range(_REPEATS):
-            if repeat in (2, _REPEATS - 1):
+        look = _Look(palette, even, 1.0, STRIPES.first_residual, np.ones(self.angles.size))
+        for repeat in range(STRIPES.repeats):
+            if repeat in (2, STRIPES.repeats - 1):
                 losses = []
-                for blur in _BLURS:
+                for blur in STRIPES.blurs:
                     trial = _Look(look.palette, look.shade, blur, look.residual, look.trust)
                     some = zip(profiles[::_BLURRED], scales[::_BLURRED], strict=True)
                     losses.append(np.nansum([self._fit(p, s, trial)[2] for p, s in some]))
-                look.blur = _BLURS[int(np.argmin(losses))]
-            look = self._relearned(clear if repeat < _WITHOUT_GLARE else profiles, scales, look)
+                look.blur = STRIPES.blurs[int(np.argmin(losses))]
+            look = self._relearned(clear if repeat < STRIPES.repeats_without_glare else profiles, scales, look)
         return look
 
     def _relearned(self, profiles: Samples, scales: Samples, look: _Look) -> _Look:
@@ -288,7 +252,7 @@ class Stripes:
         rough = np.sqrt(np.median(np.array(squares), axis=0))
         rough = np.convolve(np.pad(rough, 2, mode="edge"), np.ones(5) / 5.0, mode="valid")
         usual = np.median(rough) + 1.0
-        trust = 1.0 / (1.0 + _DOUBT * (rough / usual) ** 2)
+        trust = 1.0 / (1.0 + STRIPES.doubt * (rough / usual) ** 2)
         return _Look(palette, light, look.blur, float(np.median(residuals)), trust / trust.max())
 
 
@@ -304,7 +268,7 @@ def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) 
         wanted: the picture's colours there, (f, n, 3).
         kept: which of them count, (f, n).
     """
-    s = angles / _REACH
+    s = angles / STRIPES.reach
     series = np.stack([s**power for power in range(5)], axis=1)
     centres = np.linspace(-1.0, 1.0, _HUMPS)
     humps = np.maximum(0.0, 1.0 - np.abs(s[:, None] - centres) / (centres[1] - centres[0]))
@@ -320,10 +284,12 @@ def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) 
             normal += basis.T @ basis
             right += basis.T @ level[good, channel]
     share = float(np.sum(kept)) * 3.0 / angles.size
-    held = np.concatenate([[0.0], np.full(4, 1.0), np.full(_HUMPS, _HELD), np.full(3 * _HUMPS, _TINTED)])
+    held = np.concatenate(
+        [[0.0], np.full(4, 1.0), np.full(_HUMPS, STRIPES.sheen_prior), np.full(3 * _HUMPS, STRIPES.tint_prior)]
+    )
     normal += np.diag(held * share + 1e-6)
     rough = np.diff(np.eye(_HUMPS), 2, axis=0)
-    normal[5:, 5:] += _ROUGH * share * np.kron(np.eye(4), rough.T @ rough)
+    normal[5:, 5:] += STRIPES.roughness_prior * share * np.kron(np.eye(4), rough.T @ rough)
     found = np.linalg.solve(normal, right)
     shade = np.clip(series @ found[:5] / 100.0, 0.2, 3.0)
     white, *tints = found[5:].reshape(4, _HUMPS)

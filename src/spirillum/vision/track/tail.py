@@ -14,24 +14,13 @@ from spirillum.robot.robot import Robot
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
+from spirillum.vision.track.constants import TAIL
 
 __all__ = ["TailWave"]
 
 _TAIL = ("tail_rotation_rate",)
-_PHASES = 40
-"""Phases that are tried on every frame."""
-_EVERY = 3
-"""Rows of the strip from one to the next one that is looked at there."""
 _COARSE = 13
 """Places along the tail at which the optics are asked."""
-_SHARE = 0.4
-"""Least share of the wire that has to be where it should be."""
-_RIVAL = 0.85
-"""Largest score of another phase over the best one."""
-_OFFSET, _LEAN = 0.3, 0.02
-"""Likely sideways offset of the tail, in widths of the wire, and tilt, rad."""
-_FLOOR = 0.004
-"""What the tail's shape is trusted to, rad."""
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
 """Weights of red, green and blue that are tried first: a darker, brighter, more yellow, ... wire than its sides."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
@@ -76,11 +65,11 @@ class TailWave:
         )
         pixel = optics.length_per_pixel
         first = min(2.0 * tail.wire_diameter, 0.1 * tail.length)
-        rows = int(np.clip(round((tail.length - first) / (1.2 * pixel)), 40, 400))
+        rows = int(np.clip(round((tail.length - first) / (TAIL.row_spacing * pixel)), 40, 400))
         self.xi = np.linspace(first, tail.length, rows)
-        step = float(np.clip(0.25 * tail.wire_diameter, 0.4 * pixel, pixel))
+        step = float(np.clip(TAIL.column_spacing * tail.wire_diameter, 0.4 * pixel, pixel))
         self.inner = max(1, round(0.5 * tail.wire_diameter / step))
-        reach = tail.amplitude + 3.0 * max(tail.wire_diameter, 2.0 * pixel)
+        reach = tail.amplitude + TAIL.border * max(tail.wire_diameter, 2.0 * pixel)
         self.columns = 1 + 2 * int(np.ceil(reach / step))
         self.step = step
         self.width = max(tail.wire_diameter, 2.0 * pixel)
@@ -124,7 +113,7 @@ class TailWave:
             self.usual = 0.0
             self._sharpen(strips)
         fits = np.array([self._fit(image, strip)[0] for image, strip in strips])
-        readable = fits[:, 2] > _SHARE
+        readable = fits[:, 2] > TAIL.least_share
         self.readable = float(np.mean(readable))
         self._check_shape(strips, fits[readable], self.readable)
         if self.readable < 0.2 and not self._flags:
@@ -152,10 +141,10 @@ class TailWave:
         if self.contrast is None:
             return nothing
         answer, rival = self._fit(image, self._strip(pose))
-        if not np.isfinite(answer[:2]).all() or answer[2] < _SHARE or rival > _RIVAL:
+        if not np.isfinite(answer[:2]).all() or answer[2] < TAIL.least_share or rival > TAIL.largest_rival:
             return nothing
         hand = (float(answer[5]), float(answer[6])) if answer[6] > 0.0 else None
-        return (float(answer[0] % (2.0 * np.pi)), float(np.hypot(answer[1], _FLOOR))), hand
+        return (float(answer[0] % (2.0 * np.pi)), float(np.hypot(answer[1], TAIL.floor))), hand
 
     @property
     def flags(self) -> tuple[Flag, ...]:
@@ -210,8 +199,8 @@ class TailWave:
         return ridge
 
     def _scores(self, ridge: Samples, strip: _Strip, wave: Samples) -> Samples:
-        scores = np.empty(_PHASES)
-        wave_scores(ridge, self.xi, strip.tilt, wave, self.step, _EVERY, scores)
+        scores = np.empty(TAIL.phases)
+        wave_scores(ridge, self.xi, strip.tilt, wave, self.step, TAIL.row_stride, scores)
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
@@ -233,9 +222,10 @@ class TailWave:
         if not np.isfinite(scores).all() or scores.max() <= 0.0:
             return answer, np.inf
         best = int(np.argmax(scores))
-        apart = np.abs((np.arange(_PHASES) - best + _PHASES // 2) % _PHASES - _PHASES // 2) > _PHASES / 6
-        likely = _OFFSET * self.width, _LEAN * (self.xi[-1] - self.xi[0])
-        settings = (2.0 * np.pi * best / _PHASES, self.step, self.width, self.usual, *likely)
+        count = scores.size
+        apart = np.abs((np.arange(count) - best + count // 2) % count - count // 2) > count / 6
+        likely = TAIL.offset * self.width, TAIL.tilt * (self.xi[-1] - self.xi[0])
+        settings = (2.0 * np.pi * best / count, self.step, self.width, self.usual, *likely)
         wave_fit(ridge, self.xi, strip.tilt, self.wave, settings, answer)
         return answer, float(scores[apart].max() / scores[best])
 

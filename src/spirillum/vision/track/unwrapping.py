@@ -18,37 +18,10 @@ from spirillum.units import show
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.constants import UNWRAPPING
 
-__all__ = ["LARGEST_STEP", "Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
+__all__ = ["Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
 
-LARGEST_STEP = 0.45
-"""Step from frame to frame, in periods, from which on its sense is doubtful."""
-_ORDER = 0.6
-"""Least length of the mean of the steps as unit vectors: less is no rotation."""
-_STRAY = 0.3
-"""Distance from where an angle should be, in periods, that makes it a stray reading."""
-_START = 40
-"""Steps from which the first rate is found."""
-_LOST = 6
-"""Stray readings in a row after which the rate is found anew."""
-_GAIN, _RATE_GAIN = 0.5, 0.08
-"""How far angle and rate follow each reading."""
-_DRIFT = 0.05
-"""Change of the rate over a gap, relative, that has to be reckoned with."""
-_TURNED = 0.35
-"""Least angle, rad, that counts as turning when two senses of rotation are compared."""
-_RESTS, _STILL = 0.005, 0.02
-"""Least way, over the body's length, and turn, rad, of something that is not a part of the background."""
-_LEAP, _FEW_LEAPS, _NEAR_STEPS = np.radians(25.0), 2, 9
-"""Steps of the body beside the median of nine around it, from which on it leaps, and how many say that it is misread.
-
-On rendered films with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and more."""
-_RARELY = 0.1
-"""Share of the frames on which angles have to be read."""
-_FEW_FRAMES = 10
-"""Frames on which something has to rest to be taken for a part of the background."""
-_WALLS = 1.5
-"""What walls may add to the largest advance of a helix in a turn."""
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -100,11 +73,12 @@ def unwrapped(
     flags: list[Flag] = []
     if known.size < 0.5 * angle.size:
         flags.append(_unread(part, known.size, angle.size))
-    if abs(rate) * dt > LARGEST_STEP * period:
+    least = UNWRAPPING.least_order
+    if abs(rate) * dt > UNWRAPPING.largest_step * period:
         flags.append(_too_fast(part, rate, dt, period))
     elif (other := _better_alias(t, a, period, dt, rate)) is not None:
         flags.append(_other_rate(part, rate, other))
-    elif order < _ORDER and _local_order(t, a, period, dt) < _ORDER:  # a start or stop is in order at each time
+    elif order < least and _local_order(t, a, period, dt) < least:  # a start or stop is in order at each time
         flags.append(_jumps(part))
     values, doubtful = _followed(t, a, error[known], period, dt)
     if doubtful:
@@ -115,7 +89,7 @@ def unwrapped(
                 "turns may be missing from its angle",
             )
         )
-    if part == "body" and (count := _leaps(t, values, dt)) >= _FEW_LEAPS:
+    if part == "body" and (count := _leaps(t, values, dt)) >= UNWRAPPING.leaps:
         flags.append(_wrong_stripes(count))
     out[known] = values
     return out, tuple(flags)
@@ -164,28 +138,28 @@ def _followed(
     values = np.full(a.size, np.nan)
     stray = 0
     lost = None
-    rate = _rate(t[: _START + 1], a[: _START + 1], period, dt)[0]
+    rate = _rate(t[: UNWRAPPING.start + 1], a[: UNWRAPPING.start + 1], period, dt)[0]
     state, at = float(a[_first_good(t, a, period, rate)]), float(t[_first_good(t, a, period, rate)])
     begin = _first_good(t, a, period, rate)
     for k in range(begin, a.size):
         span = float(t[k]) - at
         ahead = state + rate * span
         value = float(a[k] + period * np.round((ahead - a[k]) / period))
-        if span > 10.0 * dt and abs(rate) * span * _DRIFT > 0.5 * period and lost is None:
+        if span > 10.0 * dt and abs(rate) * span * UNWRAPPING.drift > 0.5 * period and lost is None:
             lost = (at, float(t[k]))
-        if abs(value - ahead) > _STRAY * period and k > begin:
+        if abs(value - ahead) > UNWRAPPING.outlier * period and k > begin:
             stray += 1
-            if stray >= _LOST:
-                near = slice(max(0, k - _LOST + 1), min(a.size, k + _START))
+            if stray >= UNWRAPPING.lost:
+                near = slice(max(0, k - UNWRAPPING.lost + 1), min(a.size, k + UNWRAPPING.start))
                 rate = _rate(t[near], a[near], period, dt)[0]
                 state, at, stray = value, float(t[k]), 0
                 values[k] = value
             continue
         stray = 0
         values[k] = value
-        gain = _GAIN if np.isfinite(error[k]) and error[k] < 0.1 * period else 0.2
+        gain = UNWRAPPING.gain if np.isfinite(error[k]) and error[k] < 0.1 * period else 0.2
         if span > 0:
-            rate += _RATE_GAIN * gain / _GAIN * (value - ahead) / max(span, dt)
+            rate += UNWRAPPING.rate_gain * gain / UNWRAPPING.gain * (value - ahead) / max(span, dt)
         state, at = ahead + gain * (value - ahead), float(t[k])
     return values, lost
 
@@ -204,25 +178,27 @@ def _leaps(t: Samples, values: Samples, dt: float) -> int:
     """Steps from reading to reading that are far from those around them."""
     known = np.isfinite(values)
     steps, spans = np.diff(values[known]), np.diff(t[known])
-    if steps.size < _NEAR_STEPS:
+    if steps.size < UNWRAPPING.leap_window:
         return 0
-    around = sliding_window_view(np.pad(steps / spans, _NEAR_STEPS // 2, mode="edge"), _NEAR_STEPS)
+    around = sliding_window_view(
+        np.pad(steps / spans, UNWRAPPING.leap_window // 2, mode="edge"), UNWRAPPING.leap_window
+    )
     off = np.abs(steps - np.median(around, axis=1) * spans)
-    return int(np.sum((off > _LEAP) & (spans < 10.0 * dt)))
+    return int(np.sum((off > UNWRAPPING.leap) & (spans < 10.0 * dt)))
 
 
 def _wrong_stripes(count: int) -> Flag:
     return Flag(
         "stripes-do-not-fit",
-        f"the body's angle leaps {count} times by more than {np.degrees(_LEAP):.0f} degrees from frame to frame: "
-        "number or order of the stripes is wrong, or they are misread; the body's rotation is not given",
+        f"the body's angle leaps {count} times by more than {np.degrees(UNWRAPPING.leap):.0f} degrees from frame to "
+        "frame: number or order of the stripes is wrong, or they are misread; the body's rotation is not given",
         _RATES["body"],
     )
 
 
 def _unread(part: _Part, seen: int, total: int) -> Flag:
     name, what = ("stripes-unreadable", "stripes") if part == "body" else ("tail-unreadable", "tail")
-    if seen < max(4, _RARELY * total):
+    if seen < max(4, UNWRAPPING.least_share * total):
         return Flag(
             name, f"the {what} could be read on {seen} of {total} frames; the rotation is not given", _RATES[part]
         )
@@ -242,7 +218,8 @@ def _too_fast(part: _Part, rate: float, dt: float, period: float) -> Flag:
     return Flag(
         f"aliased-{part}",
         f"the {part} turns by {abs(rate) * dt / period:.2f} of a period from frame to frame, so that its sense of "
-        f"rotation is doubtful; allowed: below {LARGEST_STEP:g}, with more frames a second; its rotation is not given",
+        f"rotation is doubtful; allowed: below {UNWRAPPING.largest_step:g}, with more frames a second; its "
+        "rotation is not given",
         _RATES[part],
     )
 
@@ -279,10 +256,10 @@ def nothing_moves(
         x: place along the channel, m, (n,).
         robot: the robot.
     """
-    if time.size < _FEW_FRAMES:
+    if time.size < UNWRAPPING.fewest_frames:
         return ()
     moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
-    if np.isfinite(tail_phase).any() or moved > _RESTS * robot.body.length or turned > _STILL:
+    if np.isfinite(tail_phase).any() or moved > UNWRAPPING.rest * robot.body.length or turned > UNWRAPPING.rest_angle:
         return ()
     sentence = (
         "what was followed neither moves nor turns, and its tail is not seen: it may be something that stands in "
@@ -312,8 +289,8 @@ def contradictions(
     body, body_turned = _slope(time, body_angle)
     tail, tail_turned = _slope(time, tail_phase)
     _, moved = _slope(time, x)
-    turns = abs(tail_turned) > _TURNED
-    if turns and abs(body_turned) > _TURNED and body * tail > 0:
+    turns = abs(tail_turned) > UNWRAPPING.turning
+    if turns and abs(body_turned) > UNWRAPPING.turning and body * tail > 0:
         if hand_seen > 0:
             sentence = (
                 "body and tail seem to turn the same way, as no free swimmer does, though the tail's hand is as given: "
@@ -340,11 +317,11 @@ def contradictions(
 def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
     """A way that no tail drives which turns as this one seems to."""
     turns, what = abs(tail_turned) / (2 * np.pi), "the tail is too fast for this frame rate"
-    if abs(tail_turned) > _TURNED and moved * tail_turned * robot.hand < 0:
+    if abs(tail_turned) > UNWRAPPING.turning and moved * tail_turned * robot.hand < 0:
         why, what = "moves against the sense in which its tail seems to turn", f"{what}, tail.handedness is wrong"
-    elif abs(moved) <= turns * _WALLS * _largest_advance(robot):
+    elif abs(moved) <= turns * UNWRAPPING.wall_factor * _largest_advance(robot):
         return ()
-    elif abs(tail_turned) > _TURNED:
+    elif abs(tail_turned) > UNWRAPPING.turning:
         why = (
             f"advances {show(abs(moved) / turns, 'mm')} a turn of its tail, more than such a wire can in viscous fluid"
         )

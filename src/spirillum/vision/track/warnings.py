@@ -12,33 +12,14 @@ from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
+from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import Candidate, close_places
 
-__all__ = ["EVERYTHING", "FULL_VIEW", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
+__all__ = ["EVERYTHING", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
 
 _THREADS = 2
 EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
 """All that a track gives."""
-
-_SECOND = 0.75
-"""Score of a second robot over that of the first."""
-_CLEAR = 1.3
-"""The same over the next best place."""
-_MAYBE, _TURNED = 0.85, 1.05
-"""Score of a robot the other way round over that of the stated direction, from which on more frames are asked, and
-from which on it is said."""
-_OFTEN = 0.6
-"""Share of the frames in which something has to be seen to be said."""
-_ASKED = 3
-"""Every how manieth frame is looked at the other way round first."""
-_LOST = 0.03
-"""Share of frames without the robot that is said."""
-FULL_VIEW = 0.97
-"""Share of the edges in the picture below which the robot is partly out of view."""
-_ENOUGH = 0.2
-"""Share of frames on which it is in full view, from which on the others are left out."""
-_HIDDEN = 0.55
-"""Share of the edges that fit below which glare, shadows or bubbles are said."""
 
 
 def rivals_in(
@@ -61,9 +42,13 @@ def rivals_in(
             continue
         count += 1
         apart = [other for other in others if _apart(other, one, half) and len(others) > 2]
-        clear = [other for other in apart if other.score > max(_SECOND * one.score, _CLEAR * others[2].score)]
+        clear = [
+            other
+            for other in apart
+            if other.score > max(VISIBILITY.second * one.score, VISIBILITY.second_clear * others[2].score)
+        ]
         rivals += [(image, other.pose) for other in clear[:1]]
-    return rivals if len(rivals) > _OFTEN * count else []
+    return rivals if len(rivals) > VISIBILITY.often * count else []
 
 
 def turned_flags(
@@ -83,10 +68,10 @@ def turned_flags(
         chosen: the one that was taken for the robot.
     """
     seen = [(image, some[0].score) for image, some, one in zip(images, found, chosen, strict=True) if one is not None]
-    turned = _turned(body, seen[::_ASKED], still)
-    if turned > _MAYBE:
+    turned = _turned(body, seen[:: VISIBILITY.asked], still)
+    if turned > VISIBILITY.maybe_turned:
         turned = _turned(body, seen, still)
-    if turned <= _TURNED:
+    if turned <= VISIBILITY.turned:
         return ()
     side = "left" if body.optics.leftward else "right"
     sentence = (
@@ -147,9 +132,9 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
 
 def cut_off(found: Sequence[Placed]) -> np.ndarray:
     """Frames that are left out because the robot is partly out of view, if it is in full view often enough, (n,)."""
-    part = np.array([one.known and one.inside < FULL_VIEW for one in found])
-    whole = np.array([one.known and one.inside >= FULL_VIEW for one in found])
-    enough = int(whole.sum()) > _ENOUGH * int((part | whole).sum())
+    part = np.array([one.known and one.inside < VISIBILITY.full_view for one in found])
+    whole = np.array([one.known and one.inside >= VISIBILITY.full_view for one in found])
+    enough = int(whole.sum()) > VISIBILITY.enough * int((part | whole).sum())
     return part if enough else np.zeros(part.shape, dtype=bool)
 
 
@@ -173,7 +158,7 @@ def sight_flags(
         return (Flag("robot-not-seen", "the robot was not seen well enough on any frame", EVERYTHING),)
     first, last = np.flatnonzero(known)[[0, -1]]
     inside = np.array([one.inside for one in found])
-    if count - 1 - last > max(3, _LOST * count):
+    if count - 1 - last > max(3, VISIBILITY.lost * count):
         flags.append(
             Flag(
                 "robot-left-the-view",
@@ -181,11 +166,11 @@ def sight_flags(
                 "is kept",
             )
         )
-    if first > max(3, _LOST * count):
+    if first > max(3, VISIBILITY.lost * count):
         sentence = f"the robot was first seen at {time[first]:.2f} s: the measurement begins there"
         flags.append(Flag("robot-came-late", sentence))
     between = ~known[first : last + 1]
-    if between.mean() > _LOST:
+    if between.mean() > VISIBILITY.lost:
         flags.append(
             Flag(
                 "robot-lost",
@@ -193,8 +178,8 @@ def sight_flags(
                 "left out",
             )
         )
-    part = known & (inside < FULL_VIEW)
-    if part.mean() > _LOST:
+    part = known & (inside < VISIBILITY.full_view)
+    if part.mean() > VISIBILITY.lost:
         flags.append(
             Flag(
                 "robot-partly-out-of-view",
@@ -203,7 +188,7 @@ def sight_flags(
             )
         )
     share = np.array([one.share for one in found])
-    if known.sum() and float(np.median(share[known])) < _HIDDEN:
+    if known.sum() and float(np.median(share[known])) < VISIBILITY.hidden:
         flags.append(
             Flag(
                 "edges-hidden",

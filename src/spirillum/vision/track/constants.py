@@ -1,0 +1,443 @@
+"""Tuned numbers of the tracker: one frozen set of constants for each stage.
+
+Where a field names no source, its value was set by hand while the tracker was developed on rendered films; nothing else
+stands behind it. What halving and doubling them does to measured rates is in `docs/measuring.md`, found by
+`benchmarks/tracker_constants.py`. Numbers that are definitions or numerical resolutions stand where they are used, and
+compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, because arguments would slow them down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+
+__all__ = [
+    "COLOURS",
+    "CONTOUR",
+    "CUTS",
+    "FIRST_LOOK",
+    "FOLLOWING",
+    "IDENTITY",
+    "OUTLINE",
+    "SEARCH",
+    "SIZE",
+    "STEADINESS",
+    "STRIPES",
+    "TAIL",
+    "UNWRAPPING",
+    "VISIBILITY",
+    "ColourConstants",
+    "ContourConstants",
+    "CutConstants",
+    "FirstLookConstants",
+    "FollowingConstants",
+    "IdentityConstants",
+    "OutlineConstants",
+    "SearchConstants",
+    "SizeConstants",
+    "SteadinessConstants",
+    "StripeConstants",
+    "TailConstants",
+    "UnwrappingConstants",
+    "VisibilityConstants",
+]
+
+
+@dataclass(frozen=True)
+class SearchConstants:
+    """Search for the body in a whole picture (`search`)."""
+
+    body_width: float = 16.0
+    """Apparent width of the body in the reduced picture that is searched first, pixels."""
+    headings: tuple[float, ...] = (-8.0, -4.0, 0.0, 4.0, 8.0)
+    """Headings that are tried, degrees."""
+    background_share: float = 0.8
+    """Share of the background that is subtracted; less than 1, or a robot that hardly moves would vanish too."""
+    edge_stride: int = 2
+    """Every how many edge points one is used."""
+    column_step: int = 6
+    """Columns of the reduced picture that share one computed outline, pixels."""
+    peaks: int = 3
+    """Best places that are kept of each block of columns and heading."""
+    candidates: int = 5
+    """Candidates that are kept of a picture."""
+    coarse_blur: float = 1.0
+    """Standard deviation of the blur of the reduced picture, pixels."""
+    fine_blur: float = 1.2
+    """Standard deviation of the blur of the full picture, pixels."""
+    reach: int = 6
+    """Largest distance by which a candidate is moved in a round of refinement, pixels."""
+    margin: int = 24
+    """Width of the surroundings of a candidate that are looked at in refinement, pixels."""
+    travel_penalty: float = 0.5
+    """Relative score that a way of one body length between two frames costs."""
+
+
+@dataclass(frozen=True)
+class ContourConstants:
+    """Apparent edges of the body (`contour`): which are used, and the least standard error of each, pixels."""
+
+    front: float = 0.04
+    """Error of the front end."""
+    rear: float = 0.06
+    """Error of the rear end of a striped body."""
+    bare_rear: float = 0.5
+    """Error of the rear end of a body without stripes."""
+    side: float = 0.04
+    """Error of the sides."""
+    striped_side: float = 0.3
+    """Error of the sides of the seal, where stripes pass."""
+    coupling: float = 0.15
+    """Error of the coupling's edges."""
+    seal: float = 0.03
+    """Error of the front edge of the seal."""
+    end_width: float = 0.9
+    """Half width of the ends that is used, over the body's radius."""
+    seal_arc: float = 1.0
+    """Angle from the top up to which the seal's edge is used, rad."""
+
+
+@dataclass(frozen=True)
+class OutlineConstants:
+    """Sub-pixel fit of the body's edges (`body`)."""
+
+    half_profile: int = 6
+    """Reach of the brightness profiles on either side of an edge, pixels."""
+    blur: float = 0.8
+    """Standard deviation of the blur that makes a picture smooth between its pixels, pixels."""
+    noise_correlation: float = 2.8
+    """Length along an edge over which the blurred noise is correlated, pixels."""
+    largest_shift: float = 2.5
+    """Largest shift of an edge that one linear step can tell, pixels."""
+    rounding_noise: float = 1.5
+    """Least standard deviation of brightness in a compressed film, of 255."""
+    iterations: int = 5
+    """Most Gauss-Newton steps on a frame."""
+    learning_rounds: int = 5
+    """Rounds of learning, in which mean profiles of the edges and places of the frames are renewed in turn."""
+    smoothed_rounds: int = 2
+    """Rounds after which places are still held to a smooth path: a robot neither jumps nor turns at once."""
+    neighbours: int = 2
+    """Edge points on either side whose frames are pooled with those of a point to learn its profile."""
+    least_strength: float = 0.2
+    """Contrast of an edge on a frame over its usual one below which it is left out."""
+    least_share: float = 0.3
+    """Share of the edges that have to fit."""
+    trusted_error: float = 0.6
+    """Standard deviation of an edge's place above which it says nothing of the body's size, pixels."""
+    strength_cap: float = 10.0
+    """Contrast from which on all edges weigh the same in the body's size, of 255."""
+    largest_error: float = 0.7
+    """Largest standard error of a place that is kept, pixels."""
+
+
+@dataclass(frozen=True)
+class FirstLookConstants:
+    """Whether the robot is in the video, and where (`first_look`)."""
+
+    searched: int = 8
+    """Frames that are searched without any prior knowledge."""
+    clearness: float = 1.6
+    """Least score of the best place over the third best one on a frame that counts as clear."""
+    clear_share: float = 0.25
+    """Least share of such frames."""
+    faint: float = 0.4
+    """Score over that on the best frames below which a frame is not learnt from: the robot is partly out of view."""
+    whole_frames: int = 4
+    """Frames in full view that are enough to learn stripes and tail from."""
+    relearning: int = 3
+    """Most times that a body is learnt again at the size and place at which its outline lies."""
+
+
+@dataclass(frozen=True)
+class SizeConstants:
+    """Apparent size of the body, a second scale beside the ruler (`size`)."""
+
+    looked_at: int = 3
+    """Frames on which sizes from half to twice the stated one are tried."""
+    clearness: float = 3.0
+    """Least score of the best place over the third best one, median over frames, of something that is a robot."""
+    stated_preference: float = 1.25
+    """Factor by which an outline has to fit better that is a little larger or smaller than stated."""
+    stated_range: float = 0.007
+    """Relative difference of size that counts as stated in the first round of the search."""
+    build_error: float = 0.005
+    """Standard error of the apparent size by how well a robot is built, relative. Assumed."""
+    edge_error: float = 0.2
+    """Standard error of where its edges appear, pixels.
+
+    Assumed; on a hundred rendered and degraded films (70 pixels from the middle to the nose) the apparent size was
+    within 0.2 % in standard deviation."""
+    doubt: float = 2.0
+    """Standard errors from which on size and scale are said to differ."""
+    largest_difference: float = 0.1
+    """Relative difference beyond which no length is given."""
+    edge_width: float = 0.6
+    """Standard deviation of the Gaussian within which edges agree, pixels."""
+    tolerance: tuple[float, float, float, float] = (0.0125, 0.5, 0.5, 0.006)
+    """Differences of size (relative), place (pixels, pixels) and heading (rad) up to which a body is taken as found."""
+
+
+@dataclass(frozen=True)
+class IdentityConstants:
+    """Whether what was found is the robot (`identity`)."""
+
+    least_share: float = 0.5
+    """Share of the frames looked at on which stripes or tail have to be read."""
+    size_tolerance: float = 0.03
+    """Relative difference from the stated size beyond which both have to be read: chance makes stripes of many
+    things."""
+    sure_share: float = 0.75
+    """Share on which the tail has to be read then, and on which it says where the nose is.
+
+    It was 0.83 and more on rendered films of a hundred robots, 0.52 on one at half the size."""
+
+
+@dataclass(frozen=True)
+class SteadinessConstants:
+    """Whether camera and ruler stayed where they were (`steadiness`)."""
+
+    parts: int = 4
+    """Stretches of the film whose backgrounds are compared."""
+    fewest_frames: int = 3
+    """Fewest frames of a stretch."""
+    reach: int = 12
+    """Largest shift that is looked for, pixels."""
+    peak_range: float = 0.25
+    """Correlation below the largest one down to which a shift is looked at closely: a ruler correlates at many."""
+    smooth_share: float = 0.8
+    """Share of the picture that is too smooth to tell a shift."""
+    most_peaks: int = 6
+    """Most shifts that are looked at closely, beside none."""
+    clearly_better: float = 0.7
+    """Residual of the edges at a shift over that near none, below which the shift is believed."""
+    rows_beside: int = 6
+    """Rows beside the robot that its edges change, pixels."""
+    moved: float = 0.2
+    """Shift of a ruler's lines from which on the camera has moved, pixels; at rest within 0.05 on rendered films."""
+    moved_roughly: float = 2.0
+    """Shift of the picture alone from which on the camera has moved, pixels.
+
+    At rest within 1 on rendered films, also under a drifting lamp."""
+
+
+@dataclass(frozen=True)
+class ColourConstants:
+    """Classes of colour of the stripes (`colours`)."""
+
+    pairs: int = 3
+    """Kinds of neighbouring stripes that have to be seen before their order is judged."""
+    whole_samples: int = 4
+    """Fewest angles of a stripe, and of those beside it, when its width is taken."""
+    blurred_width: float = 0.3
+    """Width over that of a stripe below which a colour between two others is their blurred edge."""
+    glare: float = 240.0
+    """Brightness of glare to begin with, of 255."""
+    pale: float = 0.7
+    """Ratio of the weakest to the strongest channel from which on a bright colour is glare."""
+    fits: float = 0.7
+    """Share of neighbouring stripes that have to stand in a given order."""
+
+
+@dataclass(frozen=True)
+class StripeConstants:
+    """Angle of the body from its stripes (`stripes`)."""
+
+    reach: float = radians(78.0)
+    """Largest angle from the direction towards the camera up to which the surface is sampled, rad."""
+    step: float = radians(1.5)
+    """Spacing of the samples, rad."""
+    margin: float = 0.12
+    """Share of the seal's length that is left out at either end."""
+    lamp_tint: float = 3.0
+    """Weight of the prior that the lamp's three channels change together within a frame."""
+    blurs: tuple[float, ...] = (0.4, 0.6, 0.8, 1.0, 1.3, 1.6, 2.0, 2.5, 3.0)
+    """Standard deviations of the picture's blur that are tried, pixels."""
+    cut: float = 7.99
+    """Residual over the typical one at which a sample no longer counts.
+
+    Tukey's 4.7 standard deviations of one channel, times 1.7, about the root of 3, for the norm of three."""
+    edge_cut: float = 0.35
+    """Least residual at which a sample no longer counts, over the step between two stripes: edges a part of a pixel
+    away still pull."""
+    first_residual: float = 18.0
+    """Typical residual before anything was learnt, of 255."""
+    repeats: int = 6
+    """Rounds of learning colours, shading and blur."""
+    repeats_without_glare: int = 2
+    """First rounds, in which what looks like glare is left out."""
+    sheen_prior: float = 0.05
+    """Weight of the prior that nothing shines."""
+    tint_prior: float = 2.0
+    """Weight of the prior that what shines is white."""
+    roughness_prior: float = 0.2
+    """Weight of the prior that what shines changes evenly along the angle."""
+    floor: float = radians(0.05)
+    """Standard error of the geometry of seal and stripes, rad."""
+    pixel_locking: float = 0.05
+    """Standard error of an edge by where it lies within a pixel, pixels."""
+    unreadable: float = 0.6
+    """Loss over that of one even colour above which nothing is read."""
+    good: float = 0.3
+    """Loss over that of one even colour below which learnt colours are believed without trying the named ones."""
+    fits: float = 0.25
+    """Loss over that of one even colour from which on the stripes are not those that are stated.
+
+    Wrong ones had 0.26 and more, right ones on a hundred degraded films at most 0.19."""
+    width_range: float = 0.3
+    """Logarithm of the stripes' width over the stated one from which on there are more or fewer of them."""
+    doubt: float = 1.0
+    """How much less an angle counts at which frames differ from the model by more than usual."""
+    white: float = 228.0
+    """Brightness of the darkest channel from which on no colour is left, of 255."""
+    wide_glare: int = 10
+    """Samples along the angle from which on glare is wide."""
+    halo: int = 8
+    """Samples beside wide glare that it makes paler than a lamp does."""
+    ambiguous: float = 1.15
+    """Least ratio of the second smallest loss to the smallest one."""
+
+
+@dataclass(frozen=True)
+class TailConstants:
+    """Phase of the tail from the picture of its wire (`tail`)."""
+
+    phases: int = 40
+    """Phases that are tried on every frame."""
+    row_stride: int = 3
+    """Every how many rows of the strip one is used there."""
+    row_spacing: float = 1.2
+    """Distance of the rows along the tail, pixels."""
+    column_spacing: float = 0.25
+    """Distance of the columns across the tail over the wire's diameter, within 0.4 to 1 pixel."""
+    border: float = 3.0
+    """Width of the strip beyond the amplitude, over the wire's apparent diameter."""
+    least_share: float = 0.4
+    """Least share of the wire that has to be where it should be."""
+    largest_rival: float = 0.85
+    """Largest score of another phase over the best one."""
+    offset: float = 0.3
+    """Prior standard deviation of the tail's sideways offset, over the wire's apparent diameter."""
+    tilt: float = 0.02
+    """Prior standard deviation of the tail's tilt, rad."""
+    floor: float = 0.004
+    """Standard error of the phase by the tail's shape, rad."""
+
+
+@dataclass(frozen=True)
+class UnwrappingConstants:
+    """From angles modulo a period to continuous angles (`unwrapping`)."""
+
+    largest_step: float = 0.45
+    """Step from frame to frame, in periods, from which on its sense is doubtful; aliasing begins at 0.5."""
+    least_order: float = 0.6
+    """Least mean resultant length of the steps as unit vectors: less is no rotation."""
+    outlier: float = 0.3
+    """Distance from the predicted angle, in periods, from which on a reading is an outlier."""
+    start: int = 40
+    """Steps from which the first rate is found."""
+    lost: int = 6
+    """Outliers in a row after which the rate is found anew."""
+    gain: float = 0.5
+    """Share of a residual by which the predicted angle follows a reading."""
+    rate_gain: float = 0.08
+    """Share of a residual by which the predicted rate follows a reading."""
+    drift: float = 0.05
+    """Relative change of the rate that has to be expected over a gap."""
+    turning: float = 0.35
+    """Least angle that counts as rotation when two senses of rotation are compared, rad."""
+    rest: float = 0.005
+    """Least displacement, over the body's length, of something that is not part of the background."""
+    rest_angle: float = 0.02
+    """Least rotation of something that is not part of the background, rad."""
+    leap: float = radians(25.0)
+    """Deviation of a step of the body from the running median from which on it leaps, rad.
+
+    On rendered films with the right stripes the largest was 17 degrees, with seven, nine or ten for eight 50 and
+    more."""
+    leaps: int = 2
+    """Leaps that say that stripes are misread."""
+    leap_window: int = 9
+    """Steps of the running median."""
+    least_share: float = 0.1
+    """Share of the frames on which angles have to be read."""
+    fewest_frames: int = 10
+    """Frames on which something has to rest to be taken for part of the background."""
+    wall_factor: float = 1.5
+    """Factor that walls may add to the largest advance of a helix in a turn."""
+
+
+@dataclass(frozen=True)
+class CutConstants:
+    """Films whose times do not fit what they show (`cuts`)."""
+
+    window: int = 8
+    """Frames before and after a moment through which straight lines are fitted."""
+    clear: float = 8.0
+    """Jump over the standard deviation of jumps elsewhere."""
+    place: float = 1.0
+    """Least jump of the place, pixels."""
+    angle: float = 0.12
+    """Least jump of an angle, rad."""
+    gap: float = 3.0
+    """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
+    long_window: int = 30
+    """Readings before and after a gap through which the lines go that tell whether time has passed."""
+    meeting: float = 0.5
+    """Share of the least jump below which two lines meet."""
+    unseen: int = 20
+    """Frames without the robot over which lines go on: it may be lost where it jumps."""
+
+
+@dataclass(frozen=True)
+class VisibilityConstants:
+    """Second robots, wrong directions, gaps, robots that leave, and glare (`warnings`)."""
+
+    second: float = 0.75
+    """Score of a second robot over that of the first."""
+    second_clear: float = 1.3
+    """Score of a second robot over that of the next best place."""
+    maybe_turned: float = 0.85
+    """Score of a robot the other way round over that of the stated direction from which on more frames are asked."""
+    turned: float = 1.05
+    """Score of a robot the other way round over that of the stated direction from which on it is said."""
+    often: float = 0.6
+    """Share of the frames on which a second robot has to be seen."""
+    asked: int = 3
+    """Every how many frames one is first looked at the other way round."""
+    lost: float = 0.03
+    """Share of frames without the robot that is said."""
+    full_view: float = 0.97
+    """Share of the edges in the picture below which the robot is partly out of view."""
+    enough: float = 0.2
+    """Share of frames in full view from which on the others are left out."""
+    hidden: float = 0.55
+    """Share of the edges that fit below which glare, shadows or bubbles are said."""
+
+
+@dataclass(frozen=True)
+class FollowingConstants:
+    """From frame to frame (`follow`)."""
+
+    search_interval: int = 15
+    """Frames between two searches of the whole picture for a robot that was lost."""
+    memory: int = 12
+    """Frames from which the next place is predicted."""
+    largest_jump: float = 4.0
+    """Distance from the predicted place from which on a place is not believed, pixels."""
+
+
+SEARCH = SearchConstants()
+CONTOUR = ContourConstants()
+OUTLINE = OutlineConstants()
+FIRST_LOOK = FirstLookConstants()
+SIZE = SizeConstants()
+IDENTITY = IdentityConstants()
+STEADINESS = SteadinessConstants()
+COLOURS = ColourConstants()
+STRIPES = StripeConstants()
+TAIL = TailConstants()
+UNWRAPPING = UnwrappingConstants()
+CUTS = CutConstants()
+VISIBILITY = VisibilityConstants()
+FOLLOWING = FollowingConstants()
