@@ -32,7 +32,7 @@ from spirillum.fluid.tube.wall import Seat
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.load import with_phases, with_tolerance
+from spirillum.robot.load import with_resolution
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.placement import Placement
 from spirillum.swimming.steady import swim
@@ -195,7 +195,7 @@ def end_rows(*, quick: bool) -> list[Row]:
 
 
 def _speed(channel: str, placement: dict[str, Any], tolerance: float) -> Timed:
-    robot = with_phases(with_tolerance(sp.load(f"biorob2012-{channel}"), tolerance), 1)
+    robot = with_resolution(sp.load(f"biorob2012-{channel}"), {"tolerance": tolerance, "phases": 1})
     return timed(lambda: sp.predict(robot, model="tube", tail_rate=TAIL_RATE, placement=placement))
 
 
@@ -280,8 +280,8 @@ def main() -> None:
     options = parser.parse_args()
     os.environ["SPIRILLUM_CACHE"] = "off"
     held(body(0.3, 0.6, None), 1.0, 0.2, Fineness(tolerance=1e-2))
-    warm = with_phases(sp.load("biorob2012-wide", **{"tail.length": "10 mm"}), 1)
-    sp.predict(warm, model="tube", tail_rate=1.0, placement={"gap": "4 mm"}, tolerance=0.05)
+    warm = with_resolution(sp.load("biorob2012-wide", **{"tail.length": "10 mm"}), {"phases": 1})
+    sp.predict(warm, model="tube", tail_rate=1.0, placement={"gap": "4 mm"}, resolution={"tolerance": 0.05})
     answer: dict[str, list[Row]] = {}
     for name, run in CASES.items():
         if options.only is None or name in options.only:

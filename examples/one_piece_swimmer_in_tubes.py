@@ -33,7 +33,7 @@ FLOW = 0.5e-3  # m/s
 def swims(diameter: str, place: str, tolerance: float = 0.02, **ends: str | float) -> sp.Prediction:
     """The swimmer in a tube 40 mm long."""
     robot = {**SWIMMER, "channel": {"diameter": diameter, "length": "40 mm"}}
-    return sp.predict(robot, model="tube", placement={**PLACES[place], **ends}, tolerance=tolerance)
+    return sp.predict(robot, model="tube", placement={**PLACES[place], **ends}, resolution={"tolerance": tolerance})
 
 
 print("tube     place     closed    open   with flow  against (mm/s)   torque (N m)   error")
@@ -55,7 +55,7 @@ for diameter in ("1.2 mm", "3 mm"):
 rated = swims("1.2 mm", "lying")
 driven = {**SWIMMER, "drive": {"kind": "torque", "joint": "fixed", "torque": f"{rated.drive_torque!r} N m"}}
 driven["channel"] = {"diameter": "1.2 mm", "length": "40 mm"}
-turned = sp.predict(driven, model="tube", placement=PLACES["lying"], tolerance=0.02)
+turned = sp.predict(driven, model="tube", placement=PLACES["lying"], resolution={"tolerance": 0.02})
 assert math.isclose(turned.forward_velocity, rated.forward_velocity, rel_tol=1e-9)
 assert math.isclose(turned.tail_rotation_rate, rated.tail_rotation_rate, rel_tol=1e-9)
 

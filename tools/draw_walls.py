@@ -46,7 +46,7 @@ def factors(robot: str, gap: float) -> tuple[float, float, float]:
     asked: dict[str, Any] = {"model": "tube", "tail_rate": "1.2 Hz"}
     raised = sp.predict(robot, **asked, placement={"gap": f"{gap} mm"})
     level_floor = {"gap": f"{gap} mm", "pitch": "0 deg", "tail_drop": f"{drop} mm"}
-    along = sp.predict(robot, **asked, placement=level_floor, tolerance=0.05)
+    along = sp.predict(robot, **asked, placement=level_floor, resolution={"tolerance": 0.05})
     if raised.band is None:
         raise RuntimeError("the pitch was left open")
     speeds = raised.forward_velocity, float(raised.band.swimming.forward_velocity[-1]), along.forward_velocity

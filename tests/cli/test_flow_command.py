@@ -26,10 +26,10 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from spirillum.swimming.prediction import predict, prepared
 
     def quick(robot: Any, **options: Any) -> Any:
-        known = {"model": "sbt", "accuracy": None, "tolerance": None}
+        known = {"model": "sbt", "resolution": None}
         if options["model"] != "tube":
             return predict(robot, **{**options, **known})
-        placed = prepared(robot, "tube", placement=options["placement"], tolerance=options["tolerance"])[2]
+        placed = prepared(robot, "tube", placement=options["placement"], resolution=options["resolution"])[2]
         found = predict(robot, **{**options, **known, "placement": None})
         return replace(found, model=Tube(), batch=placed)
 

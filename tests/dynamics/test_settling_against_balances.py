@@ -22,7 +22,7 @@ from spirillum.robot.outline import body_outline
 
 WIDE = "biorob2012-wide"
 WEIGHT = 0.02
-QUICK: dict[str, Any] = {"tolerance": 0.05, "drain": ("8 mm", "2 mm"), "gaps": 2, "phases": 2}
+QUICK: dict[str, Any] = {"resolution": {"tolerance": 0.05, "phases": 2}, "drain": ("8 mm", "2 mm"), "gaps": 2}
 
 
 def film(gap: float, sideways: float = 0.0, normal: float = 0.0, along: float = 15.0, across: float = 200.0) -> Film:

@@ -126,9 +126,11 @@ def test_only_a_motor_has_a_transient() -> None:
 
 def test_accuracy_reaches_the_model_and_its_error_the_dataset() -> None:
     settings = {"model": "slender", "duration": "1 s"}
-    standard, high = (held("biorob2012-wide", accuracy=accuracy, **settings) for accuracy in ("standard", "high"))
+    standard, high = (
+        held("biorob2012-wide", resolution={"accuracy": accuracy}, **settings) for accuracy in ("standard", "high")
+    )
     for dataset, accuracy in ((standard, "standard"), (high, "high")):
-        alone = sp.predict("biorob2012-wide", model="slender", accuracy=accuracy)
+        alone = sp.predict("biorob2012-wide", model="slender", resolution={"accuracy": accuracy})
         assert dataset.attrs["error_estimate"] == alone.error_estimate
         assert dataset.attrs["known_error"] == alone.to_dict()["error_estimate"]["statement"]
     assert float(standard["mean_forward_velocity"]) != float(high["mean_forward_velocity"])

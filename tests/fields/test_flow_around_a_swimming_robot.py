@@ -24,7 +24,7 @@ def _directions(count: int) -> np.ndarray:
 
 
 def test_motion_is_the_predicted_one(swimming: sp.Flow) -> None:
-    alone = sp.predict(WIDE, model="slender", tail_rate="1.2 Hz", calibrated=False, accuracy="high")
+    alone = sp.predict(WIDE, model="slender", tail_rate="1.2 Hz", calibrated=False, resolution={"accuracy": "high"})
     assert swimming.prediction.forward_velocity == alone.forward_velocity
     assert swimming.prediction.calibrated is False
 
@@ -112,7 +112,7 @@ def test_turning_the_tail_turns_the_flow(swimming: sp.Flow) -> None:
         ({"phase": "40"}, 'phase = "40" has no unit'),
         ({"tail_rate": "0 Hz"}, "a tail at rest"),
         ({"friction": "ice"}, "friction = 'ice'"),
-        ({"accuracy": "perfect"}, "accuracy = 'perfect'"),
+        ({"resolution": {"accuracy": "perfect"}}, "accuracy = 'perfect'"),
     ],
 )
 def test_wrong_questions_are_named(arguments: dict[str, str], words: str) -> None:

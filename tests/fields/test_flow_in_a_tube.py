@@ -21,7 +21,9 @@ def robot() -> sp.Robot:
 @pytest.fixture(scope="module")
 def swimming(robot: sp.Robot) -> sp.Flow:
     """It swims nose up in the open tube."""
-    return sp.flow(robot, model="tube", tail_rate="1.2 Hz", phase="40 deg", placement=PLACE, tolerance=0.05)
+    return sp.flow(
+        robot, model="tube", tail_rate="1.2 Hz", phase="40 deg", placement=PLACE, resolution={"tolerance": 0.05}
+    )
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,9 @@ def section(swimming: sp.Flow) -> Any:
 
 
 def test_motion_is_the_predicted_one(swimming: sp.Flow, robot: sp.Robot) -> None:
-    alone = sp.predict(robot, model="tube", tail_rate="1.2 Hz", placement=PLACE, tolerance=0.05, band=False)
+    alone = sp.predict(
+        robot, model="tube", tail_rate="1.2 Hz", placement=PLACE, resolution={"tolerance": 0.05}, band=False
+    )
     assert swimming.prediction.forward_velocity == alone.forward_velocity
     speed, c, s = alone.forward_velocity, np.cos(np.radians(2.0)), np.sin(np.radians(2.0))
     np.testing.assert_allclose(swimming.heading, [c, 0.0, -s])
@@ -103,10 +107,10 @@ def test_boxes_show_a_tube_whole_unless_it_is_wide_or_an_extent_is_given() -> No
         ({"model": "sbt"}, "model = 'sbt'.*allowed: slender, tube"),
         ({"model": "tubes"}, "model = 'tubes' .did you mean tube"),
         ({"placement": {"gap": "0.5 mm"}}, "placement"),
-        ({"tolerance": 0.01}, "tolerance = 0.01 with model 'slender'"),
+        ({"resolution": {"tolerance": 0.01}}, "tolerance = 0.01 with model 'slender'"),
         ({"model": "tube", "placement": {"gap": "5 cm"}}, "placement.gap"),
         ({"model": "tube", "placement": {"height": "5 cm"}}, "height"),
-        ({"model": "tube", "tolerance": 1.0}, "tolerance = 1.0; allowed"),
+        ({"model": "tube", "resolution": {"tolerance": 1.0}}, "tolerance = 1.0; allowed"),
         ({"model": "tube", "robot": {"extends": WIDE, "channel": "none"}}, "channel"),
     ],
 )

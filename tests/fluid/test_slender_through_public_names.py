@@ -99,14 +99,14 @@ def test_flow_between_body_and_bare_tail_slows_the_robot(wide: Any) -> None:
 @pytest.mark.parametrize("accuracy", ["standard", "high"])
 def test_accuracy(accuracy: str) -> None:
     """Both forms of the wire agree within what their statement says; the estimate is of that size."""
-    answer = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, accuracy=accuracy)
-    other = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, accuracy="high")
+    answer = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, resolution={"accuracy": accuracy})
+    other = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, resolution={"accuracy": "high"})
     assert answer.forward_velocity == pytest.approx(other.forward_velocity, rel=0.01)
     assert 0 < answer.error_estimate < 0.02
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
     own = sp.predict(robot(model__slender__accuracy=accuracy), model="slender", tail_rate="1 Hz", calibrated=False)
     assert own.forward_velocity == answer.forward_velocity
-    matrix = sp.resistance(PRESET, model="slender", accuracy=accuracy).matrix
+    matrix = sp.resistance(PRESET, model="slender", resolution={"accuracy": accuracy}).matrix
     np.testing.assert_array_equal(
         matrix, sp.resistance(robot(model__slender__accuracy=accuracy), model="slender").matrix
     )
@@ -191,11 +191,17 @@ def test_batch_of_phases_and_viscosities(wide: Any) -> None:
         (lambda: sp.resistance(PRESET, model="slender", about="nose"), "about = 'nose'; allowed: body, tail-root"),
         (lambda: sp.resistance(PRESET, model="slender", phase=float("nan")), "is not finite"),
         (
-            lambda: sp.resistance(PRESET, model="slender", accuracy="bogus"),
+            lambda: sp.resistance(PRESET, model="slender", resolution={"accuracy": "bogus"}),
             "accuracy = 'bogus'; allowed: standard, high",
         ),
-        (lambda: sp.predict(PRESET, model="slender", accuracy="bogus"), "accuracy = 'bogus'; allowed: standard, high"),
-        (lambda: sp.predict(PRESET, model="slender", accuracy=""), "accuracy = ''; allowed: standard, high"),
+        (
+            lambda: sp.predict(PRESET, model="slender", resolution={"accuracy": "bogus"}),
+            "accuracy = 'bogus'; allowed: standard, high",
+        ),
+        (
+            lambda: sp.predict(PRESET, model="slender", resolution={"accuracy": ""}),
+            "accuracy = ''; allowed: standard, high",
+        ),
         (lambda: robot(model__slender__accuracy="hihg"), "(did you mean high?)"),
         (lambda: robot(model__slender__acuracy="high"), "(did you mean accuracy?)"),
     ],

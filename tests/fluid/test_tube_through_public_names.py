@@ -47,7 +47,7 @@ def placed(batch: Any, **fields: Any) -> Any:
 
 
 def predicted(robot: Any, **options: Any) -> Any:
-    options = {"placement": {"gap": "4 mm"}, "tolerance": 0.04, "phases": 1, **options}
+    options = {"placement": {"gap": "4 mm"}, "resolution": {"tolerance": 0.04, "phases": 1}, **options}
     return sp.predict(robot, model="tube", tail_rate="1.2 Hz", **options)
 
 
@@ -186,7 +186,7 @@ def test_a_wide_channel_gives_slender(batch: Any) -> None:
 def test_error_estimate(robot: Any) -> None:
     """There is one, and it is not nothing, at the smallest and the largest tolerance that it takes to be quick."""
     for tolerance in (0.05, 0.01):
-        answer = predicted(robot, tolerance=tolerance)
+        answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 1})
         assert 0 < answer.error_estimate < 2 * tolerance, tolerance
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
 

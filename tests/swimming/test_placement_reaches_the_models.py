@@ -9,7 +9,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.cli import main
-from spirillum.robot.load import with_accuracy, with_phases, with_tolerance
+from spirillum.robot.load import with_resolution
 from spirillum.robot.placement import Placement
 
 WIDE = "biorob2012-wide"
@@ -158,14 +158,14 @@ def test_wrong_options_exit_with_two(
 def test_options_of_the_tube() -> None:
     robot = sp.load(WIDE)
     assert (robot.model.tube.tolerance, robot.model.tube.phases) == (0.005, 2)
-    changed = with_phases(with_tolerance(with_accuracy(robot, "high", "tube"), 0.02), 6)
+    changed = with_resolution(robot, {"accuracy": "high", "tolerance": 0.02, "phases": 6}, "tube")
     assert (changed.model.tube.tolerance, changed.model.tube.phases) == (0.02, 6)
     assert changed.model.slender.accuracy == "high"
     assert sp.load(WIDE, **{"model.tube.tolerance": 0.02, "model.tube.phases": 6}).model.tube == changed.model.tube
     for wrong in (0.0, 0.1, float("nan"), "0.01", True):
-        text = refused(lambda wrong=wrong: with_tolerance(robot, wrong))  # type: ignore[arg-type]
+        text = refused(lambda wrong=wrong: with_resolution(robot, {"tolerance": wrong}, "tube"))
         assert text == f"tolerance = {wrong!r}; allowed: 0.0001 to 0.05"
     for wrong in (0, 65, 2.5):
-        text = refused(lambda wrong=wrong: with_phases(robot, wrong))  # type: ignore[arg-type]
+        text = refused(lambda wrong=wrong: with_resolution(robot, {"phases": wrong}, "tube"))
         assert text == f"phases = {wrong!r}; allowed: a whole number from 1 to 64"
     assert "model.tube.tolerance = 1.0" in refused(lambda: sp.load(WIDE, **{"model.tube.tolerance": 1.0}))

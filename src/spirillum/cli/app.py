@@ -120,10 +120,8 @@ def predict(
             calibrated=not no_calibration,
             calibration=calibration,
             posterior=posterior,
-            accuracy=accuracy,
+            resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
-            tolerance=tolerance,
-            phases=phases,
             band=not no_band,
             motion=motion,
             progress=progress,
@@ -172,10 +170,8 @@ def compare_models(
             friction=friction,
             calibrated=calibrated or None,
             calibration=calibration,
-            accuracy=accuracy,
+            resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
-            tolerance=tolerance,
-            phases=phases,
             progress=progress,
         )
     if target is not None:
@@ -225,9 +221,8 @@ def resistance(
             model=model,
             about=about,
             phase=text.angle(phase),
-            accuracy=accuracy,
+            resolution={"accuracy": accuracy, "tolerance": tolerance},
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
-            tolerance=tolerance,
         )
     text.show(result.to_dict(), text.resistance, json=json)
 

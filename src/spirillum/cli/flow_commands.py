@@ -96,7 +96,8 @@ def flow(
     flow_text.check_targets(output, volume)
     loaded = loaded_robot(robot, settings)
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow)
-    seat = seat_in_tube(loaded, model, placement, tolerance)
+    fineness = {"accuracy": accuracy, "tolerance": tolerance}
+    seat = seat_in_tube(loaded, model, placement, fineness)
     plane_around(loaded, plane, offset, extent, resolution, seat)
     if volume is not None:
         box_around(loaded, extent, volume_resolution, seat)
@@ -107,9 +108,8 @@ def flow(
             model=model,
             tail_rate=tail_rate,
             friction=friction,
-            accuracy=accuracy,
+            resolution=fineness,
             placement=placement,
-            tolerance=tolerance,
             phase=text.angle(phase),
             frame=frame,
         )

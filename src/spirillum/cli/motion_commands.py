@@ -102,7 +102,7 @@ def simulate(
             samples_per_turn=samples_per_turn,
             calibrated=not no_calibration,
             calibration=calibration,
-            accuracy=accuracy,
+            resolution={"accuracy": accuracy},
             placement=placement_from(gap, eccentricity, pitch, None, None, None),
             weight=not no_weight,
             roughness=roughness,
@@ -173,7 +173,7 @@ def magnetic_sweep(
     picture = None if plot is None else output_target(plot, PICTURES, "sweep.png")
     loaded = loaded_robot(robot, settings)
     with text.progress_bar(quiet=json) as progress:
-        dataset = answer(loaded, rate, model=model, turns=turns, accuracy=accuracy, progress=progress)
+        dataset = answer(loaded, rate, model=model, turns=turns, resolution={"accuracy": accuracy}, progress=progress)
     write_dataset(dataset, target)
     if picture is not None:
         from spirillum.view.figures.magnetic import magnetic_figure

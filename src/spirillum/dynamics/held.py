@@ -22,6 +22,7 @@ from spirillum.dynamics.sampling import duration_of, late_averages, sample_times
 from spirillum.errors import InputError
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques, rates_per_torque
 from spirillum.swimming.motor import battery_voltage, winding_resistance
@@ -198,7 +199,7 @@ def swim_in_time(
     on: Sequence[tuple[str | float, str | float]] | None = None,
     duty: str | Path | None = None,
     samples_per_turn: int = 100,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> xr.Dataset:
     """Axial swimming (two degrees of freedom) from rest: `spirillum.simulate` with `motion="held"`.
 
@@ -214,7 +215,7 @@ def swim_in_time(
             float in s; None: on throughout.
         duty: duty file instead, see `spirillum.dynamics.remote`.
         samples_per_turn: samples of the output per steady turn of the tail.
-        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
 
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
@@ -224,7 +225,7 @@ def swim_in_time(
         InputError: for wrong input or a drive without a motor.
     """
     prediction = predict(
-        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, accuracy=accuracy
+        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, resolution=resolution
     )
     batch = prediction.batch
     if batch.drive != "dc-motor" or batch.electrics is None:

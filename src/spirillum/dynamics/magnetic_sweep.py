@@ -26,6 +26,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import two_links as kernel
 from spirillum.quantities import attributes
+from spirillum.robot.options import Resolution
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full
 from spirillum.swimming.prediction import Prediction, predict
@@ -79,7 +80,7 @@ def magnetic_sweep(
     *,
     model: str = "rft",
     turns: float = 30.0,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> xr.Dataset:
     """Speed, phase lag and wobble of a free one-piece swimmer against the rate of the field, in unbounded fluid.
@@ -91,7 +92,7 @@ def magnetic_sweep(
         model: `rft` or `slender`.
         turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
             at most 25, and the last is averaged, over whole slips where the robot slips.
-        accuracy: of the model `slender`, `standard` or `high`; None: the robot's own.
+        resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.
         progress: told what is being computed, how many rates are done, and of how many.
 
     Returns:
@@ -103,7 +104,7 @@ def magnetic_sweep(
         InputError: for another drive, wrong rates, or a model without all entries.
     """
     check_full(find_swimmer_model(model))
-    held = predict(robot, model=model, accuracy=accuracy, calibrated=False)
+    held = predict(robot, model=model, resolution=resolution, calibrated=False)
     if held.batch.drive != "magnetic":
         raise InputError(f"drive.kind = '{held.batch.drive}'; allowed: 'magnetic' for a sweep of the field")
     if not 4 <= turns <= 1e4:

@@ -33,6 +33,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.place import GAP_BAND, GAP_SHARE, seat_of
 from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry, wire_of_geometry
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.options import Resolution
 from spirillum.robot.outline import Outline
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
@@ -258,10 +259,8 @@ def settle(
     *,
     tail_rate: str | float | None = None,
     friction: str | None = None,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    phases: int | None = None,
     drain: tuple[str | float, str | float] | None = None,
     gaps: int = 5,
     progress: Progress | None = None,
@@ -275,10 +274,8 @@ def settle(
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        accuracy: of the wire, `standard` or `high`; None: the robot's own.
+        resolution: of the model `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the robot lies, level and without an imposed flow, see `predict`.
-        tolerance: relative tolerance of the speed, 0.0001 to 0.05; None: the robot's own.
-        phases: number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
         drain: largest and smallest gap of the draining film, with units or floats in m; None: a ninth of the body's
             radius (but at most half of the room), and a fifth of that.
         gaps: number of gaps at which the film is computed, 2 to 32.
@@ -289,7 +286,7 @@ def settle(
     """
     if not _FEWEST <= gaps <= _MOST:
         raise InputError(f"gaps = {gaps}; allowed: {_FEWEST} to {_MOST}")
-    ready, model, batch = prepared(robot, MODEL, None, accuracy, _level(placement), tolerance, phases)
+    ready, model, batch = prepared(robot, MODEL, resolution=resolution, placement=_level(placement))
     place = _placed(batch)
     weight = _weight(ready)
     asked = _drain(drain, batch, gaps)

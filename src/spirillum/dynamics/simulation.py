@@ -19,6 +19,7 @@ from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels.two_links import thinnest_film
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
@@ -44,7 +45,7 @@ def simulate(
     on: Sequence[tuple[str | float, str | float]] | None = None,
     duty: str | Path | None = None,
     samples_per_turn: int = 100,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
     roughness: str | float | None = None,
@@ -68,7 +69,7 @@ def simulate(
             float in s; None: on throughout.
         duty: duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next.
         samples_per_turn: samples of the output per steady turn of the tail.
-        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
             starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
         weight: let weight and buoyancy act on the free robot, if its masses are known.
@@ -96,7 +97,7 @@ def simulate(
             on=on,
             duty=duty,
             samples_per_turn=samples_per_turn,
-            accuracy=accuracy,
+            resolution=resolution,
         )
     check_full(find_swimmer_model(model))
     steady = predict(
@@ -105,7 +106,7 @@ def simulate(
         friction=friction,
         calibrated=calibrated,
         calibration=calibration,
-        accuracy=accuracy,
+        resolution=resolution,
         progress=progress,
     )
     turn = 2.0 * np.pi / _turning(steady)

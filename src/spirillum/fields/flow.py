@@ -16,6 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fluid.tube.wall import Seat
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction, predict, prepared
@@ -206,9 +207,8 @@ def flow(
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = False,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
     phase: str | float = 0.0,
     frame: str = "lab",
 ) -> Flow:
@@ -227,11 +227,10 @@ def flow(
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply calibration factors to the motion. They stand for walls that are not in the flow, which
             then pulls at the robot; without them it swims free of force.
-        accuracy: of the model, `standard` or `high`; the flow of `standard` leaves out the torque of the wire's spin.
-            None: `high` with `slender`, the robot's own with `tube`.
+        resolution: of the model: `accuracy`, and with `tube` also `tolerance` and `phases`; None: the robot's own, but
+            accuracy `high` with `slender`. The flow of `standard` leaves out the torque of the wire's spin.
         placement: with `tube`, where in the channel the robot lies: `gap`, `eccentricity`, `pitch`, `tail_drop`,
             `ends`, `flow`, each a quantity with its unit or a float in SI.
-        tolerance: with `tube`, relative, 0.0001 to 0.05; None: the robot's own.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         frame: `lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the robot's forward
             velocity, not turning).
@@ -242,15 +241,17 @@ def flow(
     angle = parse_option("phase", phase, KINDS["angle"])
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    wanted = Resolution.of(resolution)
+    if wanted.accuracy is None and model == "slender":
+        wanted = wanted.model_copy(update={"accuracy": "high"})
     prediction = predict(
         robot,
         model=_checked_model(model),
         tail_rate=tail_rate,
         friction=friction,
         calibrated=calibrated,
-        accuracy="high" if accuracy is None and model == "slender" else accuracy,
+        resolution=wanted,
         placement=placement,
-        tolerance=tolerance,
         band=False,
     )
     around = Flow(prediction, _field(prediction, angle), angle, cast("Frame", frame))
@@ -295,7 +296,7 @@ def seat_in_tube(
     robot: Robot,
     model: str,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
 ) -> Seat | None:
     """The tube and where in it a robot will lie, before anything is solved; None with the model `slender`.
 
@@ -303,7 +304,7 @@ def seat_in_tube(
         robot: the robot.
         model: `slender` or `tube`.
         placement: as `flow`.
-        tolerance: as `flow`.
+        resolution: as `flow`.
 
     Raises:
         InputError: for wrong input, or a robot outside the domain of `tube`.
@@ -312,7 +313,7 @@ def seat_in_tube(
 
     if _checked_model(model) != "tube":
         return None
-    return place_of(prepared(robot, model, placement=placement, tolerance=tolerance)[2], 0).seat
+    return place_of(prepared(robot, model, placement=placement, resolution=resolution)[2], 0).seat
 
 
 def plane_around(

@@ -17,7 +17,8 @@ from spirillum.fluid.model import PARTS, ResistanceModel
 from spirillum.fluid.registry import check_placement, find_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.load import load, with_accuracy, with_tolerance
+from spirillum.robot.load import load, with_resolution
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
@@ -75,9 +76,8 @@ def resistance(
     model: str = "rft",
     about: str = "body",
     phase: str | float = 0.0,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
 ) -> Resistance:
     """Resistance matrix of one part alone in the same fluid.
 
@@ -87,19 +87,15 @@ def resistance(
         model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
-        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a part that the model cannot do.
     """
     ready, chosen = load(robot), find_model(model)
-    if accuracy is not None:
-        ready = with_accuracy(ready, accuracy, model)
-    if tolerance is not None:
-        ready = with_tolerance(ready, tolerance, model)
+    ready = with_resolution(ready, resolution, model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
     if part not in PARTS:

@@ -13,7 +13,7 @@ from typing import Any
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
-from spirillum.robot.fields import Section
+from spirillum.robot.options import Resolution
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 
@@ -25,9 +25,7 @@ __all__ = [
     "preset_names",
     "preset_text",
     "raw_table",
-    "with_accuracy",
-    "with_phases",
-    "with_tolerance",
+    "with_resolution",
 ]
 
 _WHAT = "a preset's name or a robot file (TOML, see `spirillum robot new`)"
@@ -146,59 +144,26 @@ def parse_setting(text: str) -> tuple[str, Any]:
     return path, parsed["value"] if set(parsed) == {"value"} else value
 
 
-def with_accuracy(robot: Robot, accuracy: str, model: str = "slender") -> Robot:
-    """The robot with another form of the wire, `model.slender.accuracy`, which the model `tube` reads too.
+def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None, model: str | None = None) -> Robot:
+    """The robot with another resolution of the models `slender` and `tube`.
 
     Args:
         robot: a checked robot.
-        accuracy: `standard` or `high`.
-        model: the model that is asked.
+        resolution: fields of `Resolution` that replace the robot's own.
+        model: the model that will be asked; None: any.
 
     Raises:
-        InputError: for any other accuracy, or a model in closed form, which has none.
+        InputError: for a wrong value, or a field that the model does not read.
     """
-    return _with_option(robot, "slender.accuracy", accuracy, "standard, high", model, ("slender", "tube"))
-
-
-def with_tolerance(robot: Robot, tolerance: float, model: str = "tube") -> Robot:
-    """The robot with another tolerance of the model `tube`.
-
-    Args:
-        robot: a checked robot.
-        tolerance: relative tolerance of the speed per turn, 0.0001 to 0.05.
-        model: the model that is asked.
-
-    Raises:
-        InputError: for any other tolerance, or another model.
-    """
-    return _with_option(robot, "tube.tolerance", tolerance, "0.0001 to 0.05", model, ("tube",))
-
-
-def with_phases(robot: Robot, phases: int, model: str = "tube") -> Robot:
-    """The robot with another number of phases over which the model `tube` averages.
-
-    Args:
-        robot: a checked robot.
-        phases: number of phases of the tail, 1 to 64.
-        model: the model that is asked.
-
-    Raises:
-        InputError: for any other number, or another model.
-    """
-    return _with_option(robot, "tube.phases", phases, "a whole number from 1 to 64", model, ("tube",))
-
-
-def _with_option(robot: Robot, path: str, value: object, allowed: str, model: str, models: tuple[str, ...]) -> Robot:
-    """The robot with one option of a model replaced; `models` are those that read it."""
-    section, name = path.split(".")
-    if model not in models:
-        readers = " or ".join(f"'{reader}'" for reader in models)
-        raise InputError(f"{name} = {value!r} with model {model!r}; allowed: only with model {readers}")
-    own: Section = getattr(robot.model, section)
-    checked = problems_in(type(own), {**own.model_dump(), name: value})
-    if isinstance(checked, list):
-        raise InputError(f"{name} = {value!r}; allowed: {allowed}")
-    return robot.model_copy(update={"model": robot.model.model_copy(update={section: checked})})
+    options = robot.model
+    for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
+        section, readers = ("slender", ("slender", "tube")) if name == "accuracy" else ("tube", ("tube",))
+        if model is not None and model not in readers:
+            allowed = " or ".join(f"'{reader}'" for reader in readers)
+            raise InputError(f"{name} = {value!r} with model {model!r}; allowed: only with model {allowed}")
+        changed = getattr(options, section).model_copy(update={name: value})
+        options = options.model_copy(update={section: changed})
+    return robot.model_copy(update={"model": options})
 
 
 def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:

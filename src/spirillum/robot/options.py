@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
+from spirillum.errors import InputError, did_you_mean
 from spirillum.robot.fields import Factor, Length, Section, Text
+from spirillum.robot.problems import problems_in
 
 __all__ = [
     "Calibration",
@@ -14,6 +17,7 @@ __all__ = [
     "FittedTo",
     "ModelOptions",
     "PerrinOptions",
+    "Resolution",
     "RftOptions",
     "SbtOptions",
     "SlenderOptions",
@@ -76,19 +80,24 @@ class SbtOptions(Section):
     """Add the torque of the wire's own spin, `4 pi mu a^2` per arc length along the tangent."""
 
 
+Accuracy = Literal["standard", "high"]
+Tolerance = Annotated[float, Field(strict=True, ge=1e-4, le=0.05, allow_inf_nan=False)]
+Phases = Annotated[int, Field(strict=True, ge=1, le=64)]
+
+
 class SlenderOptions(Section):
     """Options of the resolved tail and body."""
 
-    accuracy: Literal["standard", "high"] = "standard"
+    accuracy: Accuracy = "standard"
     """Form of the wire and resolution of the surfaces."""
 
 
 class TubeOptions(Section):
     """Options of the robot in its tube; the form of the wire is that of `SlenderOptions`."""
 
-    tolerance: Annotated[float, Field(strict=True, ge=1e-4, le=0.05, allow_inf_nan=False)] = 0.005
+    tolerance: Tolerance = 0.005
     """Relative tolerance of the speed per turn, from which the resolution follows."""
-    phases: Annotated[int, Field(strict=True, ge=1, le=64)] = 2
+    phases: Phases = 2
     """Number of phases of the tail, evenly over a turn, that an answer is averaged over."""
 
 
@@ -105,6 +114,43 @@ class ModelOptions(Section):
     """Resolved tail and body."""
     tube: TubeOptions = TubeOptions()
     """Resolved tail and body in their tube."""
+
+
+class Resolution(Section):
+    """Numerical resolution of the models `slender` and `tube`; None keeps the robot's own option."""
+
+    accuracy: Accuracy | None = None
+    """Of `slender` and `tube`: form of the wire and resolution of the surfaces, `standard` or `high`."""
+    tolerance: Tolerance | None = None
+    """Of `tube`: relative tolerance of the speed per turn, 0.0001 to 0.05."""
+    phases: Phases | None = None
+    """Of `tube`: number of phases of the tail that an answer is averaged over, 1 to 64."""
+
+    @classmethod
+    def of(cls, value: Resolution | Mapping[str, Any] | None) -> Self:
+        """A resolution from what a caller may give.
+
+        Args:
+            value: a resolution, its fields by name, or None: the robot's own options.
+
+        Raises:
+            InputError: for an unknown field or a wrong value.
+        """
+        if isinstance(value, cls):
+            return value
+        names = ", ".join(cls.model_fields)
+        if not (value is None or isinstance(value, Mapping)):
+            raise InputError(f"resolution = {str(value)[:60]!r}; allowed: {names}, each by name")
+        for name, given in (value or {}).items():
+            if name not in cls.model_fields:
+                hint = did_you_mean(str(name)[:60], cls.model_fields)
+                raise InputError(f"resolution.{name} is not a known field{hint}; allowed: {names}")
+            if isinstance(problems_in(cls, {name: given}), list):
+                raise InputError(f"{name} = {given!r}; allowed: {_ALLOWED[name]}")
+        return cls(**(value or {}))
+
+
+_ALLOWED = {"accuracy": "standard, high", "tolerance": "0.0001 to 0.05", "phases": "a whole number from 1 to 64"}
 
 
 class FittedTo(Section):

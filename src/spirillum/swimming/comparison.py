@@ -14,7 +14,8 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import with_calibration
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement, find_swimmer_model
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
+from spirillum.robot.load import load, with_resolution
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import STEADY
@@ -151,10 +152,8 @@ def compare_models(
     friction: str | None = None,
     calibrated: bool | None = None,
     calibration: str | Path | None = None,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    phases: int | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> ModelComparison:
     """Predict the steady swimming of one robot with several models.
@@ -170,23 +169,15 @@ def compare_models(
         calibrated: apply calibration factors, model by model; None: only those of a calibration file, for
             factors that stand for walls in some models and not in others hide how the models differ.
         calibration: calibration file whose factors replace the robot's.
-        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for the models that compute the walls; as `predict`.
-        tolerance: of the model `tube`, relative; None: the robot's own.
-        phases: of the model `tube`, number of phases of the tail; None: the robot's own.
         progress: told what is being computed, how many models are done, and of how many.
 
     Raises:
         InputError: for wrong input, or if no model answers.
     """
-    own = load(robot)
+    own = with_resolution(load(robot), resolution)
     factors = calibration is not None if calibrated is None else calibrated
-    if accuracy is not None:
-        own = with_accuracy(own, accuracy)
-    if tolerance is not None:
-        own = with_tolerance(own, tolerance)
-    if phases is not None:
-        own = with_phases(own, phases)
     ready = own if calibration is None else with_calibration(own, calibration)
     reading = friction_reading(friction or ready.friction.reading)
     names = _chosen(models)

@@ -20,7 +20,8 @@ from spirillum.fluid.registry import check_placement, find_swimmer_model
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
-from spirillum.robot.load import load, with_accuracy, with_phases, with_tolerance
+from spirillum.robot.load import load, with_resolution
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import STEADY, Swimming
@@ -128,10 +129,8 @@ def predict(
     calibrated: bool = True,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    phases: int | None = None,
     band: bool = True,
     motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
@@ -153,11 +152,9 @@ def predict(
         calibration: calibration file whose factors replace the robot's.
         posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
             95 % interval, the model's discrepancy included.
-        accuracy: of the models `slender` and `tube`, `standard` or `high`; None: the robot's own.
+        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        tolerance: of the model `tube`, relative, 0.0001 to 0.05; None: the robot's own.
-        phases: of the model `tube`, number of phases of the tail that are averaged, 1 to 64; None: the robot's own.
         band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
             place alone.
         motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`: released, without weight
@@ -175,7 +172,7 @@ def predict(
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
         drawn = read_posterior(posterior, model)
         robot = drawn.central(robot)
-    ready, chosen, batch = prepared(robot, model, calibration, accuracy, placement, tolerance, phases)
+    ready, chosen, batch = prepared(robot, model, calibration=calibration, resolution=resolution, placement=placement)
     reading = friction_reading(friction or ready.friction.reading)
     rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
@@ -223,11 +220,10 @@ def _without_fitted_friction(robot: Robot) -> Robot:
 def prepared(
     robot: str | Path | Mapping[str, Any] | Robot,
     model: str,
+    *,
     calibration: str | Path | None = None,
-    accuracy: str | None = None,
+    resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    tolerance: float | None = None,
-    phases: int | None = None,
 ) -> tuple[Robot, SwimmerModel, RobotBatch]:
     """A loaded robot with its model and batch, in its place and inside the model's domain; arguments as `predict`.
 
@@ -239,12 +235,7 @@ def prepared(
         ready = with_calibration(ready, calibration)
         if not placement and find_swimmer_model(model).placed:
             placement = calibrated_placement(ready, calibration)
-    if accuracy is not None:
-        ready = with_accuracy(ready, accuracy, model)
-    if tolerance is not None:
-        ready = with_tolerance(ready, tolerance, model)
-    if phases is not None:
-        ready = with_phases(ready, phases, model)
+    ready = with_resolution(ready, resolution, model)
     chosen = find_swimmer_model(model)
     return ready, chosen, checked_batch(ready, chosen, Placement.of(placement))
 
