@@ -124,7 +124,7 @@ _HOME = {
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from spirillum.answer import own_version
+        from spirillum.version import own_version
 
         return own_version()
     if name not in _HOME:

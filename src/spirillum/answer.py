@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-__all__ = ["as_json", "envelope", "own_version", "quantity", "versions"]
+__all__ = ["as_json", "envelope", "quantity"]
 
 
 def quantity(value: float | Iterable[float] | None, unit: str, **more: Any) -> dict[str, Any]:
@@ -40,16 +37,3 @@ def envelope(kind: str, content: Mapping[str, Any], warnings: Iterable[str]) -> 
 def as_json(answer: Mapping[str, Any]) -> str:
     """JSON text; refuses anything that is not valid JSON, such as NaN."""
     return json.dumps(answer, indent=2, allow_nan=False, ensure_ascii=False)
-
-
-@lru_cache(maxsize=1)
-def own_version() -> str:
-    """Version of the program."""
-    return version("spirillum")
-
-
-@lru_cache(maxsize=1)
-def versions() -> str:
-    """Versions of what a result was computed with."""
-    packages = ("spirillum", "numpy", "scipy", "xarray")
-    return ", ".join([f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in packages)])

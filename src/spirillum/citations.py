@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from spirillum.answer import own_version
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_model
+from spirillum.version import own_version
 
 __all__ = ["REFERENCES", "citation"]
 

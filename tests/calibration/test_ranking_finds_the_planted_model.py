@@ -83,7 +83,7 @@ def test_a_few_tails_name_no_winner(ranking: Any, count: int) -> None:
 def test_failures_say_on_which_scale_they_are(ranking: Any, capsys: pytest.CaptureFixture[str]) -> None:
     from rich.console import Console
 
-    from spirillum.cli.calibration_text import ranking as table
+    from spirillum.cli.tables.model_ranking import table
 
     table(ranking.to_dict(), Console(width=300))
     printed = capsys.readouterr().out

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

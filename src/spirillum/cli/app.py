@@ -10,7 +10,7 @@ import typer
 from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
-from spirillum.cli.inputs import loaded_robot, overrides_from, placement_from
+from spirillum.cli.inputs import angle, loaded_robot, overrides_from, placement_from
 from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
@@ -60,7 +60,7 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:  # noqa: FBT001 - a callback of the library
     if wanted:
-        from spirillum.answer import own_version
+        from spirillum.version import own_version
 
         typer.echo(f"spirillum {own_version()}")
         raise typer.Exit
@@ -108,10 +108,10 @@ def predict(
 
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --set tail.wavelength=20mm`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.swimming.prediction import predict as answer
 
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         result = answer(
             loaded_robot(robot, settings),
             model=model,
@@ -126,7 +126,7 @@ def predict(
             motion=motion,
             progress=progress,
         )
-    text.show(result.to_dict(), text.prediction, json=json)
+    renderer.show(result.to_dict(), json=json)
 
 
 def compare_models(
@@ -156,13 +156,13 @@ def compare_models(
 
     Example: `spirillum compare-models biorob2012-wide --tail-rate 1.2Hz`
     """
-    from spirillum.cli import comparison_text, text
+    from spirillum.cli import renderer
     from spirillum.files import PICTURES, output_target
     from spirillum.swimming.comparison import compare_models as answer
 
     target = None if output is None else output_target(output, PICTURES, "models.png")
     loaded = loaded_robot(robot, settings)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         result = answer(
             loaded,
             models=model,
@@ -179,7 +179,8 @@ def compare_models(
         from spirillum.view.figures.style import save_as
 
         save_as(comparison_figure(result), target)
-    text.show(comparison_text.comparison_answer(result, output), comparison_text.model_comparison, json=json)
+    file = None if output is None else str(output)
+    renderer.show(renderer.with_files(result.to_dict(), file=file), json=json)
 
 
 def resistance(
@@ -211,20 +212,20 @@ def resistance(
 
     Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.fluid.resistance import resistance as answer
 
-    with text.patience(model, quiet=json):
+    with renderer.patience(model, quiet=json):
         result = answer(
             loaded_robot(robot, settings),
             part=part,
             model=model,
             about=about,
-            phase=text.angle(phase),
+            phase=angle(phase),
             resolution={"accuracy": accuracy, "tolerance": tolerance},
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
         )
-    text.show(result.to_dict(), text.resistance, json=json)
+    renderer.show(result.to_dict(), json=json)
 
 
 def study(
@@ -256,10 +257,11 @@ def study(
 
     Example: `spirillum study -o my-study`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
 
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer
+        from spirillum.results.study import study_answer
 
         dataset = answer(
             source,
@@ -272,7 +274,7 @@ def study(
             posterior=posterior,
             progress=progress,
         )
-    text.show(text.study_answer(dataset, output), text.study, json=json)
+    renderer.show(study_answer(dataset, output), json=json)
 
 
 def schema(
@@ -283,7 +285,7 @@ def schema(
     Example: `spirillum schema robot`
     """
     from spirillum.answer import as_json
-    from spirillum.cli.schemas import schema_of
+    from spirillum.schemas import schema_of
 
     typer.echo(as_json(schema_of(name)))
 

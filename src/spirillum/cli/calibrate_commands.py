@@ -54,11 +54,11 @@ def calibrate(
     Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
     """
     from spirillum.calibration.posterior import Sampling
-    from spirillum.cli import calibration_text, text
+    from spirillum.cli import renderer
     from spirillum.results.calibration import calibrate as answer
 
     robots = [loaded_robot(name, settings) for name in robot]
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
             robots,
@@ -71,7 +71,7 @@ def calibrate(
             figures=not no_figures,
             progress=progress,
         )
-    text.show(found.to_dict(), calibration_text.calibration, json=json)
+    renderer.show(found.to_dict(), json=json)
     if not found.converged:
         raise typer.Exit(1)
 
@@ -100,11 +100,11 @@ def rank_models(
     """
     from spirillum.calibration.posterior import Sampling
     from spirillum.calibration.ranking import rank_models as answer
-    from spirillum.cli import calibration_text, text
+    from spirillum.cli import renderer
     from spirillum.robot.load import PAPER_ROBOTS
 
     names = robot or PAPER_ROBOTS
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
             [loaded_robot(name, settings) for name in names],
@@ -113,7 +113,7 @@ def rank_models(
             sampling=Sampling(seed=seed),
             progress=progress,
         )
-    text.show(found.to_dict(), calibration_text.ranking, json=json)
+    renderer.show(found.to_dict(), json=json)
     if not all(item.fit.converged for item in found.ranked):
         raise typer.Exit(1)
 
@@ -137,7 +137,7 @@ def suggest(
     Example: `spirillum suggest my-calibration/posterior.nc --candidates tails.csv`
     """
     from spirillum.calibration.suggest import suggest as answer
-    from spirillum.cli import calibration_text, text
+    from spirillum.cli import renderer
     from spirillum.robot.load import PAPER_ROBOTS
 
     if rows < 1:
@@ -145,4 +145,4 @@ def suggest(
     names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings) for name in names] or None
     found = answer(posterior, robots, candidates=candidates, trials=trials)
-    text.show(found.to_dict(), lambda content, console: calibration_text.suggestion(content, console, rows), json=json)
+    renderer.show(found.to_dict(), json=json, rows=rows)

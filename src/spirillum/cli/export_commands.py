@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.inputs import angle, loaded_robot
 from spirillum.cli.options import Json, RobotArgument, Settings, starting
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 __all__ = ["export"]
 
@@ -50,7 +46,7 @@ def export(
 
     Example: `spirillum export biorob2012-wide robot.stl`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.errors import InputError
     from spirillum.exports.write import export as answer
 
@@ -59,35 +55,10 @@ def export(
     found = answer(
         loaded_robot(robot, settings),
         target,
-        phase=text.angle(phase),
+        phase=angle(phase),
         fineness=fineness,
         unit=unit,
         sidecar=sidecar if sidecar or no_sidecar else None,
         model=model,
     )
-    text.show(found.to_dict(), _table, json=json)
-
-
-def _table(answer: Mapping[str, Any], console: Console) -> None:
-    """Files, then the numbers of the geometry."""
-    from spirillum.cli.text import add_quantities, grid
-
-    first, *others = (Path(item["file"]) for item in answer["files"])
-    meshes = [path for path in others if path.parent != first.parent]
-    lines = [f"{item['file']}: {item['holds']}" for item in answer["files"] if Path(item["file"]) not in meshes]
-    if meshes:
-        lines.insert(1, f"{meshes[0].parent}: {len(meshes)} mesh files, in mm")
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
-    if "solid" in answer:
-        solid = answer["solid"]
-        state = "watertight" if solid["watertight"] else "not watertight"
-        bodies = "one body" if solid["bodies"] == 1 else f"{solid['bodies']} bodies"
-        console.print(f"{bodies}, {state}, {solid['triangles']} triangles", highlight=False)
-        size = " x ".join(f"{1e3 * value:.4g}" for value in solid["size"]["value"])
-        console.print(f"{size} mm, {1e6 * solid['volume']['value']:.4g} ml", highlight=False)
-        return
-    table = grid(f"{answer['robot']}: links", "quantity", "value", "unit", "SI")
-    for name, link in answer["links"].items():
-        add_quantities(table, {f"{name} {key}": link[key] for key in ("mass", "displaced_volume")})
-    console.print(table)
+    renderer.show(found.to_dict(), json=json)

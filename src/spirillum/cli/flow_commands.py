@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.inputs import angle, loaded_robot, placement_from
 from spirillum.cli.options import (
     Eccentricity,
     Ends,
@@ -89,11 +89,13 @@ def flow(
 
     Example: `spirillum flow biorob2012-wide -o flow.png --tail-rate 1.2Hz`
     """
-    from spirillum.cli import flow_text, text
+    from spirillum.cli import renderer
+    from spirillum.fields.answer import flow_answer
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
+    from spirillum.results.flow import check_targets, write_flow
 
-    flow_text.check_targets(output, volume)
+    check_targets(output, volume)
     loaded = loaded_robot(robot, settings)
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow)
     fineness = {"accuracy": accuracy, "tolerance": tolerance}
@@ -101,7 +103,7 @@ def flow(
     plane_around(loaded, plane, offset, extent, resolution, seat)
     if volume is not None:
         box_around(loaded, extent, volume_resolution, seat)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         progress("flow: forces on the robot", 0, 1)
         found = answer(
             loaded,
@@ -110,7 +112,7 @@ def flow(
             friction=friction,
             resolution=fineness,
             placement=placement,
-            phase=text.angle(phase),
+            phase=angle(phase),
             frame=frame,
         )
         written = {}
@@ -119,5 +121,5 @@ def flow(
         if volume is not None:
             written[volume] = found.volume(extent=extent, resolution=volume_resolution, progress=progress)
         for path, dataset in written.items():
-            flow_text.write(found, dataset, path)
-    text.show(flow_text.flow_answer(found, written), flow_text.flow_table, json=json)
+            write_flow(found, dataset, path)
+    renderer.show(flow_answer(found, written), json=json)

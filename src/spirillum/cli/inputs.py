@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from spirillum.errors import InputError
+from spirillum.units import KINDS, parse_option
+
 if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
 
-__all__ = ["loaded_robot", "overrides_from", "placement_from"]
+__all__ = ["angle", "gap_range", "loaded_robot", "overrides_from", "placement_from", "time_window"]
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
@@ -46,3 +49,36 @@ def placement_from(
         "flow": flow,
     }
     return {name: value for name, value in fields.items() if value is not None}
+
+
+def angle(text: str) -> float:
+    """An angle with its unit, rad.
+
+    Raises:
+        InputError: if it is none.
+    """
+    return parse_option("phase", text, KINDS["angle"])
+
+
+def time_window(text: str) -> tuple[float, float]:
+    """FROM:TO, such as ``0s:2s``, in s.
+
+    Raises:
+        InputError: if it is none.
+    """
+    start, colon, stop = text.partition(":")
+    if not colon or ":" in stop:
+        raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
+    return parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])
+
+
+def gap_range(text: str) -> tuple[str, str]:
+    """FROM:TO, such as ``1mm:0.2mm``.
+
+    Raises:
+        InputError: if it is none.
+    """
+    largest, colon, smallest = text.partition(":")
+    if not colon:
+        raise InputError(f"drain = {text[:40]!r} is not FROM:TO, for example 1mm:0.2mm")
+    return largest, smallest

@@ -62,7 +62,7 @@ def measure(
 
     Example: `spirillum measure trial-1.mp4 trial-2.mp4 --setup setup.toml -o measured`
     """
-    from spirillum.cli import measure_text, text
+    from spirillum.cli import renderer
     from spirillum.errors import InputError
 
     if setup is None:
@@ -85,14 +85,14 @@ def measure(
             video=videos[0] if videos else None,
             overrides=overrides,
         )
-        text.show(found.to_dict(), measure_text.feasibility, json=json)
+        renderer.show(found.to_dict(), json=json)
         if not found.feasible:
             raise typer.Exit(1)
         return
     _check_no_expectations(expect_tail_rate, expect_body_rate, expect_speed, duration, fps, view_width)
     from spirillum.results.measurement import measure as answer
 
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         result = answer(
             videos or [],
             setup,
@@ -107,7 +107,7 @@ def measure(
             overrides=overrides,
             progress=progress,
         )
-    text.show(result.to_dict(), measure_text.measurement, json=json)
+    renderer.show(result.to_dict(), json=json)
     if result.failures:
         video, sentence = result.failures[0]
         more = "" if len(result.failures) == 1 else f" (and {len(result.failures) - 1} more)"

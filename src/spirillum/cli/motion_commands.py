@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.inputs import loaded_robot, placement_from, time_window
 from spirillum.cli.options import (
     Accuracy,
     Calibration,
@@ -80,7 +80,8 @@ def simulate(
 
     Example: `spirillum simulate biorob2012-wide -o run.nc --duration 4s --on 0s:1s --on 2s:3s`
     """
-    from spirillum.cli import simulation_text, text
+    from spirillum.cli import renderer
+    from spirillum.dynamics.answer import run_answer
     from spirillum.dynamics.simulation import simulate as answer
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
@@ -89,7 +90,7 @@ def simulate(
     if movie is not None:
         _check_movie(movie)
     loaded = loaded_robot(robot, settings)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         dataset = answer(
             loaded,
             model=model,
@@ -97,7 +98,7 @@ def simulate(
             friction=friction,
             turns=turns,
             duration=duration,
-            on=[text.time_window(window) for window in on] if on else None,
+            on=[time_window(window) for window in on] if on else None,
             duty=duty,
             samples_per_turn=samples_per_turn,
             calibrated=not no_calibration,
@@ -109,8 +110,10 @@ def simulate(
             progress=progress,
         )
         write_dataset(dataset, target)
-        more = _drawn(dataset, picture, movie, progress)
-    text.show(simulation_text.simulation_answer(dataset, output, more), simulation_text.simulation, json=json)
+        files, warnings = _drawn(dataset, picture, movie, progress)
+    found = run_answer(dataset)
+    found["warnings"] += warnings
+    renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
 
 
 def _check_movie(movie: Path) -> None:
@@ -124,9 +127,12 @@ def _check_movie(movie: Path) -> None:
         required(package, "a film")
 
 
-def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progress: Any) -> dict[str, Any]:
+def _drawn(
+    dataset: xr.Dataset, picture: Path | None, movie: Path | None, progress: Any
+) -> tuple[dict[str, str], list[str]]:
     """Draw and film a run; the files by what they are, and the film's warnings."""
-    files: dict[str, Any] = {}
+    files: dict[str, str] = {}
+    warnings: list[str] = []
     if picture is not None:
         from spirillum.view.figures.style import save_as
         from spirillum.view.figures.trajectory import trajectory_figure
@@ -138,11 +144,11 @@ def _drawn(dataset: xr.Dataset, picture: Path | None, movie: Path | None, progre
         from spirillum.view.scene3d.film import film
 
         try:
-            files["film_warnings"] = list(film(dataset, movie, progress=progress).warnings)
+            warnings += film(dataset, movie, progress=progress).warnings
         except InputError as error:
             raise InputError(f"the run is written, the film is not: {error}") from error
         files["movie"] = str(movie)
-    return files
+    return files, warnings
 
 
 def magnetic_sweep(
@@ -165,14 +171,15 @@ def magnetic_sweep(
 
     Example: `spirillum magnetic-sweep magnetic-helix -o sweep.nc --plot sweep.png`
     """
-    from spirillum.cli import simulation_text, text
+    from spirillum.cli import renderer
+    from spirillum.dynamics.answer import sweep_answer
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as answer
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)
     picture = None if plot is None else output_target(plot, PICTURES, "sweep.png")
     loaded = loaded_robot(robot, settings)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         dataset = answer(loaded, rate, model=model, turns=turns, resolution={"accuracy": accuracy}, progress=progress)
     write_dataset(dataset, target)
     if picture is not None:
@@ -180,4 +187,5 @@ def magnetic_sweep(
         from spirillum.view.figures.style import save_as
 
         save_as(magnetic_figure(dataset), picture)
-    text.show(simulation_text.sweep_answer(dataset, output, plot), simulation_text.sweep, json=json)
+    files = {} if plot is None else {"plot": str(plot)}
+    renderer.show(renderer.with_files(sweep_answer(dataset), file=str(output), **files), json=json)

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from spirillum.cli.options import Json
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from spirillum.cli.text import Answer
 
 __all__ = ["observations_app"]
 
@@ -43,10 +38,10 @@ def check(
 
     Example: `spirillum observations check observations.csv`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.measurement.template import observations_answer
 
-    text.show(observations_answer(file), _table, json=json)
+    renderer.show(observations_answer(file), json=json)
 
 
 @observations_app.command("join")
@@ -62,17 +57,3 @@ def join(
 
     rows = join_observations(files, output)
     typer.echo(f"{output}: {rows} rows of {len(files)} files")
-
-
-def _table(answer: Answer, console: Console) -> None:
-    from rich.markup import escape
-
-    seen = ", ".join(f"{name} {count}" for name, count in answer["measured"].items())
-    counts = [(answer[name], name[: -1 if answer[name] == 1 else None]) for name in ("rows", "tails", "channels")]
-    rows, tails, channels = (f"{count} {name}" for count, name in counts)
-    console.print(
-        f"{escape(answer['file'])}: valid, {rows} of {tails} in {channels}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    console.print(f"measured: {seen}", highlight=False, soft_wrap=True)

@@ -39,9 +39,10 @@ def robot_show(robot: RobotArgument, settings: Settings = None, json: Json = Fal
 
     Example: `spirillum robot show biorob2012-narrow`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
+    from spirillum.robot.answer import robot_answer
 
-    text.show(text.robot_answer(loaded_robot(robot, settings)), text.robot, json=json)
+    renderer.show(robot_answer(loaded_robot(robot, settings)), json=json)
 
 
 @robot_app.command("check")
@@ -50,9 +51,10 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
 
     Example: `spirillum robot check biorob2012-wide`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
+    from spirillum.robot.answer import check_answer, checked
 
-    problems, warnings = text.checked(robot, overrides_from(settings))
-    text.show(text.check_answer(robot, problems, warnings), text.check, json=json)
+    problems, warnings = checked(robot, overrides_from(settings))
+    renderer.show(check_answer(robot, problems, warnings), json=json)
     if problems:
         raise typer.Exit(1)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.inputs import gap_range, loaded_robot, placement_from
 from spirillum.cli.options import (
     Accuracy,
     Eccentricity,
@@ -50,20 +50,20 @@ def settle(
 
     Example: `spirillum settle biorob2012-wide --tail-rate 1.2Hz --gap 0.5mm`
     """
-    from spirillum.cli import settle_text, text
+    from spirillum.cli import renderer
     from spirillum.dynamics.settling import settle as answer
     from spirillum.files import PICTURES, output_target
 
     target = None if output is None else output_target(output, PICTURES, "settling.png")
     loaded = loaded_robot(robot, settings)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded,
             tail_rate=tail_rate,
             friction=friction,
             resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
             placement=placement_from(gap, eccentricity, None, tail_drop, ends, None),
-            drain=None if drain is None else settle_text.gap_range(drain),
+            drain=None if drain is None else gap_range(drain),
             gaps=gaps,
             progress=progress,
         )
@@ -72,4 +72,5 @@ def settle(
         from spirillum.view.figures.style import save_as
 
         save_as(settling_figure(found), target)
-    text.show(settle_text.settling_answer(found, output), settle_text.settling, json=json)
+    file = None if output is None else str(output)
+    renderer.show(renderer.with_files(found.to_dict(), file=file), json=json)

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from spirillum.cli.options import Json
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from spirillum.cli.text import Answer
 
 __all__ = ["setup_app"]
 
@@ -43,21 +38,7 @@ def check(
 
     Example: `spirillum setup check setup.toml`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.measurement.setup_template import setup_answer
 
-    text.show(setup_answer(file), _table, json=json)
-
-
-def _table(answer: Answer, console: Console) -> None:
-    from rich.markup import escape
-
-    console.print(f"{escape(answer['file'])}: valid, robot {escape(answer['robot'])}", highlight=False, soft_wrap=True)
-    total = 100 * answer["scale_uncertainty"]
-    parts = sorted(answer["scale_sources"].items(), key=lambda item: -item[1])
-    words = ", ".join(f"{name} {100 * share:.2g} %" for name, share in parts)
-    console.print(
-        f"standard uncertainty of lengths from heights and scale: {total:.2g} %{': ' + words if words else ''}",
-        highlight=False,
-        soft_wrap=True,
-    )
+    renderer.show(setup_answer(file), json=json)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.inputs import angle, loaded_robot
 from spirillum.cli.options import Json, RobotArgument, Settings, starting
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 __all__ = ["film", "show"]
 
@@ -51,7 +47,7 @@ def show(
 
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.view.scene3d.show import show as answer
 
     target = output if output is not None or window else Path("robot.png")
@@ -59,20 +55,12 @@ def show(
         loaded_robot(robot, settings),
         target,
         view=view,
-        phase=text.angle(phase),
+        phase=angle(phase),
         size=size,
         channel=not no_channel,
         window=window,
     )
-    text.show(found.to_dict(), _picture, json=json)
-
-
-def _picture(answer: Mapping[str, Any], console: Console) -> None:
-    from rich.markup import escape
-
-    size = f"{answer['width']}x{answer['height']} pixels, view {answer['view']}"
-    where = "shown in a window" if answer["file"] is None else escape(answer["file"])
-    console.print(f"{where}: {escape(answer['robot'])}, {size}", highlight=False, soft_wrap=True)
+    renderer.show(found.to_dict(), json=json)
 
 
 def film(
@@ -95,7 +83,7 @@ def film(
 
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.dynamics.run_file import open_run
     from spirillum.files import output_target
     from spirillum.view.scene3d.encode import FILMS
@@ -103,15 +91,6 @@ def film(
 
     output_target(output, FILMS, "run.mp4")
     dataset = open_run(run)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(dataset, output, view=view, size=size, fps=fps, speed=speed, camera=camera, progress=progress)
-    text.show(found.to_dict(), _film, json=json)
-
-
-def _film(answer: Mapping[str, Any], console: Console) -> None:
-    from rich.markup import escape
-
-    size, fps = f"{answer['width']}x{answer['height']} pixels", answer["frames_per_second"]
-    length = f"{answer['duration']['value']:.3g} s at {fps} frames a second, speed x{answer['speed']:g}"
-    said = f"{answer['frames']} frames of {size}, {length}"
-    console.print(f"{escape(answer['file'])}: {escape(answer['robot'])}, {said}", highlight=False, soft_wrap=True)
+    renderer.show(found.to_dict(), json=json)

@@ -9,12 +9,8 @@ import typer
 
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
-from spirillum.units import in_unit
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
-    from spirillum.cli.text import Answer
     from spirillum.virtual.degradation import Degradation
 
 __all__ = ["render", "virtual_experiment"]
@@ -115,11 +111,11 @@ def render(
 
     Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.virtual.trial import render as answer
 
     spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded_robot(robot, settings),
             output,
@@ -149,7 +145,7 @@ def render(
             depth_uncertainty=depth_uncertainty,
             progress=progress,
         )
-    text.show(found.to_dict(), _trial, json=json)
+    renderer.show(found.to_dict(), json=json)
 
 
 def _degradation(
@@ -181,21 +177,6 @@ def _degradation(
         bubbles=bubbles,
         hand=True if hand else None,
     )
-
-
-def _trial(answer: Answer, console: Console) -> None:
-    from rich.markup import escape
-
-    from spirillum.cli import text
-
-    lost = f", {answer['dropped']} lost" if answer["dropped"] else ""
-    size = f"{answer['width']}x{answer['height']} pixels, {answer['frames_per_second']:g} frames a second"
-    said = f"{answer['frames']} frames{lost}, {size}; setup and truth beside it"
-    console.print(f"{escape(answer['video'])}: synthetic, {said}", highlight=False, soft_wrap=True)
-    table = text.grid(f"{answer['robot']}: true motion, {answer['model']}", "quantity", "value", "unit", "SI")
-    names = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_rotation_rate")
-    text.add_quantities(table, {name: answer[name] for name in names})
-    console.print(table)
 
 
 def virtual_experiment(
@@ -237,11 +218,11 @@ def virtual_experiment(
 
     Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
     """
-    from spirillum.cli import text
+    from spirillum.cli import renderer
     from spirillum.virtual.experiment import virtual_experiment as answer
 
     spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
-    with text.progress_bar(quiet=json) as progress:
+    with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             study,
             output,
@@ -260,25 +241,4 @@ def virtual_experiment(
             jobs=jobs,
             progress=progress,
         )
-    text.show(found.to_dict(), _experiment, json=json)
-
-
-def _experiment(answer: Answer, console: Console) -> None:
-    from rich.markup import escape
-
-    from spirillum.cli import text
-
-    kept = f", {answer['kept']} of them there before" if answer["kept"] else ""
-    videos = answer["trials"] * len(answer["robots"])
-    console.print(
-        f"{escape(answer['folder'])}: synthetic, {videos} videos{kept}; truth in {escape(answer['observations'])}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    title = f"without the planted spread of {100 * answer['spread']:g} %"
-    table = text.grid(title, "robot", "forward velocity (mm/s)", "tail rate (Hz)", "body rate (Hz)")
-    for robot in answer["robots"]:
-        names = {"forward_velocity": "mm/s", "tail_rotation_rate": "Hz", "body_rotation_rate": "Hz"}
-        cells = [in_unit(robot[name]["value"], robot[name]["unit"], unit) for name, unit in names.items()]
-        table.add_row(escape(robot["robot"]), *cells)
-    console.print(table)
+    renderer.show(found.to_dict(), json=json)

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.dynamics.remote import schedule, windows_of
 from spirillum.dynamics.sampling import duration_of, late_averages, sample_times
@@ -29,6 +28,7 @@ from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import calibrated_balance
 from spirillum.units import show
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

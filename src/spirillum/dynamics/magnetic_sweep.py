@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import INTEGRATOR, Reach, integrate
 from spirillum.dynamics.remote import Switch
@@ -32,6 +31,7 @@ from spirillum.swimming.freedom import check_full
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import swim
 from spirillum.units import KINDS, parse_option, show
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

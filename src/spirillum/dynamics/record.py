@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import INTEGRATOR, Reach, Trajectory
 from spirillum.dynamics.sampling import late_averages
@@ -16,6 +15,7 @@ from spirillum.kernels import two_links as kernel
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, get_args, runtim
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
@@ -21,6 +20,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction, predict, prepared
 from spirillum.units import KINDS, Kind, parse_option
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.formats.labelled import Labelled, Variable
 from spirillum.measurement.trials import LEVEL, RATE_NAMES, Trial
 from spirillum.robot.robot import Robot
+from spirillum.version import versions
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import Estimate
+from spirillum.version import versions
 
 __all__ = ["calibration_text"]
 

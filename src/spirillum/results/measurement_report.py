@@ -62,7 +62,7 @@ def write_measurement_report(
 def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails: Mapping[str, bytes]) -> str:
     from jinja2 import Environment, StrictUndefined
 
-    from spirillum.answer import versions
+    from spirillum.version import versions
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     template = (files("spirillum.results") / "measurement.html.jinja").read_text(encoding="utf-8")

@@ -7,8 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from spirillum.answer import envelope
 from spirillum.files import claim_folder, output_folder, write_dataset
 from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.registry import claims_of
 from spirillum.results.study_report import write_report
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
@@ -18,7 +22,7 @@ from spirillum.studies.spec import load_study
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["study"]
+__all__ = ["study", "study_answer"]
 
 _RESULTS = ("dataset.nc", "figures", "report.html", "claims.json")
 """What a folder without the mark of a study may not hold, for it would be replaced."""
@@ -76,3 +80,26 @@ def study(
         shutil.rmtree(parts, ignore_errors=True)  # another run of the same study may be at it too
     write_report(dataset, folder, tell)
     return dataset
+
+
+def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
+    """What a study has found and written, as `spirillum study` prints it.
+
+    Args:
+        dataset: the study.
+        output: its folder.
+    """
+    claims = claims_of(dataset)
+    verdicts = {
+        verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
+    }
+    content = {
+        "title": dataset.attrs["title"],
+        "folder": str(output),
+        "files": sorted(str(path.relative_to(output)) for path in output.rglob("*") if path.is_file()),
+        "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        "unanswered": int(np.count_nonzero(dataset["outside"].values)),
+        "claims": verdicts,
+        "observations": dataset.attrs["observations"],
+    }
+    return envelope("study", content, [line for line in dataset.attrs["warnings"].split("\n") if line])

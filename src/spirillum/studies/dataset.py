@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import versions
 from spirillum.arrays import Values
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.quantities import QUANTITIES, attributes
@@ -17,6 +16,7 @@ from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.places import PlaceTask, placed_at, with_band
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import REASONS, Part, Task
+from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spirillum.answer import own_version
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.dataset import assembled
 from spirillum.studies.observed import ObservedArrays
@@ -17,6 +16,7 @@ from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
 from spirillum.swimming.comparison import uneven_models
 from spirillum.swimming.prediction import calibration_warnings
+from spirillum.version import own_version
 
 if TYPE_CHECKING:
     import xarray as xr

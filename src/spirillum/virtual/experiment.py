@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.answer import envelope, own_version
+from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import claim_folder, output_folder, write_text
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, Hz, parse_option
+from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.options import DIRECTIONS, VIEWS, checked_fps, checked_seed, checked_size, one_of, whole_number

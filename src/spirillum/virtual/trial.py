@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity, versions
+from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import whole_file, write_dataset
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
+from spirillum.version import versions
 from spirillum.virtual.degradation import Degradation, degradation_of
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.film import FrameWriter, mp4_writer, png_writer

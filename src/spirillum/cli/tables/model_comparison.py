@@ -1,33 +1,21 @@
-"""The answer of `compare-models` as a table for people."""
+"""Table of `compare-models`: a row for each quantity, a column for each model with its difference."""
 
 from __future__ import annotations
-
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, grid
+from spirillum.cli.tables.parts import Answer, grid
 from spirillum.units import display_unit, in_unit
 
-if TYPE_CHECKING:
-    from spirillum.swimming.comparison import ModelComparison
+__all__ = ["table"]
 
-__all__ = ["comparison_answer", "model_comparison"]
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
 """What follows from other rows, and stands in the JSON only."""
 
 
-def comparison_answer(comparison: ModelComparison, picture: Path | None) -> dict[str, Any]:
-    """Answer of `compare-models`, which names the picture that was drawn."""
-    answer = comparison.to_dict()
-    warnings = answer.pop("warnings")
-    return {**answer, "file": None if picture is None else str(picture), "warnings": warnings}
-
-
-def model_comparison(answer: Answer, console: Console) -> None:
+def table(answer: Answer, console: Console) -> None:
     """Table of `compare-models`: a row for each quantity, a column for each model with its difference."""
     reference = answer["reference"]
     models = [item for item in answer["models"] if item["answered"]]

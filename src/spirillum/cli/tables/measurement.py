@@ -1,30 +1,29 @@
-"""What `spirillum measure` answers, for people."""
+"""Tables of `measure`: each trial, and the means over them; one trial has one table."""
 
 from __future__ import annotations
 
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.text import Answer, grid
+from spirillum.cli.tables.parts import Answer, grid
 from spirillum.measurement.shown import Shown, shown
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
-from spirillum.units import for_people, in_unit, shown_in
 
-__all__ = ["feasibility", "measurement"]
+__all__ = ["table"]
 
 
-def measurement(answer: Answer, console: Console) -> None:
+def table(answer: Answer, console: Console) -> None:
     """Tables of `measure`: each trial, and the means over them; one trial has one table."""
     trials, summary = answer["trials"], answer["summary"]
     several = len(trials) > 1
     if several:
         _show_trials(answer, console)
     title = "means over trials" if several else f"{answer['robot']}: {trials[0]['name']}"
-    table = grid(title, "quantity", "value", "low", "high", "unit", *(["trials"] if several else []))
+    rows = grid(title, "quantity", "value", "low", "high", "unit", *(["trials"] if several else []))
     for name, item in summary.items():
         if isinstance(item, dict) and (item["value"] is not None or name in RATE_NAMES):
-            table.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
-    console.print(table)
+            rows.add_row(name.replace("_", " "), *_numbers(item), *([str(item["n"])] if several else []))
+    console.print(rows)
     _show_intervals(answer, console, several=several)
     if answer["files"]:
         listed = [name for name in answer["files"] if not name.startswith("figures/")]
@@ -63,34 +62,3 @@ def _show_trials(answer: Answer, console: Console) -> None:
 
 def _numbers(item: Answer) -> Shown:
     return shown(item["value"], item.get("low"), item.get("high"), item["unit"])
-
-
-def feasibility(answer: Answer, console: Console) -> None:
-    """Tables of `measure --feasibility`."""
-    verdict = "all rates can be resolved" if answer["feasible"] else "[bold]not all rates can be resolved[/bold]"
-    expected = grid(f"{answer['robot']}: expected", "quantity", "value", "unit", "from")
-    for name, item in answer["expected"].items():
-        unit = for_people(item["unit"])
-        expected.add_row(name.replace("_", " "), in_unit(item["value"], item["unit"], unit), unit, item["source"])
-    console.print(expected)
-    for check in answer["checks"]:
-        mark = "yes" if check["passed"] else "[red]NO[/red] "
-        console.print(f"{mark:<4} {escape(check['sentence'])}", highlight=False, soft_wrap=True)
-    if answer["intervals"]:
-        span = f"{answer['time_measured']['value']:.4g} s"
-        table = grid(f"expected 95 % interval of one trial, {span} long", "quantity", "half width", "unit", "share")
-        for name, item in answer["intervals"].items():
-            reach = item["half_width"]
-            unit = for_people(reach["unit"])
-            share = "-" if item["share"] is None else f"{100 * item['share']:.2g} %"
-            table.add_row(name.replace("_", " "), f"{shown_in(reach['value'], unit):.2g}", unit, share)
-        console.print(table)
-        console.print(f"basis: {answer['basis']}", highlight=False, soft_wrap=True)
-    scale, parts = 100 * answer["scale_uncertainty"], answer["scale_sources"]
-    words = ", ".join(f"{name} {100 * share:.2g} %" for name, share in sorted(parts.items(), key=lambda item: -item[1]))
-    console.print(
-        f"standard uncertainty of lengths: {scale:.2g} %{' (' + words + ')' if words else ''}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    console.print(f"verdict: {verdict}", highlight=False)

@@ -1,0 +1,94 @@
+"""One renderer for all answers: JSON for machines, or the table of the answer's kind for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from spirillum.answer import as_json
+from spirillum.cli.tables.parts import Answer
+
+__all__ = ["patience", "progress_bar", "show", "with_files"]
+
+_NARROWEST = 80
+
+
+class _PipedConsole(Console):
+    """A console that leaves a reader who has gone, as `| head` does, to the caller."""
+
+    def on_broken_pipe(self) -> None:
+        """Hand the error on: the library would end the program with exit code 1."""
+        raise BrokenPipeError
+
+
+def show(answer: Answer, *, json: bool, **options: Any) -> None:
+    """Print an answer as JSON, or as the table of its kind followed by its warnings.
+
+    The table is the function `table` of the module in `spirillum.cli.tables` that is named after the answer's schema.
+
+    Args:
+        answer: an envelope, see `spirillum.answer.envelope`.
+        json: print JSON.
+        options: of the table, such as its number of rows.
+    """
+    if json:
+        try:
+            typer.echo(as_json(answer))
+        except BrokenPipeError as error:
+            raise BrokenPipeError from error  # without its number, by which the library would end with exit code 1
+        return
+    console = _PipedConsole()
+    if console.width < _NARROWEST:
+        console = _PipedConsole(width=_NARROWEST)  # a narrow terminal wraps; it must not lose numbers
+    kind = str(answer["schema"]).removeprefix("spirillum.").partition("/")[0]
+    import_module(f"spirillum.cli.tables.{kind.replace('-', '_')}").table(answer, console, **options)
+    for warning in answer["warnings"]:
+        console.print(f"[yellow]warning:[/yellow] {escape(warning)}", highlight=False, soft_wrap=True)
+
+
+def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
+    """An answer with the files that a command has written for it; its warnings stay last."""
+    content = {name: item for name, item in answer.items() if name != "warnings"}
+    return {**content, **files, "warnings": answer["warnings"]}
+
+
+@contextmanager
+def patience(model: str, *, quiet: bool) -> Iterator[None]:
+    """A sign of life on standard error while a model solves; its first run on a machine compiles for some seconds."""
+    from spirillum.fluid.registry import MODELS
+
+    console = Console(stderr=True)
+    if quiet or not console.is_terminal or model not in MODELS or MODELS[model].closed_form:
+        yield
+        return
+    with console.status("solving for the flow (the first time, compiling takes some seconds)"):
+        yield
+
+
+@contextmanager
+def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """A progress bar on standard error; silent for `--json` and where nobody watches."""
+    if quiet:
+        yield lambda _what, _done, _total: None
+        return
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = bar.add_task("starting", total=None)
+
+    def tell(what: str, done: int, total: int) -> None:
+        bar.start()  # not before there is work: an error in the input leaves nothing on the screen
+        bar.update(task, description=escape(what), completed=done, total=total)
+
+    try:
+        yield tell
+    finally:
+        bar.stop()

@@ -1,0 +1,1 @@
+"""Answers as tables for people: one module for each kind of answer, named after its schema."""

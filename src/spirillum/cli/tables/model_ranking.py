@@ -1,0 +1,53 @@
+"""Table of `rank-models`."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+
+from spirillum.calibration.judgement import CALLED
+from spirillum.cli.tables.parts import Answer, counted, grid
+
+__all__ = ["table"]
+
+
+def table(answer: Answer, console: Console) -> None:
+    """Table of `rank-models`."""
+    synthetic = " (synthetic)" if answer["synthetic"] else ""
+    title = (
+        f"{answer['observations']}{synthetic}: {counted(len(answer['models']), 'model')}, "
+        f"{counted(answer['robots'], 'robot')}"
+    )
+    console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
+    compared = [name for name in CALLED if any(name in item["discrepancy"] for item in answer["models"])]
+    rows = grid("", "model", "log density", "difference", *(f"misses {CALLED[name]} by" for name in compared))
+    for item in answer["models"]:
+        difference = item["difference"]
+        apart = "-" if difference["value"] == 0 else f"{difference['value']:.1f} +- {difference['standard_error']:.1f}"
+        misses = [item["discrepancy"].get(name) for name in compared]
+        shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
+        rows.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
+    console.print(rows)
+    console.print(f"{escape(answer['verdict'])}", highlight=False, soft_wrap=True)
+    for item in answer["models"]:
+        console.print(escape(_failures(item)), highlight=False, soft_wrap=True)
+
+
+_STANDS_OUT = 2.5
+"""Standard deviations below which the worst of some tens of means is as far off as chance makes it."""
+
+
+def _failures(item: Answer) -> str:
+    """Where a model fails, on the scale of what its own fit expects of a tail."""
+    rows = item["fails_most_at"]
+    places = [
+        f"{row['tail']} ({row['quantity'].replace('_', ' ')}: observed "
+        f"{100 * (row['observed_over_predicted']['value'] - 1):+.0f} %, "
+        f"{abs(row['standard_deviations']['value']):.1f} standard deviations)"
+        for row in rows
+    ]
+    largest = max((abs(row["standard_deviations"]["value"]) for row in rows), default=0.0)
+    words = f"{item['model']} is furthest off at {'; '.join(places)}"
+    if largest < _STANDS_OUT:
+        return f"{words}: no tail stands out from what it misses everywhere"
+    return words

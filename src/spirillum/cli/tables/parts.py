@@ -1,0 +1,87 @@
+"""What tables share: grids, rows of quantities, bands, placement, errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from spirillum.units import display_unit, in_unit
+
+__all__ = ["Answer", "add_bands", "add_quantities", "counted", "friendly", "grid", "show_error", "show_placement"]
+
+
+Answer = Mapping[str, Any]
+_NUMBERS = ("value", "low", "high", "SI")
+"""Columns of numbers."""
+
+
+def grid(title: str, *columns: str) -> Table:
+    """An empty table in the look of all answers."""
+    table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
+    for column in columns:
+        table.add_column(column, justify="right" if column in _NUMBERS else "left")
+    return table
+
+
+def friendly(value: float | None, unit: str) -> tuple[str, str]:
+    """An SI value as people read it, and its unit."""
+    shown = display_unit(value, unit)
+    return in_unit(value, unit, shown), "" if value is None or shown == "1" else shown
+
+
+def add_quantities(table: Table, items: Mapping[str, Any]) -> None:
+    """A row for each quantity that has a value: name, value, unit, SI."""
+    for name, item in items.items():
+        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
+            value, unit = friendly(item["value"], item["unit"])
+            si = "" if unit in ("", item["unit"]) else f"{item['value']:.6g} {item['unit']}"
+            table.add_row(name.replace("_", " "), value, unit, si)
+
+
+def add_bands(table: Table, items: Mapping[str, Any]) -> None:
+    """A row for each quantity that has a value: name, value, low and high of its band, unit."""
+    for name, item in items.items():
+        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
+            unit = display_unit(item["value"], item["unit"])
+            numbers = [in_unit(item.get(key), item["unit"], unit) for key in ("value", "low", "high")]
+            table.add_row(name.replace("_", " "), *numbers, "" if unit == "1" else unit)
+
+
+def show_placement(placement: Answer, console: Console) -> None:
+    """Where the model places the robot, unless nothing is around it."""
+    if len(placement) == 1:
+        return
+    said = [escape(str(placement["kind"]))]
+    for name, item in placement.items():
+        if isinstance(item, Mapping) and item.get("value") is not None:
+            value, unit = friendly(item["value"], item["unit"])
+            said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip() + _band_words(item))
+        elif name != "kind" and isinstance(item, str):
+            said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
+    console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
+
+
+def _band_words(item: Mapping[str, Any]) -> str:
+    """Over what a field of the placement is left open."""
+    if "low" not in item:
+        return ""
+    unit = display_unit(item["high"], item["unit"])
+    low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
+    return f" (open: band over {low} to {high} {unit})"
+
+
+def show_error(error: Answer, console: Console) -> None:
+    """A model's own estimate, where it has one, and its known error in words."""
+    if error["value"] is not None:
+        share = f"{100 * error['value']:.2g} %"
+        console.print(f"error estimate: {share} of the forward velocity, against another resolution", highlight=False)
+    console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
+
+
+def counted(number: int, word: str) -> str:
+    """A number with its noun, in the plural where it is not one."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"

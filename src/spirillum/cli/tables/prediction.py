@@ -1,0 +1,37 @@
+"""Table of `predict`."""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error, show_placement
+
+__all__ = ["table"]
+
+
+def table(answer: Answer, console: Console) -> None:
+    """Table of `predict`."""
+    calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
+    free = ", free motion" if answer["motion"] == "free" else ""
+    title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
+    quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
+    if "band" in answer or "kind" in answer["forward_velocity"]:
+        rows = grid(title, "quantity", "value", "low", "high", "unit")
+        add_bands(rows, quantities)
+    else:
+        rows = grid(title, "quantity", "value", "unit", "SI")
+        add_quantities(rows, quantities)
+    console.print(rows)
+    show_placement(answer["placement"], console)
+    if answer["forward_velocity"].get("kind") == "interval":
+        level = answer["forward_velocity"]["level"]
+        console.print(f"low and high: {100 * level:g} % interval of the robot's own motion", highlight=False)
+    if "band" in answer:
+        places = len(answer["band"]["gap"]["value"])
+        console.print(
+            f"band: low and high are the least and the largest of {places + 1} places, none of them likelier than "
+            "another; value: the place above",
+            highlight=False,
+            soft_wrap=True,
+        )
+    show_error(answer["error_estimate"], console)

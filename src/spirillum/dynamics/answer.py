@@ -1,0 +1,76 @@
+"""Runs and sweeps as answers: averages, final values, and what happened."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+from spirillum.answer import envelope, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["run_answer", "sweep_answer"]
+
+_ENDS = (
+    "position",
+    "tail_angle",
+    "body_angle",
+    "pitch",
+    "yaw",
+    "wall_gap",
+    "wobble_angle",
+    "phase_lag",
+    "electrical_energy",
+    "battery_charge_used",
+)
+
+
+def _warnings(dataset: xr.Dataset) -> list[str]:
+    return [line for line in dataset.attrs["warnings"].split("\n") if line]
+
+
+def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
+    """Averages over the last two thirds of a run, its final values, and what happened in it.
+
+    Args:
+        dataset: what `spirillum.simulate` returns.
+    """
+    last = dataset.isel(time=-1)
+    content: dict[str, Any] = {
+        "robot": dataset.attrs["robot"],
+        "model": dataset.attrs["model"],
+        "friction": dataset.attrs["friction"],
+        "motion": dataset.attrs["motion"],
+        "error_estimate": quantity(float(dataset.attrs["error_estimate"]), "1", statement=dataset.attrs["known_error"]),
+        "events": json.loads(dataset.attrs["events"]),
+        "duration": quantity(float(last["time"]), "s"),
+    }
+    scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]
+    content |= {name: quantity(float(dataset[name]), str(dataset[name].attrs["units"])) for name in scalars}
+    content |= {
+        f"final_{name}": quantity(last[name].values.tolist(), str(last[name].attrs["units"]))
+        for name in _ENDS
+        if name in dataset
+    }
+    return envelope("simulation", content, _warnings(dataset))
+
+
+def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
+    """Every quantity of a sweep as a list over the rates of the field.
+
+    Args:
+        dataset: what `spirillum.magnetic_sweep` returns.
+    """
+    content: dict[str, Any] = {
+        "robot": dataset.attrs["robot"],
+        "model": dataset.attrs["model"],
+        "step_out_rate": quantity(float(dataset["step_out_rate"]), "rad/s"),
+        "field_rate": quantity(dataset["field_rate"].values, "rad/s"),
+    }
+    content |= {
+        str(name): quantity(variable.values, str(variable.attrs["units"]))
+        for name, variable in dataset.data_vars.items()
+        if variable.ndim == 1
+    }
+    return envelope("magnetic-sweep", content, _warnings(dataset))

@@ -1,0 +1,22 @@
+"""Versions of the program and of what it computes with."""
+
+from __future__ import annotations
+
+import platform
+from functools import lru_cache
+from importlib.metadata import version
+
+__all__ = ["own_version", "versions"]
+
+
+@lru_cache(maxsize=1)
+def own_version() -> str:
+    """Version of the program."""
+    return version("spirillum")
+
+
+@lru_cache(maxsize=1)
+def versions() -> str:
+    """Versions of what a result was computed with."""
+    packages = ("spirillum", "numpy", "scipy", "xarray")
+    return ", ".join([f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in packages)])
