@@ -3,8 +3,8 @@
     python benchmarks/tracker_constants.py [--keep FOLDER] [--stages STRIPES,TAIL] [--all]
 
 Synthetic throughout: a few short films of the virtual camera at 320 x 240 pixels, clean and degraded. Prints Markdown:
-constants that change an error, or cost a number, in a table, and the names of all others. A quarter of an hour of one
-core. Stages that only decide on warnings are varied with `--all`.
+constants that change an error, or cost a number, in a table, and the names of all others. Twenty minutes of one core.
+Stages that only decide on warnings are varied with `--all`.
 """
 
 import argparse

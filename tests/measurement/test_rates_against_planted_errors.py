@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.measurement.outliers import outlying_trial, stray_frames
+from spirillum.measurement.outliers import outlying_frames, outlying_trial
 from spirillum.measurement.rates import Cycle, mean_of, rate_of
 
 FRAMES = 300
@@ -105,20 +105,20 @@ def test_gaps_do_not_bias_a_rate_over_true_times() -> None:
     kept = (rng.uniform(size=FRAMES) > 0.05) & ~((TIME > 3.0) & (TIME < 5.0))
     rate = rate_of(TIME[kept], 1.5 * TIME[kept] + 0.01 * rng.normal(size=int(kept.sum())))
     assert rate.low <= 1.5 <= rate.high
-    assert rate.frames + rate.strays == int(kept.sum())
+    assert rate.frames + rate.outliers == int(kept.sum())
 
 
-def test_stray_frames_are_counted_and_do_not_move_the_rate() -> None:
+def test_outlying_frames_are_counted_and_do_not_move_the_rate() -> None:
     rng = np.random.default_rng(4)
     values = 1.5 * TIME + 0.01 * rng.normal(size=FRAMES)
     without = rate_of(TIME, values)
     spoiled = values.copy()
     bad = np.array([7, 50, 51, 120, 200, 201, 202, 280])
     spoiled[bad] += rng.choice([-1.0, 1.0], bad.size) * rng.uniform(0.3, 2.0, bad.size)
-    found = stray_frames(TIME, spoiled)
+    found = outlying_frames(TIME, spoiled)
     assert set(bad) <= set(np.flatnonzero(found))
     rate = rate_of(TIME, spoiled)
-    assert rate.strays == found.sum() <= bad.size + 2
+    assert rate.outliers == found.sum() <= bad.size + 2
     assert rate.value == pytest.approx(without.value, abs=0.2 * (without.high - without.low))
     assert np.isnan(rate.residual[bad]).all()
 

@@ -14,6 +14,7 @@ from spirillum.calibration.least_squares import FEWEST_LEFT
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
+from spirillum.robust import mad_scale
 
 __all__ = [
     "CALLED",
@@ -104,7 +105,7 @@ def stray_warnings(problem: Problem, z: Samples) -> list[str]:
         if np.count_nonzero(ratio.seen) < 5:
             continue
         off = np.abs(relative - np.nanmedian(relative))
-        limit = max(_STRAY * 1.4826 * float(np.nanmedian(off)), _LEAST_STRAY)
+        limit = max(_STRAY * float(mad_scale(off)), _LEAST_STRAY)
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
             found.append(

@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.measurement.observations import Observation
+from spirillum.robust import mad_scale
 
 __all__ = ["stray_trials"]
 
@@ -32,7 +33,7 @@ def stray_trials(groups: Sequence[Sequence[Observation]], ratios: Sequence[tuple
         known = np.concatenate([own[np.isfinite(own)] for own in deviations]) if deviations else np.empty(0)
         if known.size == 0:
             continue
-        scale = 1.4826 * float(np.median(np.abs(known)))
+        scale = float(mad_scale(known))
         for group, own in zip(groups, deviations, strict=True):
             for item, off in zip(group, own.tolist(), strict=False):
                 if np.isfinite(off) and abs(off) > max(_LIMIT * scale, _LEAST):

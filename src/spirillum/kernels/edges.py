@@ -8,6 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples, Whole
 from spirillum.kernels.compiled import compiled
+from spirillum.robust import MAD_TO_SIGMA
 
 __all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
 
@@ -263,7 +264,7 @@ def robust_change(shifts: Samples, slopes: Samples, weights: Samples, used: Samp
                 miss[i] = abs(left) * math.sqrt(weights[i])
                 rest[k] = miss[i]
                 k += 1
-        level = max(0.5, 1.4826 * np.median(rest))
+        level = max(0.5, MAD_TO_SIGMA * np.median(rest))
         for i in range(count):
             share = miss[i] / (4.685 * level) if weights[i] > 0.0 else 1.0
             used[i] = weights[i] * (1.0 - share * share) ** 2 if share < 1.0 else 0.0

@@ -24,7 +24,7 @@ IMPORTED = "imported"
 """Name of the flag of a track that another program has found."""
 SYNTHETIC = "synthetic"
 """The word by which computed videos are known, and the name of the flag."""
-_MANY_STRAYS = 0.02
+_MANY_OUTLIERS = 0.02
 _FEWEST_FRAMES = 4
 """A video of which fewer were measured gives no rates."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
@@ -71,9 +71,9 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
         if not rate.steady:
             sentence = f"the {words} changes along the video; given is its mean from end to end"
             flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
-        if rate.strays > _MANY_STRAYS * (rate.frames + rate.strays):
+        if rate.outliers > _MANY_OUTLIERS * (rate.frames + rate.outliers):
             far = "1 frame lies far from its neighbours and was"
-            far = far if rate.strays == 1 else f"{rate.strays} frames lie far from their neighbours and were"
+            far = far if rate.outliers == 1 else f"{rate.outliers} frames lie far from their neighbours and were"
             sentence = f"{far} left out of the {words}"
             flags.append(Flag(f"stray-frames-{name.replace('_', '-')}", sentence))
     stripes = stripes_of(track.setup, robot)

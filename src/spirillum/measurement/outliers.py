@@ -1,4 +1,4 @@
-"""What lies far from all others: frames of a series, and trials among trials."""
+"""Outliers: frames of a series, and trials among trials."""
 
 from __future__ import annotations
 
@@ -8,20 +8,23 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.measurement.statistics import student_t_quantile
+from spirillum.robust import mad_scale, repeated_median_line, running_median
 
-__all__ = ["GRUBBS_LEVEL", "outlying_trial", "stray_frames"]
+__all__ = ["GRUBBS_LEVEL", "outlying_frames", "outlying_trial"]
 
 GRUBBS_LEVEL = 0.01
-"""Chance that Grubbs' test names one of trials that are all alike."""
+"""Significance level of Grubbs' test: the probability that it names one of trials of one distribution."""
 _WINDOW = 9
-_REACH = 6.0
-_MAD = 1.4826
+"""Frames of the running median."""
+_SIGMAS = 6.0
+"""Standard deviations beyond which a frame is an outlier."""
 _LEAST = 0.25
-"""A step that is small against the whole series' own spread is no stray, however smooth its neighbours are."""
+"""Least scale of the residuals of the running median, over that of the whole series: a step that is small against the
+series' own scatter is no outlier, however smooth its neighbours are."""
 
 
-def stray_frames(time: Samples, values: Samples, error: Samples | None = None) -> np.ndarray:
-    """Frames that lie more than six standard deviations (from the median deviation) from their neighbours.
+def outlying_frames(time: Samples, values: Samples, error: Samples | None = None) -> np.ndarray:
+    """Frames that lie more than six standard deviations (from the median absolute deviation) from their neighbours.
 
     First from the median of nine neighbours about a robust line, which finds single frames; then from the line
     itself, which finds short bursts, unless the series bends away from it as a whole.
@@ -30,7 +33,7 @@ def stray_frames(time: Samples, values: Samples, error: Samples | None = None) -
         time: times, (n,).
         values: the series, (n,); NaN where it was not measured.
         error: standard error of frames that are known to be less sure than their neighbours, such as those read by
-            hand, (n,); NaN of others. Such a frame is a stray only beyond six of it.
+            hand, (n,); NaN of others. Such a frame is an outlier only beyond six of it.
 
     Returns:
         Truth values, (n,).
@@ -40,39 +43,27 @@ def stray_frames(time: Samples, values: Samples, error: Samples | None = None) -
     if known.size < 2 * _WINDOW:
         return found
     own = np.zeros(values.shape) if error is None else np.nan_to_num(error)
-    level = values[known] - _robust_line(time[known], values[known])
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(level, _WINDOW // 2, mode="edge"), _WINDOW)
-    near = level - np.median(around, axis=1)
-    strays = _far(near, np.maximum(_LEAST * _spread(level), own[known]))
-    kept = known[~strays]
-    found[known[strays]] = True
-    level = values[kept] - _robust_line(time[kept], values[kept])
-    bursts = _far(level, own[kept])
+    residual = values[known] - repeated_median_line(time[known], values[known]).at(time[known])
+    near = residual - running_median(residual, _WINDOW)
+    single = _far(near, np.maximum(_LEAST * _scale(residual), own[known]))
+    kept = known[~single]
+    found[known[single]] = True
+    residual = values[kept] - repeated_median_line(time[kept], values[kept]).at(time[kept])
+    bursts = _far(residual, own[kept])
     if bursts.mean() < 0.1:
         found[kept[bursts]] = True
     return found
 
 
-def _spread(deviation: Samples) -> float:
-    return _MAD * float(np.median(np.abs(deviation - np.median(deviation))))
+def _scale(residual: Samples) -> float:
+    """Standard deviation about the median, from the median absolute deviation."""
+    return float(mad_scale(residual - np.median(residual)))
 
 
-def _far(deviation: Samples, least: Samples) -> np.ndarray:
-    """Where a deviation is more than six of its spread, or of the least standard error of each."""
-    spread = np.maximum(_spread(deviation), least)
-    return np.asarray((np.abs(deviation - np.median(deviation)) > _REACH * spread) & (spread > 0))
-
-
-def _robust_line(time: Samples, values: Samples) -> Samples:
-    """Siegel's line (1982, repeated medians) through the medians of some stretches: half of them may be wrong."""
-    pieces = np.array_split(np.arange(time.size), min(60, time.size))
-    t = np.array([np.median(time[piece]) for piece in pieces])
-    y = np.array([np.median(values[piece]) for piece in pieces])
-    apart = ~np.eye(t.size, dtype=bool)
-    with np.errstate(invalid="ignore"):
-        slopes = (y[:, None] - y) / (t[:, None] - t)
-    slope = np.median(np.median(slopes[apart].reshape(t.size, -1), axis=1))
-    return np.asarray(np.median(y - slope * t) + slope * time)
+def _far(residual: Samples, least: Samples) -> np.ndarray:
+    """Where a residual is more than six of its standard deviation, or of the least standard error of each."""
+    scale = np.maximum(_scale(residual), least)
+    return np.asarray((np.abs(residual - np.median(residual)) > _SIGMAS * scale) & (scale > 0))
 
 
 def outlying_trial(values: Sequence[float]) -> int | None:

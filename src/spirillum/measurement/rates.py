@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.measurement.outliers import stray_frames
+from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.statistics import student_t, student_t_quantile
 
 __all__ = ["Cycle", "Rate", "mean_of", "rate_of"]
@@ -64,7 +64,7 @@ class Rate:
     """Upper end."""
     frames: int
     """Frames that were used."""
-    strays: int
+    outliers: int
     """Frames that were left out because they lie far from their neighbours."""
     steady: bool
     """Whether the rate is the same all along, as far as can be seen."""
@@ -109,8 +109,8 @@ def rate_of(
         The slope; where the rate is seen to change, the mean from end to end.
     """
     known = np.isfinite(values) & np.isfinite(time)
-    stray = stray_frames(time, values, None if read is None or error is None else np.where(read, error, np.nan))
-    used = known & ~stray
+    outlier = outlying_frames(time, values, None if read is None or error is None else np.where(read, error, np.nan))
+    used = known & ~outlier
     count = int(used.sum())
     if count < 2 or np.ptp(time[used]) <= 0:
         return replace(_NOTHING, frames=count)
@@ -125,7 +125,7 @@ def rate_of(
         found = (value / half, low / half, high / half)
         line = np.polynomial.polynomial.polyfit(s, y, 1)
         residual = _residual(values, used, y - line[0] - line[1] * s)
-        return Rate(*found, count, int(stray.sum()), steady=True, memory=0.0, residual=residual)
+        return Rate(*found, count, int(outlier.sum()), steady=True, memory=0.0, residual=residual)
     angles = [(np.where(np.isfinite(c.angle), c.angle, 0.0)[used], c.amplitude) for c in cycles]
     blocks = _Blocks.of(s, y, weights, angles)
     bend = bent or _bend(blocks)
@@ -143,7 +143,7 @@ def rate_of(
         float(low) / half,
         float(high) / half,
         count,
-        int(stray.sum()),
+        int(outlier.sum()),
         not bend,
         fitted.memory * half,
         residual,
@@ -158,7 +158,7 @@ def mean_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float,
         values: the series, (n,); NaN where it was not measured.
         level: confidence level.
     """
-    used = np.isfinite(values) & np.isfinite(time) & ~stray_frames(time, values)
+    used = np.isfinite(values) & np.isfinite(time) & ~outlying_frames(time, values)
     if used.sum() < _FEWEST or np.ptp(time[used]) <= 0:
         return float(values[used].mean()) if used.any() else np.nan, np.nan, np.nan
     t = time[used]

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
-from spirillum.measurement.outliers import stray_frames
+from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
 from spirillum.robot.robot import Robot
 from spirillum.vision.flag import Flag
@@ -222,7 +222,7 @@ def _smooth(time: Samples, angle: Samples) -> Samples:
 
     A polynomial of low degree; where the angle is too unsteady for one, the angle as it was seen.
     """
-    known = np.isfinite(angle) & ~stray_frames(time, angle)
+    known = np.isfinite(angle) & ~outlying_frames(time, angle)
     if known.sum() < _FEWEST:
         return np.zeros(angle.shape)
     middle, half = 0.5 * (time[known][0] + time[known][-1]), 0.5 * float(np.ptp(time[known]))

@@ -10,6 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.checkerboard import Lens
 from spirillum.vision.camera.optics import Optics, optics_of
 from spirillum.vision.camera.ruler import Lines
@@ -203,7 +204,7 @@ class _Fit:
         )
         optics = self._optics(found.x, start)
         misses = self._misses(found.x, start, spacing, height)
-        typical = float(1.4826 * np.median(np.abs(misses)))
+        typical = float(mad_scale(misses))
         kept = np.abs(misses) <= max(4.0 * typical, 1e-9)
         residual = float(np.sqrt(np.mean(misses[kept] ** 2)))
         scatter = np.linalg.pinv(found.jac.T @ found.jac) * (residual / _LINE_ERROR) ** 2

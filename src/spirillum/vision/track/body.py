@@ -10,6 +10,7 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import profiles_across, robust_change, shifts_of_profiles
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.constants import OUTLINE
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
@@ -167,7 +168,7 @@ class BodyFinder:
         enough = seen >= 0.4 * len(rest)
         stack[:, ~enough] = 0.0
         middle = np.nanmedian(stack, axis=0)
-        spread = 1.4826 * np.nanmedian(np.abs(stack - middle), axis=0)
+        spread = mad_scale(stack - middle, axis=0)
         self._offset = np.where(enough, self._offset + np.clip(middle, -1.0, 1.0), self._offset)
         self._trust = np.where(enough, np.hypot(self.contour.floor, spread), 0.5)
 
@@ -233,11 +234,7 @@ def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:
     if len(poses) < 4:
         return poses
     numbers = np.array(poses)
-    earlier, later = np.triu_indices(len(poses), 1)
-    span = times[later] - times[earlier]
-    slopes = np.median((numbers[later] - numbers[earlier]) / span[:, None], axis=0)
-    line = slopes * times[:, None]
-    line += np.median(numbers - line, axis=0)
+    line = theil_sen_line(times, numbers).at(times[:, None])
     off = np.abs(numbers - line)
     bound = np.maximum(3.0 * np.median(off, axis=0), np.array([1e-3, 5e-4, 0.01]))
     return [BodyPose(*row) for row in np.where(off > bound, line, numbers).tolist()]

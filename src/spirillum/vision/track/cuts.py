@@ -13,6 +13,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
+from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUTS
 from spirillum.vision.track.warnings import EVERYTHING
@@ -96,10 +97,9 @@ def _miss(time: Samples, values: Samples, gap: int, least: float, period: float)
         if known.size < CUTS.window:
             return 0.0
         t, v = time[part][known], values[part][known]
-        spans = t - t.mean()
-        slope = float(spans @ v / (spans @ spans))
-        reached.append(float(v.mean()) + slope * (middle - float(t.mean())))
-        far += 0.5 * ((middle - float(t.mean())) / (0.5 * float(np.ptp(t)))) ** 2
+        line = least_squares_line(t, v)
+        reached.append(float(line.at(middle)))
+        far += 0.5 * ((middle - line.time) / (0.5 * float(np.ptp(t)))) ** 2
     return float(abs(math.remainder(reached[1] - reached[0], period)) / (least * max(1.0, math.sqrt(far))))
 
 
@@ -125,7 +125,7 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> float |
     steps = np.where(_even(time, t, usual) & (longest < CUTS.unseen * usual), steps, 0.0)
     if not steps.any():
         return None
-    spread = 1.4826 * float(np.median(np.abs(steps[steps != 0.0])))
+    spread = float(mad_scale(steps[steps != 0.0]))
     largest = int(np.argmax(np.abs(steps)))
     return float(splits[largest]) if abs(steps[largest]) > max(least, CUTS.clear * spread) else None
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
@@ -172,8 +173,7 @@ def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
     if times[0] <= time <= times[-1]:
         return BodyPose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
     few = slice(0, 4) if time < times[0] else slice(-4, None)
-    span = times[few] - times[few].mean()
-    slope = span @ (poses[few] - poses[few].mean(axis=0)) / max(float(span @ span), 1e-12)
+    slope = least_squares_line(times[few], poses[few]).slope
     edge = 0 if time < times[0] else -1
     there = poses[edge] + slope * (time - times[edge]) * np.array([1.0, 1.0, 0.0])
     return BodyPose(*there.tolist())

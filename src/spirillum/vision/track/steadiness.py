@@ -10,6 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.extras import required
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import seen
 from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
 from spirillum.vision.flag import Flag
@@ -97,7 +98,7 @@ def shift_between(one: Samples, other: Samples) -> float:
             back = np.array([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]])
             moved = cv2.warpAffine(other, back, other.shape[::-1], flags=cv2.INTER_CUBIC)
             rest = moved[inside][edge] - there
-            scale = 3.0 * 1.4826 * float(np.median(np.abs(rest))) + 1e-3
+            scale = 3.0 * float(mad_scale(rest)) + 1e-3
             weight = np.clip(1.0 - (rest / scale) ** 2, 0.0, None) ** 2
             normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(2)
             step = np.clip(np.linalg.solve(normal, slopes.T @ (weight * rest)), -1.0, 1.0)

@@ -10,6 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.pictures import profile_of_rows, stripe_fit, stripes_at
 from spirillum.robot.robot import Robot
+from spirillum.robust import mad_scale
 from spirillum.vision.camera.optics import BodyPose, Optics, seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
@@ -229,7 +230,7 @@ class Stripes:
             residual = gain * (level - shade * model - sheen)
             size = np.linalg.norm(residual, axis=1)
             kept = valid & (size < max(4.0 * np.median(size[valid]), 20.0))
-            residuals.append(1.4826 * np.median(size[valid]) / np.sqrt(3.0))
+            residuals.append(mad_scale(size[valid]) / np.sqrt(3.0))
             models.append(model)
             squares.append(size**2 / 3.0)
             wanted.append(level)

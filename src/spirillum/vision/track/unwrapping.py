@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
+from spirillum.robust import least_squares_line, running_median
 from spirillum.units import show
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, stripes_of
@@ -180,10 +180,7 @@ def _leaps(t: Samples, values: Samples, dt: float) -> int:
     steps, spans = np.diff(values[known]), np.diff(t[known])
     if steps.size < UNWRAPPING.leap_window:
         return 0
-    around = sliding_window_view(
-        np.pad(steps / spans, UNWRAPPING.leap_window // 2, mode="edge"), UNWRAPPING.leap_window
-    )
-    off = np.abs(steps - np.median(around, axis=1) * spans)
+    off = np.abs(steps - running_median(steps / spans, UNWRAPPING.leap_window) * spans)
     return int(np.sum((off > UNWRAPPING.leap) & (spans < 10.0 * dt)))
 
 
@@ -239,8 +236,7 @@ def _slope(time: Samples, value: Samples) -> tuple[float, float]:
     if known.sum() < 4:
         return 0.0, 0.0
     t, v = time[known], value[known]
-    centred = t - t.mean()
-    rate = float(centred @ (v - v.mean()) / max(float(centred @ centred), 1e-300))
+    rate = float(least_squares_line(t, v).slope)
     return rate, rate * float(t[-1] - t[0])
 
 

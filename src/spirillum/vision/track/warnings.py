@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.robust import least_squares_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
@@ -198,9 +199,9 @@ def sight_flags(
         )
     if known.sum() > 10:
         t, x = time[known], pose[known, 0]
-        slope = float(np.polyfit(t - t.mean(), x, 1)[0])
-        spread = float(np.std(x - np.polyval(np.polyfit(t, x, 1), t))) + float(np.nanmedian(errors[:, 0]))
-        if slope * (t[-1] - t[0]) < -max(5.0 * spread, 2.0 * optics.length_per_pixel):
+        line = least_squares_line(t, x)
+        spread = float(np.std(x - line.at(t))) + float(np.nanmedian(errors[:, 0]))
+        if line.slope * (t[-1] - t[0]) < -max(5.0 * spread, 2.0 * optics.length_per_pixel):
             flags.append(
                 Flag(
                     "moves-backwards",

@@ -1,0 +1,105 @@
+"""Scales and lines of noisy series: median absolute deviation, running median, robust and least-squares lines."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+
+__all__ = [
+    "MAD_TO_SIGMA",
+    "Line",
+    "least_squares_line",
+    "mad_scale",
+    "repeated_median_line",
+    "running_median",
+    "theil_sen_line",
+]
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation, 1/Phi^-1(3/4)."""
+_MOST_PIECES = 60
+"""Points through which a repeated-median line goes at most: its work grows with their square."""
+
+
+class Line(NamedTuple):
+    """A straight line of one or several quantities over time."""
+
+    time: float
+    """Time at which it has `value`."""
+    value: Samples
+    """Its value there, (...)."""
+    slope: Samples
+    """Change per unit of time, (...)."""
+
+    def at(self, time: Samples | float) -> Samples:
+        """Its value at a time; at several times, (n,), of a line of one quantity."""
+        return np.asarray(self.value + self.slope * (time - self.time))
+
+
+def mad_scale(residuals: Samples, axis: int | None = None) -> Samples:
+    """Standard deviation of residuals about zero from their median absolute value; NaN is left out.
+
+    Args:
+        residuals: of any shape.
+        axis: along which; None: all of them.
+    """
+    return np.asarray(MAD_TO_SIGMA * np.nanmedian(np.abs(residuals), axis=axis))
+
+
+def running_median(values: Samples, window: int) -> Samples:
+    """Median of each value and its neighbours, (n,); the first and last value are repeated beyond the ends.
+
+    Args:
+        values: (n,).
+        window: odd number of values.
+    """
+    padded = np.pad(values, window // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1))
+
+
+def least_squares_line(time: Samples, values: Samples) -> Line:
+    """The least-squares line; its reference is the mean time.
+
+    Args:
+        time: (n,).
+        values: of one quantity, (n,), or of several, (n, k).
+    """
+    middle, mean = float(time.mean()), values.mean(axis=0)
+    spans = time - middle
+    slope = spans @ (values - mean) / max(float(spans @ spans), 1e-300)
+    return Line(middle, np.asarray(mean), np.asarray(slope))
+
+
+def theil_sen_line(time: Samples, values: Samples) -> Line:
+    """Theil and Sen's line: the median slope of all pairs of points, through the median of what remains.
+
+    Args:
+        time: (n,), without repetitions.
+        values: of several quantities, (n, k).
+    """
+    earlier, later = np.triu_indices(len(time), 1)
+    span = time[later] - time[earlier]
+    slope = np.median((values[later] - values[earlier]) / span[:, None], axis=0)
+    return Line(0.0, np.median(values - slope * time[:, None], axis=0), slope)
+
+
+def repeated_median_line(time: Samples, values: Samples) -> Line:
+    """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
+
+    It goes through the medians of at most 60 stretches of the series.
+
+    Args:
+        time: (n,), increasing.
+        values: (n,).
+    """
+    pieces = np.array_split(np.arange(time.size), min(_MOST_PIECES, time.size))
+    t = np.array([np.median(time[piece]) for piece in pieces])
+    y = np.array([np.median(values[piece]) for piece in pieces])
+    apart = ~np.eye(t.size, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        slopes = (y[:, None] - y) / (t[:, None] - t)
+    slope = np.median(np.median(slopes[apart].reshape(t.size, -1), axis=1))
+    return Line(0.0, np.asarray(np.median(y - slope * t)), np.asarray(slope))
