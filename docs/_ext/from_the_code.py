@@ -323,9 +323,9 @@ class StudyFigures(SphinxDirective):
     final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.view.figures.study import study_figures
+        from spirillum.papers.registry import figures_of
 
-        pictures = study_figures(_studied())
+        pictures = figures_of(_studied())
         found: list[nodes.Node] = []
         for name in self.arguments[0].split():
             figure = nodes.figure()
@@ -418,11 +418,11 @@ def _draw_pictures(app: Sphinx) -> None:
     import runpy
     import sys
 
-    from spirillum.view.figures.study import study_figures
+    from spirillum.papers.registry import figures_of
 
     folder = Path(app.srcdir) / "_build" / "pictures"
     folder.mkdir(parents=True, exist_ok=True)
-    for name, picture in study_figures(_studied()).items():
+    for name, picture in figures_of(_studied()).items():
         picture.figure().savefig(folder / f"{name}.png", dpi=110)
     script = Path(app.srcdir).parent / "examples" / "tutorial.py"
     kept = sys.argv

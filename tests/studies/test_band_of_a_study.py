@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.legend import Legend
 
 import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
 from spirillum.papers.biorob2012.evidence import Evidence
+from spirillum.papers.registry import figures_of
 from spirillum.studies import places
 from spirillum.studies.places import AT_PLACES
-from spirillum.view.figures.study import study_figures
 from spirillum.view.figures.style import look_of_model
 
 MODELS = ["sbt", "walled"]
@@ -136,11 +137,11 @@ def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, 
 
 def test_figures_draw_the_band_and_name_it(leaning: Any, question: dict[str, object]) -> None:
     dataset = sp.study(question, band=True)
-    pictures = study_figures(dataset)
+    pictures = figures_of(dataset)
     assert list(pictures) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
     for name, picture in pictures.items():
         figure = picture.figure()
-        entries = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+        entries = [text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()]
         assert "walled: band" in entries, name
         assert "band" in picture.caption.lower()
         assert "interval" not in picture.caption

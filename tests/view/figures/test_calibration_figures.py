@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
@@ -30,7 +31,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def _texts(figure: Any) -> str:
-    return " ".join(text.get_text() for text in figure.texts)
+    return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.swimming.comparison import ModelComparison
@@ -71,7 +72,7 @@ def test_a_bar_spans_a_models_own_error(both: ModelComparison, monkeypatch: pyte
     assert bars() == 0
     monkeypatch.setattr(module, "estimated_error", lambda answer: 0.02 if answer.model.name == "rft" else None)
     assert bars() == 1  # the estimate is of the speed, which one panel shows
-    words = " ".join(text.get_text() for text in comparison_figure(both).texts)
+    words = " ".join(text.get_text() for text in comparison_figure(both).findobj(Text))
     assert "the model's own refinement (rft 2 %)" in words
     assert "No bar: sbt" in words
 
@@ -80,7 +81,7 @@ def test_a_model_without_an_answer_keeps_its_line_and_says_why() -> None:
     found = sp.compare_models(sp.load(WIDE, **{"tail.wire_diameter": "6 mm"}), models=["sbt", "rft"])
     figure = comparison_figure(found)
     assert all("no answer" in [text.get_text() for text in axes.texts] for axes in figure.axes)
-    assert "reversing the thrust" in " ".join(text.get_text() for text in figure.texts)
+    assert "reversing the thrust" in " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 @pytest.mark.parametrize(

@@ -8,20 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import rcParams
+from matplotlib.legend import Legend
+from matplotlib.text import Text
 
 import spirillum as sp
-from spirillum.view.figures.study import study_figures
+from spirillum.papers.registry import figures_of
 from spirillum.view.figures.style import look_of_model, save
 
 MM, HZ = 1e-3, 2 * np.pi
 
 
 def texts(figure: Any) -> list[str]:
-    return [text.get_text() for text in figure.texts]
+    return [text.get_text() for text in figure.findobj(Text)]
 
 
 def legend_entries(figure: Any) -> list[str]:
-    return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    return [text.get_text() for legend in figure.findobj(Legend) for text in legend.get_texts()]
 
 
 def curves(axes: Any, model: str) -> list[Any]:
@@ -30,15 +32,15 @@ def curves(axes: Any, model: str) -> list[Any]:
 
 @pytest.fixture(scope="module")
 def fig5(paper_study: Any) -> Any:
-    return study_figures(paper_study)["fig5-wide"].figure()
+    return figures_of(paper_study)["fig5-wide"].figure()
 
 
 def test_paper_study_has_the_papers_figures(paper_study: Any) -> None:
-    assert list(study_figures(paper_study)) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
+    assert list(figures_of(paper_study)) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
 
 
 def test_drop_equals_the_dataset_and_has_the_papers_mean(paper_study: Any) -> None:
-    figure = study_figures(paper_study)["drop"].figure()
+    figure = figures_of(paper_study)["drop"].figure()
     free = paper_study.sel(friction="none")
     per_turn = free["forward_velocity"] / free["motor_rotation_rate"]
     loss = 100 * (1 - per_turn.sel(channel="narrow") / per_turn.sel(channel="wide"))
@@ -82,7 +84,7 @@ def test_legend_tells_models_and_bounds_apart(fig5: Any) -> None:
 
 
 def test_figure_says_that_nothing_is_measured(paper_study: Any) -> None:
-    for picture in study_figures(paper_study).values():
+    for picture in figures_of(paper_study).values():
         assert "nothing in this figure is measured" in picture.caption
         assert any("nothing in this figure is measured" in text for text in texts(picture.figure()))
 
@@ -111,7 +113,7 @@ def test_inferred_friction_equals_the_dataset_and_leaves_negative_values_out(pap
 
 
 def test_bound_has_the_papers_largest_reynolds_number(paper_study: Any) -> None:
-    figure = study_figures(paper_study)["bound"].figure()
+    figure = figures_of(paper_study)["bound"].figure()
     assert len(figure.axes) == 8
     assert "upper bound" in figure.axes[0].get_ylabel()
     assert "(mm/s)" in figure.axes[0].get_ylabel()
@@ -126,13 +128,13 @@ def test_bound_has_the_papers_largest_reynolds_number(paper_study: Any) -> None:
 
 def test_other_studies_do_not_borrow_the_papers_reynolds_number(paper_study: Any) -> None:
     other = paper_study.assign_attrs(claims="none")
-    figures = study_figures(other)
+    figures = figures_of(other)
     assert list(figures) == ["channel-wide", "channel-narrow", "bound"]
     assert not [line for line in figures["bound"].figure().axes[0].get_lines() if line.get_color() == "black"]
 
 
 def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> None:
-    picture = study_figures(observed_study)["fig5-wide"]
+    picture = figures_of(observed_study)["fig5-wide"]
     figure = picture.figure()
     assert len(figure.axes) == 12
     assert "synthetic.csv" in picture.caption
@@ -151,7 +153,7 @@ def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> 
 
 
 def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) -> None:
-    figure = study_figures(observed_study)["fig5-wide"].figure()
+    figure = figures_of(observed_study)["fig5-wide"].figure()
     wide = observed_study.sel(channel="wide")
     derived = (wide["observed_tail_rate"] - wide["observed_body_rate"]).isel(wavelength=3, amplitude=0).item() / HZ
     assert figure.axes[7].containers[0][0].get_ydata()[0] == pytest.approx(derived)
@@ -163,7 +165,7 @@ def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) 
 
 
 def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study: Any) -> None:
-    figure = study_figures(observed_study)["fig5-wide"].figure()
+    figure = figures_of(observed_study)["fig5-wide"].figure()
     part = observed_study["effective_friction_at_observed_rate"].sel(channel="wide", model="sbt").isel(wavelength=3)
     rotor, paper = curves(figure.axes[11], "sbt")
     factor = 1e-6 if "µN m s/rad" in figure.axes[8].get_ylabel() else 1.0
@@ -175,7 +177,7 @@ def test_unanswered_robots_leave_gaps_and_are_counted() -> None:
     study = {
         "grid": {"channels": {"one": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["2 mm", "25 mm"]}
     }
-    picture = study_figures(sp.study(study))["channel-one"]
+    picture = figures_of(sp.study(study))["channel-one"]
     assert "2 of 4 results" in picture.caption
     figure = picture.figure()
     assert np.isnan(curves(figure.axes[0], "sbt")[0].get_ydata()).tolist() == [False, True]
@@ -184,7 +186,7 @@ def test_unanswered_robots_leave_gaps_and_are_counted() -> None:
 
 def test_study_without_any_answer_still_has_its_figures() -> None:
     grid = {"channels": {"one": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["25 mm"]}
-    for picture in study_figures(sp.study({"grid": grid, "assumed_motor_rates": ["1 Hz"]})).values():
+    for picture in figures_of(sp.study({"grid": grid, "assumed_motor_rates": ["1 Hz"]})).values():
         assert picture.figure().axes
 
 
@@ -194,7 +196,7 @@ def test_many_wavelengths_fill_several_figures_and_say_so() -> None:
         "wavelengths": [f"{value} mm" for value in range(10, 40)],
         "amplitudes": ["2 mm"],
     }
-    figures = study_figures(sp.study({"grid": grid}))
+    figures = figures_of(sp.study({"grid": grid}))
     parts = [name for name in figures if name.startswith("channel-one-part")]
     assert parts == [f"channel-one-part{number}" for number in (1, 2, 3, 4)]
     assert "24 of 30 wavelengths" in figures[parts[0]].caption
@@ -208,14 +210,14 @@ def test_hostile_channel_names_stay_file_names() -> None:
         "wavelengths": ["25 mm"],
         "amplitudes": ["2 mm"],
     }
-    figures = study_figures(sp.study({"grid": grid}))
+    figures = figures_of(sp.study({"grid": grid}))
     assert all(re.fullmatch("[a-z0-9]+(-[a-z0-9]+)*", name) for name in figures)
     assert len(figures) == 5
 
 
 def test_text_is_never_read_as_a_formula(tmp_path: Path) -> None:
     grid = {"channels": {"$x_{": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["2 mm"]}
-    picture = study_figures(sp.study({"grid": grid}))["channel-x"]
+    picture = figures_of(sp.study({"grid": grid}))["channel-x"]
     assert picture.title.startswith("$x_{")
     save(picture.figure(), tmp_path / "x")
 
@@ -238,7 +240,7 @@ def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str],
 def test_listed_robots_have_a_point_each(robot_file: Callable[[str, str], str]) -> None:
     robots = [robot_file(f"r{number}", f"{number} mm") for number in (1, 2, 3)]
     dataset = sp.study({"robots": robots, "title": "three"})
-    figures = study_figures(dataset)
+    figures = figures_of(dataset)
     assert list(figures) == ["robots"]
     figure = figures["robots"].figure()
     assert len(figure.axes) == 3
@@ -252,12 +254,12 @@ def test_listed_robots_have_a_point_each(robot_file: Callable[[str, str], str]) 
 
 def test_drawing_leaves_the_callers_settings_alone(paper_study: Any, tmp_path: Path) -> None:
     before = dict(rcParams)
-    save(study_figures(paper_study)["bound"].figure(), tmp_path / "bound")
+    save(figures_of(paper_study)["bound"].figure(), tmp_path / "bound")
     assert dict(rcParams) == before
 
 
 def test_files_come_out_the_same_every_time(paper_study: Any, tmp_path: Path) -> None:
-    picture = study_figures(paper_study)["bound"]
+    picture = figures_of(paper_study)["bound"]
     first, second = (save(picture.figure(), tmp_path / name) for name in ("one", "two"))
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()

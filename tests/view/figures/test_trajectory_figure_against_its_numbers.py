@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import spirillum as sp
 from spirillum.view.figures.trajectory import trajectory_figure
@@ -96,7 +97,7 @@ def test_time_axis_is_shared_and_spans_the_run(run: Any) -> None:
 
 def test_events_are_marked_and_named(run: Any) -> None:
     figure = trajectory_figure(run)
-    words = " ".join(text.get_text() for text in figure.texts)
+    words = " ".join(text.get_text() for text in figure.findobj(Text))
     assert "1: motor off (1 s)" in words
     assert "after the end" not in words
     assert "computed, nothing is measured" in words

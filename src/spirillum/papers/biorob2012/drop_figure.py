@@ -13,7 +13,8 @@ from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.view.figures.evidence import Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.style import Scale, label_of_model, look_of_model
 
 __all__ = ["drop_picture"]
@@ -69,13 +70,14 @@ def _draw(shown: Shown, evidence: Evidence, notes: list[str]) -> Figure:
     sheet = Sheet(
         _TITLE,
         shown.source_line,
-        1,
-        len(wavelengths),
-        (1.72, 2.2),
+        width=width_of(len(wavelengths), PANEL[0]),
+        heights=[2.2],
+        columns=len(wavelengths),
         notes=notes,
         legend=legend,
     )
-    figure, ((*panels,),) = sheet.draw()
+    panels = sheet.panels[0]
+    add_letters(panels)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = Scale.of(values, "m")
     for axes, wavelength in zip(panels, wavelengths, strict=True):
@@ -91,7 +93,7 @@ def _draw(shown: Shown, evidence: Evidence, notes: list[str]) -> Figure:
     panels[0].set_ylabel("loss at equal motor rates\n$1-U_{narrow}/U_{wide}$ (%)")
     bottom, top = panels[0].get_ylim()
     panels[0].set_ylim(min(bottom, 0.0), max(top, 60.0))
-    return figure
+    return sheet.finished()
 
 
 def _range(evidence: Evidence, model: str) -> tuple[Values, Values]:

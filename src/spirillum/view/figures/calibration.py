@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.units import Hz
 from spirillum.view.figures.evidence import spread
 from spirillum.view.figures.posterior import posterior_figure, profile_figure
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:
@@ -108,13 +107,14 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
         sheet = Sheet(
             f"Channel of {experiment.channels[channel] * 1e3:g} mm: fitted model against {label} means",
             _source(found),
-            len(rows),
-            len(columns),
+            width=width_of(len(columns), 1.72),
+            heights=[1.5] * len(rows),
+            columns=len(columns),
             notes=notes,
             legend=handles,
         )
-        figure, panels = sheet.draw()
-        for row, axes_row in zip(rows, panels, strict=True):
+        add_letters(sheet.panels.flat)
+        for row, axes_row in zip(rows, sheet.panels, strict=True):
             for amplitude, axes in zip(columns, axes_row, strict=True):
                 here = inside & np.array([abs(r.tail.amplitude - amplitude) < 1e-9 for r in experiment.robots])
                 _draw(axes, found, row, here)
@@ -122,12 +122,17 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
             for axes in axes_row:
                 axes.set_xlim(*ends)
             _from_zero(axes_row[0], row, inside)
-        for amplitude, axes in zip(columns, panels[0], strict=True):
+        for amplitude, axes in zip(columns, sheet.panels[0], strict=True):
             axes.set_title(f"$B_o$ = {amplitude * 1e3:g} mm", fontsize=9)
-        for axes in panels[-1]:
+        for axes in sheet.panels[-1]:
             axes.set_xlabel(r"wavelength $\lambda$ (mm)")
-        _alike_ticks(panels, np.unique(waves.round(6)))
-        return figure
+        few = np.unique(waves.round(6))
+        for axes in sheet.panels.flat:
+            axes.tick_params(labelbottom=axes in sheet.panels[-1])
+            axes.xaxis.set_major_locator(
+                FixedLocator(list(few)) if few.size <= _MOST_TICKS else MaxNLocator(4, integer=True)
+            )
+        return sheet.finished()
 
 
 def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
@@ -137,13 +142,6 @@ def _from_zero(axes: Axes, row: dict[str, Any], inside: np.ndarray) -> None:
         axes.set_ylim(0.0, 1.08 * float(np.nanmax(ends)))
     elif not np.any(row["positive"]):
         axes.set_ylim(1.08 * float(np.nanmin(ends)), 0.0)
-
-
-def _alike_ticks(panels: Sequence[Sequence[Axes]], wavelengths: Samples) -> None:
-    """The same ticks everywhere: at the wavelengths themselves, if they are few."""
-    for axes in (panel for row in panels for panel in row):
-        few = len(wavelengths) <= _MOST_TICKS
-        axes.xaxis.set_major_locator(FixedLocator(list(wavelengths)) if few else MaxNLocator(4, integer=True))
 
 
 def _rows(found: Calibrated) -> list[dict[str, Any]]:
@@ -233,23 +231,22 @@ def residual_figure(found: Calibrated) -> Figure:
         sheet = Sheet(
             "What the fitted model leaves",
             _source(found),
-            len(names),
-            1,
-            panel=(6.4, 1.5),
+            width=width_of(1, 6.4),
+            heights=[1.5] * len(names),
+            columns=1,
             notes=[_fit_words(found), "Tails in each channel by wavelength, then amplitude."],
             legend=handles,
-            tick_room=0.3,
         )
-        figure, panels = sheet.draw()
+        add_letters(sheet.panels.flat)
         order = sorted(range(experiment.size), key=lambda n: (*_place(found, n),))
         edges = [n for n in range(1, len(order)) if experiment.channel[order[n]] != experiment.channel[order[n - 1]]]
-        for name, (axes,) in zip(names, panels, strict=True):
+        for name, axes in zip(names, sheet.panels.flat, strict=True):
             _draw_residuals(axes, found, name, order)
             for edge in edges:
                 axes.axvline(edge - 0.5, color="#888888", linewidth=0.8)
             axes.set_title(_NAMES[name], fontsize=9)
             axes.set_ylabel("observed/model - 1 (%)")
-        last = panels[-1][0]
+        last = sheet.panels[-1, 0]
         last.set_xlabel("tail: wavelength x amplitude (mm)")
         shown = spread(len(order), _MOST_NAMES)
         tails = [experiment.robots[order[n]].tail for n in shown]
@@ -266,7 +263,7 @@ def residual_figure(found: Calibrated) -> Figure:
                 ha="center",
                 size=8,
             )
-        return figure
+        return sheet.finished()
 
 
 def _place(found: Calibrated, n: int) -> tuple[int, float, float]:

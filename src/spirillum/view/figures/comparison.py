@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.style import Scale, look_of_model, plain, styled
 
 __all__ = ["comparison_figure"]
@@ -66,19 +66,19 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: models side by side",
             _conditions(comparison),
-            1,
-            len(_PANELS),
-            panel=(1.9, _LINE_HEIGHT * len(comparison.models) + 0.1),
+            width=width_of(len(_PANELS), 1.9),
+            heights=[_LINE_HEIGHT * len(comparison.models) + 0.1],
+            columns=len(_PANELS),
             notes=_notes(comparison),
-            tick_room=0.16,
         )
-        figure, (panels,) = sheet.draw()
+        panels = sheet.panels[0]
+        add_letters(panels)
         for axes, panel in zip(panels, _PANELS, strict=True):
             _draw(axes, comparison, panel)
         names = comparison.models
         panels[0].set_yticks(range(len(names)), [_label(comparison, name) for name in names])
         panels[0].set_ylim(len(names) - 0.45, -0.55)
-        return figure
+        return sheet.finished()
 
 
 def _label(comparison: ModelComparison, name: str) -> str:

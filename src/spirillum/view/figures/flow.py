@@ -12,13 +12,14 @@ from matplotlib.colors import LogNorm, Normalize, SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import FancyArrowPatch
-from matplotlib.ticker import NullLocator, StrMethodFormatter
+from matplotlib.ticker import NullLocator
 
 from spirillum.arrays import Values
 from spirillum.units import Hz
 from spirillum.view.figures.scene import HALO
 from spirillum.view.figures.section import draw_glass, draw_section
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,10 +28,8 @@ if TYPE_CHECKING:
 
 __all__ = ["flow_figure"]
 
-_LEFT, _RIGHT, _HEAD, _FOOT, _X_LABEL, _GAP = 0.72, 0.95, 0.86, 0.52, 0.46, 0.3
-"""Margins of the figure, room below a panel, and room between panels, inches."""
-_LINE, _STRIP = 0.18, 1.1
-"""Height of a further line of words above the panels, and of the panel of the pressure along a tube, inches."""
+_BESIDE, _STRIP = 1.67, 1.1
+"""Typical room beside a panel for its labels and colour bar; height of the pressure along a tube, inches."""
 _WIDE, _SQUARE, _TALLEST = 6.6, 3.3, 4.2
 """Width of a panel among stacked ones and of one beside another; largest height, inches."""
 _SPEED_DECADES = 3.0
@@ -102,77 +101,79 @@ def flow_figure(flow: Flow, plane: xr.Dataset) -> Figure:
         plane: what its `plane` returns.
     """
     view = _View.of(plane)
+    strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
     with styled():
-        words = list(_conditions(flow, view))
-        strip = flow.seat is not None and view.first == "x" and bool(_at_glass(view)[0].size)
-        figure, panels, bars = _panels(
-            view, _HEAD + _LINE * (len(words) - 2), _STRIP + _GAP + _X_LABEL if strip else 0.0
-        )
-        scale = 72.0 * figure.get_size_inches()[0] * panels[0].get_position().width / float(np.ptp(view.x))
-        unit = view.lengths.factor
-        for letter, axes in zip("ab", panels, strict=True):
+        sheet = _sheet(flow, view, strip=strip)
+        stacked = sheet.panels.shape[1] == 1
+        panels = sheet.panels[:2, 0] if stacked else sheet.panels[0]
+        for axes in panels:
             axes.set_xlim(view.x[0], view.x[-1])
             axes.set_ylim(view.y[0], view.y[-1])
-            axes.set_title(f"{letter})", loc="left", pad=3, weight="bold")
             axes.set_xlabel(f"${view.first}$ ({view.lengths.unit})")
             axes.set_ylabel(f"${view.second}$ ({view.lengths.unit})")
-            if flow.seat is not None:
-                draw_glass(axes, flow.seat, view.name, view.offset, unit)
-            drop = flow.prediction.batch.placement.tail_drop
-            draw_section(axes, flow.robot, view.name, view.offset, phase=flow.phase, unit=unit, points=scale, drop=drop)
-        _draw_speed(figure, panels[0], bars[0], view)
-        _draw_lines(figure, panels[0], view)
-        _draw_pressure(figure, panels[1], bars[1], view)
+            axes.grid(visible=False)
+        _draw_speed(panels[0], view)
+        _draw_pressure(panels[1], view)
+        if strip:
+            _draw_strip(sheet.panels[-1, -1], view)
+            add_letters([*panels, sheet.panels[-1, -1]])
+        else:
+            add_letters(panels)
+        if strip and not stacked:
+            sheet.panels[1, 0].remove()
+        figure = sheet.finished(shape=float(np.ptp(view.y) / np.ptp(view.x)))
+        for axes in panels:
+            axes.set_aspect("equal")
+            axes.apply_aspect()
+            _draw_solids(axes, flow, view)
+        _draw_lines(panels[0], view)
         if flow.frame == "lab" and view.first == "x":
             _draw_heading(panels[0], flow, view)
-        if strip:
-            _draw_strip(figure, panels[1], view)
-        _write_words(figure, flow, words, list(_notes(flow, view)))
         return figure
 
 
-def _panels(view: _View, head: float, below: float) -> tuple[Figure, list[Axes], list[Axes]]:
-    """Figure, panels and the axes of their colour bars: stacked for a long plane, else side by side.
-
-    Args:
-        view: the plane.
-        head: room above the panels, inches.
-        below: room below them for another one, inches.
-    """
+def _sheet(flow: Flow, view: _View, *, strip: bool) -> Sheet:
+    """Panels for speed and pressure: stacked for a long plane, else side by side; one below them along a tube."""
     width, height = float(np.ptp(view.x)), float(np.ptp(view.y))
     stacked = width > 1.25 * height
-    across = _WIDE if stacked else _SQUARE
-    share = min(1.0, _TALLEST / (across * height / width))
-    w, h = across * share, across * height / width * share
-    columns, rows = (1, 2) if stacked else (2, 1)
-    total_w = columns * (_LEFT + w + _RIGHT)
-    total_h = head + rows * (h + _X_LABEL) + (rows - 1) * _GAP + below + _FOOT
-    figure = new_figure(total_w, total_h)
-    panels, bars = [], []
-    for number in range(2):
-        column, row = (0, number) if stacked else (number, 0)
-        left = column * (_LEFT + w + _RIGHT) + _LEFT
-        bottom = total_h - head - (row + 1) * h - row * (_X_LABEL + _GAP)
-        panels.append(figure.add_axes((left / total_w, bottom / total_h, w / total_w, h / total_h)))
-        bars.append(figure.add_axes(((left + w + 0.1) / total_w, bottom / total_h, 0.13 / total_w, h / total_h)))
-        # Ticks are made when they are drawn, which a caller may do outside `styled`.
-        panels[-1].tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
-        panels[-1].grid(visible=False)
-    return figure, panels, bars
+    across = min(_WIDE if stacked else _SQUARE, _TALLEST * width / height)
+    columns = 1 if stacked else 2
+    return Sheet(
+        f"Flow around {plain(flow.robot.name, 50)}",
+        "\n".join(_conditions(flow, view)).replace("-", "−"),
+        width=columns * (across + _BESIDE),
+        heights=[across * height / width] * (3 - columns) + [_STRIP] * strip,
+        columns=columns,
+        notes=list(_notes(flow, view)),
+        sharey=False,
+    )
+
+
+def _draw_solids(axes: Axes, flow: Flow, view: _View) -> None:
+    """Glass and robot; the panel has its final size, for the wire is drawn in true thickness."""
+    unit, scale = view.lengths.factor, _inches(axes)[0] * 72.0 / float(np.ptp(view.x))
+    if flow.seat is not None:
+        draw_glass(axes, flow.seat, view.name, view.offset, unit)
+    drop = flow.prediction.batch.placement.tail_drop
+    draw_section(axes, flow.robot, view.name, view.offset, phase=flow.phase, unit=unit, points=scale, drop=drop)
+
+
+def _inches(axes: Axes) -> tuple[float, float]:
+    """Width and height of a panel, inches."""
+    place, dpi = axes.get_window_extent(), axes.get_figure(root=True).dpi
+    return place.width / dpi, place.height / dpi
 
 
 def _draw_colours(axes: Axes, view: _View, values: Values, colours: str, norm: Normalize) -> AxesImage:
     half_x, half_y = 0.5 * (view.x[1] - view.x[0]), 0.5 * (view.y[1] - view.y[0])
     box = (view.x[0] - half_x, view.x[-1] + half_x, view.y[0] - half_y, view.y[-1] + half_y)
-    limits = axes.get_xlim(), axes.get_ylim()
-    image = axes.imshow(values, extent=box, origin="lower", cmap=colours, norm=norm, interpolation="bilinear")
-    axes.set_xlim(limits[0])
-    axes.set_ylim(limits[1])
-    axes.set_aspect("equal")
-    return image
+    axes.set_autoscale_on(False)
+    return axes.imshow(
+        values, extent=box, origin="lower", cmap=colours, norm=norm, interpolation="bilinear", aspect="auto"
+    )
 
 
-def _draw_speed(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
+def _draw_speed(axes: Axes, view: _View) -> None:
     speed = np.sqrt(sum(view.values(f"velocity_{axis}") ** 2 for axis in "xyz"))
     known = speed[np.isfinite(speed)]
     scale = Scale.of(known, "m/s")
@@ -181,12 +182,12 @@ def _draw_speed(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
     floor = min(max(lowest, highest * 10.0**-_SPEED_DECADES), 0.5 * highest)
     shown = np.maximum(view.continued(speed) / scale.factor, 0.1 * floor)  # a logarithm knows no zero
     image = _draw_colours(axes, view, shown, "viridis", LogNorm(floor, highest))
-    _bar(figure, image, bar, f"speed ({scale.unit})", "min" if lowest < floor else "neither")
     steps = _round_steps(floor, highest, (1.0, 2.0, 5.0))
-    bar.set_yticks(steps if steps.size >= 2 else [floor, highest])
+    ticks = steps if steps.size >= 2 else np.array([floor, highest])
+    _add_bar(axes, image, f"speed ({scale.unit})", ticks, "min" if lowest < floor else "neither")
 
 
-def _draw_pressure(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
+def _draw_pressure(axes: Axes, view: _View) -> None:
     pressure = view.values("pressure")
     known = np.abs(pressure[np.isfinite(pressure)])
     highest = float(known.max()) if known.size and known.max() > 0 else 1.0
@@ -196,16 +197,17 @@ def _draw_pressure(figure: Figure, axes: Axes, bar: Axes, view: _View) -> None:
     # It peaks at the wire: on a linear scale the body's pressure would have no colour.
     norm = SymLogNorm(linthresh=threshold, vmin=-limit, vmax=limit, base=10)
     image = _draw_colours(axes, view, view.continued(pressure) / scale.factor, "RdBu_r", norm)
-    _bar(figure, image, bar, f"pressure ({scale.unit})")
     steps = _round_steps(threshold, limit, (1.0,))
-    bar.set_yticks([*(-steps[::-1]), 0.0, *steps])
+    _add_bar(axes, image, f"pressure ({scale.unit})", np.array([*(-steps[::-1]), 0.0, *steps]))
 
 
-def _bar(figure: Figure, image: AxesImage, bar: Axes, label: str, extend: str = "neither") -> None:
-    colour_bar = figure.colorbar(image, cax=bar, extend=extend, format=StrMethodFormatter("{x:.3g}"))
-    colour_bar.set_label(label)
-    bar.yaxis.set_minor_locator(NullLocator())
-    bar.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
+def _add_bar(axes: Axes, image: AxesImage, label: str, ticks: Values, extend: str = "neither") -> None:
+    slim = _inches(axes)[1] / 0.13
+    bar = axes.get_figure().colorbar(
+        image, ax=axes, label=label, ticks=ticks, extend=extend, format="{x:.3g}", pad=0.01, fraction=0.05, aspect=slim
+    )
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.ax.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
 
 
 def _round_steps(low: float, high: float, digits: tuple[float, ...]) -> Values:
@@ -215,14 +217,13 @@ def _round_steps(low: float, high: float, digits: tuple[float, ...]) -> Values:
     return steps[(steps >= low * (1 - 1e-9)) & (steps <= high * (1 + 1e-9))]
 
 
-def _draw_lines(figure: Figure, axes: Axes, view: _View) -> None:
+def _draw_lines(axes: Axes, view: _View) -> None:
     """Streamlines of the velocity's part in the plane; they end at solids."""
     parts = [view.values(f"velocity_{axis}") for axis in (view.first, view.second)]
     u, v = (np.ma.array(part, mask=~np.isfinite(part)) for part in parts)
     if min(u.shape) < 3 or u.mask.all():
         return
-    place = axes.get_position()
-    width, height = figure.get_size_inches() * (place.width, place.height)
+    width, height = _inches(axes)
     axes.streamplot(
         view.x,
         view.y,
@@ -271,33 +272,17 @@ def _at_glass(view: _View) -> tuple[Values, Values]:
     return view.x[there], pressure[upper[there], there]
 
 
-def _draw_strip(figure: Figure, above: Axes, view: _View) -> None:
-    """The pressure along the tube, below a panel that shows the plane."""
+def _draw_strip(axes: Axes, view: _View) -> None:
+    """The pressure along the tube."""
     x, pressure = _at_glass(view)
     scale = Scale.of(pressure, "Pa")
-    place, height = above.get_position(), float(figure.get_size_inches()[1])
-    bottom = place.y0 - (_X_LABEL + _GAP + _STRIP) / height
-    axes = figure.add_axes((place.x0, bottom, place.width, _STRIP / height))
     axes.plot(x, pressure / scale.factor, color=COLOURS["blue"], linewidth=1.4)
     axes.axhline(0.0, color="#888888", linewidth=0.6)
-    axes.set_xlim(above.get_xlim())
-    axes.set_title("c)", loc="left", pad=3, weight="bold")
-    axes.set_xlabel(above.get_xlabel())
+    axes.set_xlim(view.x[0], view.x[-1])
+    axes.set_xlabel(f"${view.first}$ ({view.lengths.unit})")
     axes.set_ylabel(f"pressure ({scale.unit})")
-    axes.tick_params(labelsize=8, colors="#333333", length=2.5, width=0.6)
     side = "upper glass" if view.second == "z" else "glass on the left"
     axes.set_title(f"at the {side}", loc="right", pad=3, size=8, color="#333333")
-
-
-def _write_words(figure: Figure, flow: Flow, words: list[str], notes: list[str]) -> None:
-    width, height = figure.get_size_inches()
-    left = 0.15 / width
-    title = f"Flow around {plain(flow.robot.name, 50)}"
-    figure.text(left, 1 - 0.12 / height, title, va="top", size=11, weight="bold")
-    lines = "\n".join(words).replace("-", "−")
-    figure.text(left, 1 - 0.36 / height, lines, va="top", size=9, color="#333", linespacing=1.25)
-    for number, line in enumerate(notes):
-        figure.text(left, (0.40 - 0.17 * number) / height, line, va="top", size=8, color="#333")
 
 
 def _conditions(flow: Flow, view: _View) -> Iterator[str]:

@@ -10,14 +10,14 @@ from matplotlib.figure import Figure
 
 from spirillum.arrays import Samples
 from spirillum.units import Hz
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["magnetic_figure"]
 
-_SIZE = (9.0, 6.0)
 _HELD = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
 
 
@@ -31,19 +31,18 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
     speed = dataset["forward_velocity"].values
     speeds = Scale.of(np.concatenate([speed, dataset["held_forward_velocity"].values]), "m/s")
     with styled():
-        figure = new_figure(*_SIZE)
-        figure.text(0.012, 0.968, f"{plain(dataset.attrs['robot'])} in a rotating field", weight="bold", va="center")
-        figure.text(
-            0.012,
-            0.934,
+        sheet = Sheet(
+            f"{plain(dataset.attrs['robot'])} in a rotating field",
             f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
             "computed, nothing is measured",
-            va="center",
-            size=8.0,
-            color="#555555",
+            width=9.0,
+            heights=[2.25, 2.25],
+            columns=2,
+            sharex=True,
+            sharey=False,
         )
-        panels = figure.subplots(2, 2, sharex=True).ravel()
-        figure.subplots_adjust(left=0.085, right=0.985, bottom=0.085, top=0.88, wspace=0.24, hspace=0.2)
+        panels = sheet.panels.ravel()
+        add_letters(panels)
         fine, turning, lag = _held(dataset)
         advance = float(dataset["held_forward_velocity"][0] / dataset["held_tail_rotation_rate"][0])
         panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
@@ -66,11 +65,9 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         panels[3].set_ylabel("moment behind field (deg)")
         panels[3].set_ylim(0.0, 95.0)
         _step_out(panels, float(dataset["step_out_rate"]) / Hz * float(np.sign(rate[0])))
-        for letter, axes in zip("abcd", panels, strict=True):
-            axes.set_title(f"{letter})", loc="left", weight="bold")
         for axes in panels[2:]:
             axes.set_xlabel("rotation rate of the field (Hz)")
-        return figure
+        return sheet.finished()
 
 
 def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:

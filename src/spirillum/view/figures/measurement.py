@@ -60,6 +60,7 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
 def trial_figure(trial: Trial) -> Figure:
     """Series of a trial with their lines, and what is left of them."""
     figure = new_figure(7.2, 5.4)
+    figure.set_layout_engine("constrained")
     panels = figure.subplots(3, 2, sharex=True, gridspec_kw={"width_ratios": (1.25, 1.0)})
     track = trial.track
     values = {
@@ -78,14 +79,13 @@ def trial_figure(trial: Trial) -> Figure:
     panels[0][1].set_title("what is left", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
-    figure.tight_layout()
     return figure
 
 
 def _say_synthetic(figure: Figure, *, synthetic: bool) -> None:
     """In the lower right corner, where a video says of itself that it is computed."""
     if synthetic:
-        figure.text(0.99, 0.015, "synthetic", ha="right", va="bottom", size=8.0, color="#9c3d00")
+        figure.supxlabel("synthetic", x=0.99, ha="right", size=8.0, color="#9c3d00")
 
 
 def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate, words: str, unit: str) -> None:
@@ -116,6 +116,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
 def trials_figure(measurement: Measurement) -> Figure:
     """Speeds and rates of all trials, with the mean over them."""
     figure = new_figure(7.2, 2.7)
+    figure.set_layout_engine("constrained")
     for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
         title, unit = _TITLES[name]
         items = [trial.quantities[name] for trial in measurement.trials]
@@ -139,5 +140,4 @@ def trials_figure(measurement: Measurement) -> Figure:
             axes.set_yticks([])
             axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color="#777777")
     _say_synthetic(figure, synthetic=any(trial.synthetic for trial in measurement.trials))
-    figure.tight_layout()
     return figure

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
-from spirillum.view.figures.sheet import Sheet
-from spirillum.view.figures.style import COLOURS, Scale, look_of_model, new_figure, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.style import COLOURS, Scale, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -36,27 +36,24 @@ def posterior_figure(found: Calibrated) -> Figure:
     count = len(names)
     colour = look_of_model(found.problem.model.name).colour
     with styled():
-        room, head, foot = 0.85, 0.75, 0.75
-        size = room + _CELL * count + 0.15
-        figure = new_figure(max(size, 5.5), size - room + head + foot)
-        width, height = figure.get_size_inches()
-        figure.text(
-            0.15 / width, 1 - 0.12 / height, "Posterior of the fitted numbers", va="top", size=11, weight="bold"
-        )
         synthetic = "synthetic, nothing is measured" if found.experiment.synthetic else "observed"
         words = f"{plain(found.experiment.source, 40)} ({synthetic}), model {found.problem.model.name}"
         words += "; contours hold 50 and 95 % of the draws" if count > 1 else ""
-        left_out = f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
-        figure.text(0.15 / width, 1 - 0.36 / height, words + left_out, va="top", size=9, color="#333")
+        words += f"; {len(every) - count} more are in posterior.nc" if len(every) > count else ""
+        sheet = Sheet(
+            "Posterior of the fitted numbers",
+            words,
+            width=max(1.0 + _CELL * count, 5.5),
+            heights=[_CELL - 0.1] * count,
+            columns=count,
+            sharey=False,
+        )
         for row, below in enumerate(names):
-            for column, name in enumerate(names[: row + 1]):
-                place = (
-                    (room + _CELL * column) / width,
-                    (foot + _CELL * (count - 1 - row)) / height,
-                    (_CELL - 0.1) / width,
-                    (_CELL - 0.1) / height,
-                )
-                axes = figure.add_axes(place)
+            for column, name in enumerate(names):
+                axes = sheet.panels[row, column]
+                if column > row:
+                    axes.remove()
+                    continue
                 if row == column:
                     _marginal(axes, every[name], colour)
                 else:
@@ -66,7 +63,7 @@ def posterior_figure(found: Calibrated) -> Figure:
                     axes.set_xlabel(_label(name), fontsize=7)
                 if column == 0 and row > 0:
                     axes.set_ylabel(_label(below), fontsize=7)
-        return figure
+        return sheet.finished()
 
 
 def _label(name: str) -> str:
@@ -131,17 +128,16 @@ def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
             "Profile likelihood",
             f"{plain(found.experiment.source, 40)}{synthetic}, model {found.problem.model.name}: least chi squared "
             "above the best fit",
-            rows,
-            columns,
-            panel=(1.72, 1.3),
+            width=width_of(columns, 1.72),
+            heights=[1.3] * rows,
+            columns=columns,
             notes=[
                 "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
                 "no limit there. The model's discrepancy is held; the wider intervals of the table do not hold it.",
             ],
-            labelled_rows=frozenset(range(rows - 1)),
         )
-        figure, panels = sheet.draw()
-        every = [axes for row in panels for axes in row]
+        every = list(sheet.panels.flat)
+        add_letters(every)
         units = {item.label: item.parameter.unit for item in found.problem.coordinates}
         for axes, profile in zip(every, profiles, strict=False):
             scale = Scale.of(np.abs(profile.values), units[profile.label]) if units[profile.label] else None
@@ -156,6 +152,6 @@ def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         for axes in every[len(profiles) :]:
             axes.remove()
-        for row in panels:
+        for row in sheet.panels:
             row[0].set_ylabel(r"$\Delta\chi^2$")
-        return figure
+        return sheet.finished()

@@ -9,11 +9,10 @@ from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from spirillum.dynamics.settling import Settling
 from spirillum.units import Hz
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 __all__ = ["settling_figure"]
-
-_SIZE = (9.0, 3.5)
 
 
 def settling_figure(settling: Settling) -> Figure:
@@ -23,26 +22,22 @@ def settling_figure(settling: Settling) -> Figure:
         settling: what `spirillum.settle` returns.
     """
     with styled():
-        figure = new_figure(*_SIZE)
         motion = settling.prediction
-        figure.text(0.012, 0.955, f"{plain(settling.robot.name)}: settling in the tube", weight="bold", va="center")
-        figure.text(
-            0.012,
-            0.895,
+        sheet = Sheet(
+            f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
             "level, from the lowest place · computed, nothing is measured",
-            va="center",
-            size=8.0,
-            color="#555555",
+            width=9.0,
+            heights=[2.2],
+            columns=3,
+            sharey=False,
         )
-        panels = figure.subplots(1, 3)
-        figure.subplots_adjust(left=0.065, right=0.985, bottom=0.15, top=0.79, wspace=0.32)
+        panels = sheet.panels[0]
+        add_letters(panels)
         _gap(panels[0], settling)
         _azimuth(panels[1], settling)
         _resistance(panels[2], settling)
-        for letter, axes in zip("abc", panels, strict=True):
-            axes.set_title(f"{letter})", loc="left", weight="bold")
-        return figure
+        return sheet.finished()
 
 
 def _gap(axes: Axes, settling: Settling) -> None:

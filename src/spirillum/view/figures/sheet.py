@@ -1,161 +1,120 @@
-"""A sheet of lettered panels, laid out in inches: title, legend, rows of panels, notes."""
+"""A sheet of panels with title, subtitle, legends and notes; matplotlib's constrained layout finds room for them."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from itertools import count, product
+from string import ascii_lowercase
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 
-from spirillum.view.figures.style import new_figure, readable
+from spirillum.view.figures.style import lay_out, new_figure
 
-__all__ = ["Sheet"]
+__all__ = ["Sheet", "add_letters", "width_of"]
 
-_LEFT, _RIGHT = 0.82, 0.12
-_COLUMN_GAP, _ROW_GAP = 0.14, 0.34
-_X_LABEL = 0.42
 _NARROWEST = 5.2
-_LINE = 0.17
-_LEGEND_LINE = 0.21
-_LETTERS_PER_INCH = 16.0
-_WORDS = re.compile(r"(?:(?<!\\)\$.*?(?<!\\)\$|\S|\u00a0)+")
+_MARGINS, _GAP = 0.94, 0.14
+"""Typical room for the labels beside a row of panels, and between panels, inches."""
+_EDGE = 0.012
+"""Free edge at the left and at the right, share of the width."""
 
 
-def _letter(number: int) -> str:
-    """a) b) ... z) aa) ab) as the paper letters its panels."""
-    alphabet = "abcdefghijklmnopqrstuvwxyz"
-    return f"{alphabet[number // 26 - 1] if number >= 26 else ''}{alphabet[number % 26]})"
+def width_of(columns: int, panel: float) -> float:
+    """Width of a sheet whose `columns` panels are about `panel` inches wide."""
+    return max(_MARGINS + columns * panel + (columns - 1) * _GAP, _NARROWEST)
 
 
-@dataclass
+def add_letters(panels: Iterable[Axes]) -> None:
+    """Letter panels a) b) ... z) aa) ab) as journals do."""
+    names = ("".join(letters) for size in count(1) for letters in product(ascii_lowercase, repeat=size))
+    for axes, name in zip(panels, names, strict=False):
+        axes.set_title(f"{name})", loc="left", pad=3, weight="bold")
+
+
 class Sheet:
-    """Sizes of a sheet, from which its figure follows."""
+    """A figure with a grid of panels of given height below title, subtitle and legend, notes at the foot.
 
-    title: str
-    subtitle: str
-    rows: int
-    columns: int
-    panel: tuple[float, float] = (1.72, 1.5)
-    """Width and height of a panel, inches."""
-    notes: Sequence[str] = ()
-    legend: Sequence[Line2D] = ()
-    labelled_rows: frozenset[int] = frozenset()
-    """Rows, besides the last, under which the horizontal axis is labelled."""
-    legends_above: dict[int, Sequence[Line2D]] = field(default_factory=dict)
-    """A legend of its own above a row."""
-    tick_room: float = 0.0
-    """Additional height below the last row, for long tick labels."""
+    Args:
+        title: bold, in the first line.
+        subtitle: below the title, wrapped to the width.
+        width: width of the figure, inches; see `width_of`.
+        heights: height of the panels of each row, inches.
+        columns: number of columns.
+        notes: sentences at the foot, each wrapped to the width; a formula in them must not contain a space.
+        legend: entries between subtitle and panels.
+        legend_below: entries between panels and notes.
+        sharex: which panels share their horizontal axes, as in `Figure.subplots`.
+        sharey: which panels share their vertical axes, as in `Figure.subplots`.
 
-    @property
-    def width(self) -> float:
-        """Width of the sheet, inches."""
-        return max(_LEFT + self.columns * self.panel[0] + (self.columns - 1) * _COLUMN_GAP + _RIGHT, _NARROWEST)
+    Attributes:
+        figure: the figure.
+        panels: the panels, (rows, columns).
+    """
 
-    @property
-    def panel_width(self) -> float:
-        """Width of a panel: wider than asked for where few columns leave room, inches."""
-        return (self.width - _LEFT - _RIGHT - (self.columns - 1) * _COLUMN_GAP) / self.columns
-
-    def _wrapped(self, text: str) -> list[str]:
-        """Lines that fit the sheet; a formula counts as long as it looks, and is never broken."""
-        lines: list[str] = [""]
-        for word in _WORDS.findall(text):
-            longer = f"{lines[-1]} {word}".strip()
-            if len(readable(longer)) <= int((self.width - 0.3) * _LETTERS_PER_INCH):
-                lines[-1] = longer
-            else:
-                lines.append(word)
-        return lines
-
-    def _legend_height(self, handles: Sequence[Line2D]) -> float:
-        return _LEGEND_LINE * len(self._legend_lines(handles)) + 0.04 if handles else 0.0
-
-    def _legend_lines(self, handles: Sequence[Line2D]) -> list[list[Line2D]]:
-        """Entries of a legend broken into lines that fit the sheet."""
-        lines: list[list[Line2D]] = [[]]
-        used = 0.0
-        for handle in handles:
-            need = 0.6 + 0.067 * len(readable(str(handle.get_label())))
-            if lines[-1] and used + need > self.width - 0.2:
-                lines.append([])
-                used = 0.0
-            lines[-1].append(handle)
-            used += need
-        return lines
-
-    def draw(self) -> tuple[Figure, list[list[Axes]]]:
-        """The figure with its empty panels; every row shares its vertical axis."""
-        notes = [line for note in self.notes for line in self._wrapped(note)]
-        head = 0.12 + 0.24 + _LINE * len(self._wrapped(self.subtitle)) + 0.08
-        below = [self._gap_below(row) for row in range(self.rows)]
-        foot = _LINE * len(notes) + 0.1
-        top_legend = self._legend_height(self.legend)
-        height = head + top_legend + 0.26 + self.rows * self.panel[1] + sum(below) + foot
-        figure = new_figure(self.width, height)
-        self._write_head(figure, height)
-        y = height - head
-        self._write_legend(figure, self.legend, y, height)
-        y -= top_legend + 0.26
-        panels: list[list[Axes]] = []
-        for row in range(self.rows):
-            panels.append(self._row(figure, row, y, height))
-            y -= self.panel[1] + below[row]
-            if row + 1 in self.legends_above:
-                extra = self.legends_above[row + 1]
-                self._write_legend(figure, extra, y + self._legend_height(extra) + 0.24, height)
-        for number, line in enumerate(notes):
-            figure.text(
-                0.15 / self.width, (foot - 0.05 - _LINE * number) / height, line, va="top", size=8, color="#333"
-            )
-        return figure, panels
-
-    def _gap_below(self, row: int) -> float:
-        last = row == self.rows - 1
-        gap = _X_LABEL + self.tick_room if last else _ROW_GAP
-        if row in self.labelled_rows and not last:
-            gap = _X_LABEL + 0.26
-        return gap + self._legend_height(self.legends_above.get(row + 1, ()))
-
-    def _write_head(self, figure: Figure, height: float) -> None:
-        left = 0.15 / self.width
-        figure.text(left, 1 - 0.12 / height, self.title, va="top", size=11, weight="bold")
-        subtitle = "\n".join(self._wrapped(self.subtitle))
-        figure.text(left, 1 - 0.36 / height, subtitle, va="top", size=9, color="#333", linespacing=1.25)
-
-    def _write_legend(self, figure: Figure, handles: Sequence[Line2D], y: float, height: float) -> None:
-        """Lines of legend entries, the first with its top at `y` inches."""
-        if not handles:
-            return
-        for number, line in enumerate(self._legend_lines(handles)):
-            figure.legend(
-                handles=line,
-                loc="upper left",
-                bbox_to_anchor=(0.13 / self.width, (y - _LEGEND_LINE * number) / height),
-                ncol=len(line),
-                borderpad=0.1,
-                borderaxespad=0.1,
-                columnspacing=1.3,
-                handletextpad=0.5,
-                handlelength=2.6,
-            )
-
-    def _row(self, figure: Figure, row: int, top: float, height: float) -> list[Axes]:
-        found: list[Axes] = []
-        for column in range(self.columns):
-            left = _LEFT + column * (self.panel_width + _COLUMN_GAP)
-            place = (
-                left / self.width,
-                (top - self.panel[1]) / height,
-                self.panel_width / self.width,
-                self.panel[1] / height,
-            )
-            axes = figure.add_axes(place, sharey=found[0] if found else None)
-            axes.set_title(_letter(row * self.columns + column), loc="left", pad=3, weight="bold")
-            axes.tick_params(labelleft=column == 0, length=2.5, width=0.6)
+    def __init__(
+        self,
+        title: str,
+        subtitle: str,
+        *,
+        width: float,
+        heights: Sequence[float],
+        columns: int,
+        notes: Sequence[str] = (),
+        legend: Sequence[Line2D] = (),
+        legend_below: Sequence[Line2D] = (),
+        sharex: bool | Literal["none", "all", "row", "col"] = False,
+        sharey: bool | Literal["none", "all", "row", "col"] = "row",
+    ) -> None:
+        self.heights = heights
+        self.figure = new_figure(width, 1.5 + 1.2 * sum(heights))
+        rect = (_EDGE, 0.0, 1.0 - 2.0 * _EDGE, 1.0)
+        self.figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.06, wspace=0.0, hspace=0.0, rect=rect)
+        # One title and one legend find room in a figure; the next ones stand in figures within it.
+        outer = self.figure.subfigures()
+        left: Any = {"x": 0.0, "ha": "left", "wrap": True}
+        outer.suptitle(title, size=11, weight="bold", **left)
+        if notes:
+            outer.supxlabel("\n".join(notes), size=8, color="#333333", **left)
+        middle = outer.subfigures()
+        middle.suptitle(subtitle, size=9, color="#333333", **left)
+        inner = middle.subfigures()
+        _add_legend(inner, legend, "outside upper left")
+        _add_legend(inner, legend_below, "outside lower left")
+        ratios = {"height_ratios": heights}
+        self.panels = inner.subplots(
+            len(heights), columns, sharex=sharex, sharey=sharey, squeeze=False, gridspec_kw=ratios
+        )
+        for axes in self.panels.flat:
             # Ticks are made when they are drawn, which a caller may do outside `styled`.
-            axes.tick_params(labelsize=8, colors="#333333", grid_color="#dddddd", grid_linewidth=0.5)
-            found.append(axes)
-        return found
+            axes.tick_params(length=2.5, width=0.6, labelsize=8, colors="#333333")
+            axes.tick_params(grid_color="#dddddd", grid_linewidth=0.5)
+
+    def finished(self, shape: float | None = None) -> Figure:
+        """The figure, as high as its panels need; nothing moves any more.
+
+        Args:
+            shape: height over width of the panels of the first row, instead of their height.
+        """
+        lay_out(self.figure)
+        first, dpi = self.panels[0, 0].get_window_extent(), self.figure.dpi
+        height = self.heights[0] if shape is None else shape * first.width / dpi
+        missing = (height - first.height / dpi) * sum(self.heights) / self.heights[0]
+        self.figure.set_figheight(self.figure.get_figheight() + missing)
+        lay_out(self.figure)
+        self.figure.set_layout_engine("none")
+        return self.figure
+
+
+def _add_legend(figure: SubFigure, handles: Sequence[Line2D], place: str) -> None:
+    """A legend in as few lines as the width allows."""
+    for columns in range(len(handles), 0, -1):
+        by_rows = [handle for column in range(columns) for handle in handles[column::columns]]
+        legend = figure.legend(
+            handles=by_rows, loc=place, ncols=columns, columnspacing=1.3, handletextpad=0.5, handlelength=2.6
+        )
+        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()

@@ -16,7 +16,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator
 from spirillum.view.figures.evidence import PaperFigure, Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
-from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.style import Scale, plain
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Picture", "study_figures"]
 
+PANEL = (1.72, 1.5)
+"""Width and height of a panel of a grid of tails, inches."""
 MOST_COLUMNS = 6
 """Wavelengths of one figure."""
 MOST_FIGURES = 4
@@ -143,35 +145,34 @@ def _draw_channel(
     rows: Sequence[Row],
     notes: Sequence[str],
 ) -> Figure:
-    rates = [number for number, row in enumerate(rows) if row.across == "rates"]
     sheet = Sheet(
         title,
         shown.source_line,
-        len(rows),
-        len(wavelengths),
+        width=width_of(len(wavelengths), PANEL[0]),
+        heights=[PANEL[1]] * len(rows),
+        columns=len(wavelengths),
         notes=notes,
         legend=model_handles(shown, own_drive=not shown.observed),
-        labelled_rows=frozenset(number - 1 for number in rates),
-        legends_above={number: amplitude_handles(shown) for number in rates},
+        legend_below=amplitude_handles(shown) if rows[-1].across == "rates" else (),
     )
-    figure, panels = sheet.draw()
+    add_letters(sheet.panels.flat)
     scale = Scale.of(np.asarray(shown.whole["amplitude"].values, dtype=float), "m")
     for number, row in enumerate(rows):
-        for axes, wavelength in zip(panels[number], wavelengths, strict=True):
+        labelled = number == len(rows) - 1 or rows[number + 1].across != row.across
+        for axes, wavelength in zip(sheet.panels[number], wavelengths, strict=True):
             part = shown.part(channel=channel, wavelength=wavelength)
             x = scale(np.asarray(shown.whole["amplitude"].values, dtype=float)[amplitudes])
             row.draw(axes, part if row.across == "rates" else part.part(amplitude=amplitudes), x)
             if row.across == "tails":
                 tail_axis(axes, x)
-            labelled = number == len(rows) - 1 or number in sheet.labelled_rows
             axes.tick_params(labelbottom=labelled)
             if labelled:
                 rate = row.across == "rates"
                 axes.set_xlabel("assumed $\\omega_m$ (Hz)" if rate else f"wave amplitude $B_o$ ({scale.unit})")
             if number == 0:
                 head_column(axes, shown, wavelength)
-        _finish_row(panels[number], row)
-    return figure
+        _finish_row(sheet.panels[number], row)
+    return sheet.finished()
 
 
 def _finish_row(panels: Sequence[Axes], row: Row) -> None:
@@ -216,7 +217,7 @@ def _bound_picture(shown: Shown) -> Picture:
     if any(shown.paper_speed(channel) for channel in channels):
         notes.append(
             "Dashed black: the speed behind the paper's largest Reynolds number if its length is the body's diameter "
-            "(the paper does not say), $U = Re\\,\\mu/(\\rho D_b)$."
+            "(the paper does not say), $U\\,=\\,Re\\,\\mu/(\\rho\\,D_b)$."
         )
     part = shown.part(channel=channels, wavelength=wavelengths)
     notes += [
@@ -235,8 +236,16 @@ def _bound_picture(shown: Shown) -> Picture:
 def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title: str, notes: Sequence[str]) -> Figure:
     speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
     legend = [*model_handles(shown, own_drive=True), *_paper_entry(shown, channels, speed_scale)]
-    sheet = Sheet(title, shown.source_line, len(channels), len(wavelengths), notes=notes, legend=legend)
-    figure, panels = sheet.draw()
+    sheet = Sheet(
+        title,
+        shown.source_line,
+        width=width_of(len(wavelengths), PANEL[0]),
+        heights=[PANEL[1]] * len(channels),
+        columns=len(wavelengths),
+        notes=notes,
+        legend=legend,
+    )
+    add_letters(sheet.panels.flat)
     amplitudes = spread(shown.whole.sizes["amplitude"], MOST_TAILS)
     values = np.asarray(shown.whole["amplitude"].values, dtype=float)
     scale = Scale.of(values, "m")
@@ -244,8 +253,8 @@ def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title
     row = bound_row(shown)
     what = "upper bound" if shown.upper_bound else "own drive"
     for number, channel in enumerate(channels):
-        name = plain(str(shown.whole["channel"].values[channel]), 24)
-        for axes, wavelength in zip(panels[number], wavelengths, strict=True):
+        name = plain(str(shown.whole["channel"].values[channel]), 22)
+        for axes, wavelength in zip(sheet.panels[number], wavelengths, strict=True):
             row.draw(axes, shown.part(channel=channel, wavelength=wavelength, amplitude=amplitudes), x)
             tail_axis(axes, x)
             last = number == len(channels) - 1
@@ -257,8 +266,8 @@ def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title
             speed = shown.paper_speed(channel)
             if speed is not None:
                 axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)
-        _finish_row(panels[number], Row(f"{name}: {what}\n$U_x$ ({speed_scale.unit})", row.draw))
-    return figure
+        _finish_row(sheet.panels[number], Row(f"{name}\n{what} $U_x$ ({speed_scale.unit})", row.draw))
+    return sheet.finished()
 
 
 def _paper_entry(shown: Shown, channels: Sequence[int], scale: Scale) -> list[Line2D]:
@@ -296,12 +305,19 @@ def _draw_robots(shown: Shown, places: list[int], title: str, rows: Sequence[Row
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)
     upright = _TICK_LETTER * longest * len(names) < width
-    room = _TICK_LETTER * longest if named and not upright else 0.0
     legend = model_handles(shown, own_drive=not shown.observed)
-    sheet = Sheet(title, shown.source_line, len(rows), 1, (width, 1.6), notes=notes, legend=legend, tick_room=room)
-    figure, panels = sheet.draw()
+    sheet = Sheet(
+        title,
+        shown.source_line,
+        width=width_of(1, width),
+        heights=[1.6] * len(rows),
+        columns=1,
+        notes=notes,
+        legend=legend,
+    )
+    add_letters(sheet.panels.flat)
     x = np.asarray(places, dtype=float)
-    for number, (row, (axes,)) in enumerate(zip(rows, panels, strict=True)):
+    for number, (row, axes) in enumerate(zip(rows, sheet.panels.flat, strict=True)):
         row.draw(axes, shown.part(robot=places), x)
         axes.set_xlim(-0.6, shown.whole.sizes["robot"] - 0.4)
         last = number == len(rows) - 1
@@ -311,4 +327,4 @@ def _draw_robots(shown: Shown, places: list[int], title: str, rows: Sequence[Row
         if last and not named:
             axes.set_xlabel("place of the robot in the list, from 0")
         _finish_row([axes], row)
-    return figure
+    return sheet.finished()

@@ -25,6 +25,7 @@ __all__ = [
     "Look",
     "Scale",
     "label_of_model",
+    "lay_out",
     "look_of_model",
     "new_figure",
     "plain",
@@ -162,6 +163,13 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height))
     FigureCanvasAgg(figure)
     return figure
+
+
+def lay_out(figure: Figure) -> None:
+    """Place panels and words of a figure with a layout engine, without drawing them."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
 
 
 def plain(text: str, longest: int = 60) -> str:

@@ -15,17 +15,16 @@ from matplotlib.figure import Figure
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.units import Hz
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["trajectory_figure"]
 
-_WIDTH, _PATHS, _PANEL, _HEAD, _FOOT = 9.0, 1.75, 1.35, 0.78, 0.52
-"""Width of the figure; heights of the paths, of a panel over time, above and below them, inches."""
-_LEFT, _RIGHT, _BETWEEN, _BELOW, _GAP = 0.80, 0.20, 0.85, 0.55, 0.16
-"""Margins, and room between panels for labels, inches."""
+_WIDTH, _PATHS, _PANEL = 9.0, 1.75, 1.25
+"""Width of the figure; heights of the paths and of a panel over time, inches."""
 _MOST_EVENTS = 12
 _DECADES = 5
 """Range of a logarithmic axis."""
@@ -117,41 +116,42 @@ def trajectory_figure(dataset: xr.Dataset) -> Figure:
     if path is None and not shown:
         raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
     events = _events_of(dataset, time)
+    facts = [
+        f"{name} {plain(str(dataset.attrs[name]), 40)}"
+        for name in ("model", "motion", "friction")
+        if dataset.attrs.get(name)
+    ]
     with styled():
-        notes = _event_words(events)
-        rows = -(-len(shown) // 2)
-        top = _PATHS + _BELOW + 0.1 if path is not None else 0.0
-        height = _HEAD + top + rows * _PANEL + _GAP * max(rows - 1, 0) + _FOOT + 0.17 * len(notes)
-        figure = new_figure(_WIDTH, height)
-        _write_words(figure, dataset, notes)
-        letters = iter("abcdefghijklmnop")
-        half = 0.5 * (_WIDTH - _LEFT - _RIGHT - _BETWEEN)
+        sheet = Sheet(
+            f"{plain(str(dataset.attrs.get('robot', 'a robot')), 50)}: a run in time",
+            " · ".join([*facts, "computed, nothing is measured"]),
+            width=_WIDTH,
+            heights=[_PATHS] * (path is not None) + [_PANEL] * -(-len(shown) // 2),
+            columns=2,
+            notes=_event_words(events),
+            sharey=False,
+        )
+        panels = iter(sheet.panels.flat)
         if path is not None:
-            for column, (name, across) in enumerate((("side", 2), ("from above", 1))):
-                box = (_LEFT + column * (half + _BETWEEN), height - _HEAD - _PATHS, half, _PATHS)
-                _draw_path(_axes(figure, box), path, across, name, next(letters))
-        first: Axes | None = None
+            for name, across in (("side", 2), ("from above", 1)):
+                _draw_path(next(panels), path, across, name)
+        over_time = []
         for number, panel in enumerate(shown):
-            row, column = number // 2, number % 2
-            bottom = height - _HEAD - top - (row + 1) * _PANEL - _GAP * row
-            axes = _axes(figure, (_LEFT + column * (half + _BETWEEN), bottom + 0.1, half, _PANEL - 0.1), share=first)
-            first = first or axes
-            _draw_panel(axes, dataset, panel, time, next(letters))
-            _mark_events(axes, events, numbered=row == 0)
-            last = number + 2 >= len(shown)
-            axes.tick_params(labelbottom=last)
-            if last:
+            axes = next(panels)
+            _draw_panel(axes, dataset, panel, time)
+            _mark_events(axes, events, numbered=number < 2)
+            axes.set_xlim(float(time[0]), float(time[-1]))
+            over_time.append(axes)
+            if number + 2 < len(shown):
+                axes.tick_params(labelbottom=False)
+            else:
                 axes.set_xlabel("time (s)")
-        if first is not None:
-            first.set_xlim(float(time[0]), float(time[-1]))
-        return figure
-
-
-def _axes(figure: Figure, box: tuple[float, float, float, float], share: Axes | None = None) -> Axes:
-    """Axes in inches from the lower left corner."""
-    width, height = figure.get_size_inches()
-    place = (box[0] / width, box[1] / height, box[2] / width, box[3] / height)
-    return figure.add_axes(place, sharex=share)
+        for axes in panels:
+            axes.remove()
+        for axes in over_time[1:]:
+            axes.sharex(over_time[0])
+        add_letters(axes for axes in sheet.panels.flat if axes.figure is not None)
+        return sheet.finished()
 
 
 def _time_of(dataset: xr.Dataset) -> Samples:
@@ -179,7 +179,7 @@ def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> Iterator[tuple[
                 yield words, values
 
 
-def _draw_path(axes: Axes, path: Samples, across: int, name: str, letter: str) -> None:
+def _draw_path(axes: Axes, path: Samples, across: int, name: str) -> None:
     lengths = Scale.of(np.ptp(path[np.isfinite(path).all(axis=1)], axis=0), "m")
     x, y = lengths(path[:, 0]), lengths(path[:, across])
     axes.plot(x, y, color=COLOURS["blue"])
@@ -188,7 +188,6 @@ def _draw_path(axes: Axes, path: Samples, across: int, name: str, letter: str) -
     axes.set_xlabel(f"$x$ ({lengths.unit})")
     axes.set_ylabel(f"${'xyz'[across]}$ ({lengths.unit})")
     _widen(axes, x, y)
-    axes.set_title(f"{letter})", loc="left", pad=3, weight="bold")
     axes.set_title(f"path, {name}; scales differ", loc="right", pad=3, size=8, color="#555555")
 
 
@@ -201,7 +200,7 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, letter: str) -> None:
+def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples) -> None:
     lines = list(_lines(dataset, panel, time))
     values = np.concatenate([line for _, line in lines])
     scale = Scale(1.0, panel.unit) if panel.unit in ("Hz", "deg") else Scale.of(values, panel.unit)
@@ -223,7 +222,6 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, l
     elif panel.lines[0][0] == "wall_gap":
         axes.set_ylim(bottom=min(0.0, float(np.nanmin(values)) / scale.factor))
     axes.set_ylabel(f"{panel.label} ({scale.unit})")
-    axes.set_title(f"{letter})", loc="left", pad=2, size=8.5, weight="bold")
     if any(words for words, _ in lines):
         axes.legend(loc="upper right", ncols=4, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2)
         _make_room(axes)
@@ -249,17 +247,11 @@ def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
 
 
 def _event_words(events: list[tuple[float, str]]) -> list[str]:
-    """The events by number, a few to a line."""
+    """The events by number, in one note."""
     words = [f"{number}: {what} ({when:.4g} s)" for number, (when, what) in enumerate(events[:_MOST_EVENTS], 1)]
     if len(events) > _MOST_EVENTS:
         words.append(f"and {len(events) - _MOST_EVENTS} more")
-    lines: list[str] = []
-    for word in words:
-        if lines and len(lines[-1]) + len(word) < 130:
-            lines[-1] += f" · {word}"
-        else:
-            lines.append(word)
-    return lines
+    return [" · ".join(words)] if words else []
 
 
 def _mark_events(axes: Axes, events: list[tuple[float, str]], *, numbered: bool) -> None:
@@ -280,21 +272,3 @@ def _crowded(events: list[tuple[float, str]], place: int) -> int:
     for close in near:
         level = 1 - level if close else 0
     return level
-
-
-def _write_words(figure: Figure, dataset: xr.Dataset, notes: list[str]) -> None:
-    height = float(figure.get_size_inches()[1])
-    attrs = dataset.attrs
-    figure.text(
-        0.012,
-        1 - 0.16 / height,
-        f"{plain(str(attrs.get('robot', 'a robot')), 50)}: a run in time",
-        weight="bold",
-        va="top",
-        size=11,
-    )
-    facts = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
-    line = " · ".join([*facts, "computed, nothing is measured"])
-    figure.text(0.012, 1 - 0.40 / height, line, va="top", size=8.0, color="#555555")
-    for number, note in enumerate(reversed(notes)):
-        figure.text(0.012, (0.10 + 0.17 * number) / height, note, size=7.5, color="#333333")
