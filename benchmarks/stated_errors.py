@@ -21,7 +21,8 @@ import numpy as np
 
 import spirillum as sp
 from spirillum.fluid.wire.interaction import Resolution, solve
-from spirillum.fluid.wire.slender import robot_solution, solids_of, tail_wire
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.fluid.wire.slender import robot_solution
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire, wire_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline, cylinder_outline
@@ -187,11 +188,11 @@ def times(*, baseline: bool) -> Row:
         fields = {"model.slender.accuracy": accuracy}
         batch = RobotBatch.of(sp.load(TAIL, **ROBOT, **fields))
         coupled = RobotBatch.of(sp.load(TAIL, **fields))
-        wire = tail_wire(batch, 0)
+        wire = RobotGeometry.of(batch).wire()
         found[f"tail 6x6, {accuracy}"] = _best(lambda w=wire, a=accuracy: _resistance(w, a))
         found[f"robot 12x12, {accuracy}"] = _best(lambda b=batch: robot_solution(b))
         found[f"robot with coupling 12x12, {accuracy}"] = _best(lambda b=coupled: robot_solution(b))
-    outline = solids_of(batch, 0)[0][1]
+    outline = RobotGeometry.of(batch).body
     found["body 6x6, standard"] = _best(lambda: solve([(outline, 0)], [], Resolution()))
     answer: Row = {"milliseconds": {name: round(1e3 * value, 2) for name, value in found.items()}}
     if baseline:

@@ -28,13 +28,13 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.model import END_LOSS
 from spirillum.fluid.tube.solids import Fineness, Solids
-from spirillum.fluid.tube.wall import Seat
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import with_resolution
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.placement import Placement
+from spirillum.robot.seat import Seat
 from spirillum.swimming.steady import swim
 
 Row = dict[str, Any]

@@ -17,8 +17,9 @@ MOMENT, FIELD = 1.0, 2.0
 def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
     """A made-up body of revolution that feels nothing but its own rotation; SI."""
     drive = np.zeros(20)
-    drive[0], drive[1], drive[2] = 3.0, 1.0, 1.0
-    drive[3], drive[5], drive[6] = MOMENT * np.cos(angle), MOMENT * np.sin(angle), FIELD
+    drive[[kernel.KIND, kernel.FIXED, kernel.DUTY]] = kernel.MAGNETIC, 1.0, 1.0
+    drive[kernel.MOMENT : kernel.FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
+    drive[kernel.FIELD] = FIELD
     drag = np.diag([1.0, 1.0, 1.0, along, across, across, 1.0])
     return TwoLinks(drag, np.zeros((7, 7)), np.zeros(8), np.array([np.inf, 1e-9, np.inf, 1.0]), np.zeros((0, 6)), drive)
 
@@ -26,7 +27,7 @@ def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
 def run_at(links: TwoLinks, rate: float, turns: float) -> np.ndarray:
     """Angle of the moment behind the field about x."""
     drive = links.drive.copy()
-    drive[7] = rate
+    drive[kernel.FIELD_RATE] = rate
     here = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
     start = np.zeros(kernel.STATES)
     start[kernel.ATTITUDE] = 1.0

@@ -11,11 +11,11 @@ import spirillum as sp
 from spirillum.dynamics.resting_forces import (
     Film,
     contact_line,
+    descent_of,
     film_of,
     lubrication_resistance,
     orbit_period,
     settled_azimuth,
-    settling_path,
     settling_time,
 )
 from spirillum.robot.outline import body_outline
@@ -55,7 +55,7 @@ def test_weight_holds_the_sideways_force_at_the_settled_azimuth() -> None:
 
 def test_distance_from_the_settled_azimuth_falls_by_e_in_the_settling_time() -> None:
     there = film(5e-4, sideways=0.012, across=1.6e9)  # sinks by 1 nm in 100 s
-    path = settling_path([there, film(5e-4 - 1e-9, sideways=0.012, across=1.6e9)], WEIGHT)
+    path = descent_of([there, film(5e-4 - 1e-9, sideways=0.012, across=1.6e9)], WEIGHT)
     left = settled_azimuth(0.012, WEIGHT) - path.azimuth
     late = (path.time > 30.0) & (path.time < 80.0)
     slope = np.polyfit(path.time[late], np.log(left[late]), 1)[0]
@@ -70,7 +70,7 @@ def test_once_around_takes_the_integral_of_the_inverse_rate() -> None:
 
 
 def test_straight_fall_takes_the_closed_form_of_a_power_law() -> None:
-    path = settling_path(power_law((1e-3, 5e-4, 2e-4)), WEIGHT)
+    path = descent_of(power_law((1e-3, 5e-4, 2e-4)), WEIGHT)
     exact = 2 * 2.5e-3 / WEIGHT * (2e-4**-0.5 - path.gap[0] ** -0.5)
     assert path.drained
     assert path.time[-1] == pytest.approx(exact, rel=1e-7)
@@ -81,7 +81,7 @@ def test_straight_fall_takes_the_closed_form_of_a_power_law() -> None:
 
 def test_sideways_force_slows_the_fall_and_turns_with_its_sign() -> None:
     gaps = (1e-3, 5e-4, 2e-4)
-    straight, right, left = (settling_path(power_law(gaps, force), WEIGHT) for force in (0.0, 0.01, -0.01))
+    straight, right, left = (descent_of(power_law(gaps, force), WEIGHT) for force in (0.0, 0.01, -0.01))
     assert right.time[-1] > straight.time[-1]
     assert right.time[-1] == pytest.approx(left.time[-1], rel=1e-9)
     assert right.azimuth == pytest.approx(-left.azimuth, rel=1e-7, abs=1e-12)
@@ -89,7 +89,7 @@ def test_sideways_force_slows_the_fall_and_turns_with_its_sign() -> None:
 
 
 def test_force_beyond_the_weight_carries_the_robot_up_and_the_gap_opens_again() -> None:
-    path = settling_path(power_law((1e-3, 5e-4, 1e-4), 0.1), WEIGHT)
+    path = descent_of(power_law((1e-3, 5e-4, 1e-4), 0.1), WEIGHT)
     assert not path.drained
     assert path.gap.min() > 1e-4
     assert path.gap[-1] == pytest.approx(path.gap[0], rel=1e-4)
@@ -145,7 +145,7 @@ def test_body_is_pushed_the_way_that_its_lowest_line_moves() -> None:
     body = answer.prediction.body_rotation_rate
     assert np.sign(answer.sideways_force) == np.sign(body) == -1  # the tail is right-handed
     assert answer.azimuth == pytest.approx(np.arcsin(answer.sideways_force / answer.weight))
-    assert answer.path.drained
+    assert answer.descent.drained
     assert answer.rests == "level"
 
 
@@ -187,7 +187,7 @@ def test_force_beyond_the_weight_is_told() -> None:
     content = answer.to_dict()
     assert content["azimuth"]["value"] is None
     assert content["orbit_period"]["value"] > 0
-    assert not answer.path.drained
+    assert not answer.descent.drained
     assert any("does not drain" in warning for warning in answer.warnings)
 
 

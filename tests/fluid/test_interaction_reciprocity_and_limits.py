@@ -139,10 +139,10 @@ def test_phase_against_a_tail_that_is_built_turned(wide: Any) -> None:
     phase = 0.7
     solution = robot_solution(wide)
     turn = axis_rotation(np.array([phase]))[0]
-    from spirillum.fluid.wire.slender import solids_of
+    from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
     wires = [(replace(w, points=w.points @ turn.T, tangents=w.tangents @ turn.T), 1) for w in solution.wires]
-    solids = [(outline, part) for _, outline, part in solids_of(wide, 0)]
+    solids = RobotGeometry.of(wide).solids("robot")
     anew = solve(solids, wires, Resolution(order=8, tolerance=1e-4)).matrix
     found = MODEL.resistance(wide, np.array([phase]))[0] / float(wide.viscosity[0])
     assert_same(anew, found, 1e-10)
@@ -233,10 +233,10 @@ def test_sphere_and_wire_against_faxen() -> None:
 
 def test_more_modes_and_nodes_change_little(wide: Any) -> None:
     """The error that a resolution announces by its tolerance is the one that it makes."""
-    from spirillum.fluid.wire.slender import solids_of, tail_wire
+    from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
-    solids = [(outline, part) for _, outline, part in solids_of(wide, 0)]
-    wires = [(tail_wire(wide, 0), 1)]
+    solids = RobotGeometry.of(wide).solids("robot")
+    wires = [(RobotGeometry.of(wide).wire(), 1)]
     fine = solve(solids, wires, Resolution(order=16, tolerance=1e-9))
     errors = []
     for order, tolerance in ((6, 1e-3), (8, 1e-4), (12, 1e-6)):

@@ -8,11 +8,12 @@ import pytest
 
 from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
-from spirillum.fluid.tube.wall import Seat, point_reflection, waves_between
+from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.fluid.wire.interaction import Resolution, solve
 from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.kernels.blobs import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
+from spirillum.robot.seat import Seat
 
 
 def ball(x: float, radius: float) -> Outline:

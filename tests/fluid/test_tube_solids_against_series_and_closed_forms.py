@@ -12,8 +12,8 @@ import pytest
 from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.model import END_LOSS
 from spirillum.fluid.tube.solids import Fineness, Solids
-from spirillum.fluid.tube.wall import Seat
 from spirillum.robot.outline import Outline, body_outline
+from spirillum.robot.seat import Seat
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 REFERENCE = json.loads((BENCHMARKS / "tube_reference.json").read_text(encoding="utf-8"))

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import exp1
 
-from spirillum.fluid.tube.wall import Seat, point_reflection, point_waves, waves_between
+from spirillum.fluid.tube.wall import point_reflection, point_waves, waves_between
+from spirillum.robot.seat import Seat
 
 EULER = 0.5772156649015329
 

@@ -13,11 +13,9 @@ from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Arc, Outline, body_outline, cylinder_outline, solid_outlines
 from spirillum.robot.seat import (
     STEEPEST_PITCH,
-    body_gap,
+    Seat,
     contact_pitch,
     largest_gap,
-    offset_for_gap,
-    tail_clearance,
 )
 
 R = 0.02
@@ -36,6 +34,13 @@ def in_tube(points: np.ndarray, e: float, pitch: float) -> np.ndarray:
     """Distance of points of the robot's frame from the tube's axis, by turning and shifting them."""
     x, y, z = points.T
     return np.hypot(y, -e + x * np.sin(pitch) + z * np.cos(pitch))
+
+
+def turned(points: np.ndarray, phase: float) -> np.ndarray:
+    """Points turned about the x axis."""
+    x, y, z = points.T
+    c, s = np.cos(phase), np.sin(phase)
+    return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)
 
 
 @lru_cache
@@ -61,7 +66,7 @@ def helix(phase: float = 0.0, count: int = 1501) -> np.ndarray:
 @given(e=offsets, pitch=pitches)
 def test_gap_against_points_on_the_surface(shape: str, e: float, pitch: float) -> None:
     brute = R - in_tube(surface(shape), e, pitch).max()
-    found = body_gap(SHAPES[shape], R, e, pitch)
+    found = Seat(R, e, pitch).clearance(SHAPES[shape])
     assert found <= brute + 1e-15  # no point of the surface is closer
     assert found == pytest.approx(brute, abs=1e-6)
 
@@ -72,54 +77,54 @@ def test_level_body(shape: str, share: float) -> None:
     """E = R - a - gap, and no gap is larger than R - a."""
     a = max(float(p.points(np.linspace(0, 1, 3))[1].max()) for p in SHAPES[shape].pieces)
     gap = (R - a) * (1 - share)
-    e = offset_for_gap(SHAPES[shape], R, gap)
+    e = Seat.at_gap(SHAPES[shape], R, gap).offset
     assert e == pytest.approx(R - a - gap, abs=1e-15)
-    assert body_gap(SHAPES[shape], R, e) == pytest.approx(gap, abs=1e-15)
+    assert Seat(R, e).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-15)
     assert largest_gap(SHAPES[shape], R) == pytest.approx(R - a, abs=1e-15)
-    assert np.isnan(offset_for_gap(SHAPES[shape], R, 1.001 * (R - a)))
+    assert np.isnan(Seat.at_gap(SHAPES[shape], R, 1.001 * (R - a)).offset)
 
 
 @given(e=offsets, pitch=pitches)
 def test_sphere_does_not_feel_its_pitch(e: float, pitch: float) -> None:
-    assert body_gap(SHAPES["sphere"], R, e, pitch) == pytest.approx(R - 0.009 - abs(e), abs=1e-12)
+    assert Seat(R, e, pitch).clearance(SHAPES["sphere"]) == pytest.approx(R - 0.009 - abs(e), abs=1e-12)
     shifted = Outline((Arc((-0.02, 0.0), (0.004, 0.004), (0.0, np.pi)),), ())  # off the centre of rotation
     centre = abs(-e - 0.02 * np.sin(pitch))
-    assert body_gap(shifted, R, e, pitch) == pytest.approx(R - 0.004 - centre, abs=1e-12)
+    assert Seat(R, e, pitch).clearance(shifted) == pytest.approx(R - 0.004 - centre, abs=1e-12)
 
 
 @given(e=offsets, pitch=pitches)
 def test_capsule_is_a_ball_along_a_line(e: float, pitch: float) -> None:
     """Two hemispheres and their hull: the ball's centre is farthest from the axis at one end of the line."""
     ends = np.abs(-e + np.array([1, -1]) * 0.0085 * np.sin(pitch))
-    assert body_gap(SHAPES["rounded"], R, e, pitch) == pytest.approx(R - 0.009 - ends.max(), abs=1e-12)
+    assert Seat(R, e, pitch).clearance(SHAPES["rounded"]) == pytest.approx(R - 0.009 - ends.max(), abs=1e-12)
 
 
 @given(gap=st.floats(1e-5, 3e-3), pitch=st.floats(0.0, np.radians(15)))
 def test_offset_of_a_pitched_capsule(gap: float, pitch: float) -> None:
-    e = offset_for_gap(SHAPES["rounded"], R, gap, pitch)
+    e = Seat.at_gap(SHAPES["rounded"], R, gap, pitch).offset
     assert e == pytest.approx(R - 0.009 - gap - 0.0085 * np.sin(pitch), abs=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["capsule", "cylinder", "spheroid"])
 @given(gap=st.floats(1e-5, 2e-3), pitch=st.floats(0.0, np.radians(20)))
 def test_offset_and_gap_are_inverse(shape: str, gap: float, pitch: float) -> None:
-    e = offset_for_gap(SHAPES[shape], R, gap, pitch)
-    assert body_gap(SHAPES[shape], R, e, pitch) == pytest.approx(gap, abs=1e-14)
-    assert body_gap(SHAPES[shape], R, e + 1e-5, pitch) < gap < largest_gap(SHAPES[shape], R, pitch)
+    e = Seat.at_gap(SHAPES[shape], R, gap, pitch).offset
+    assert Seat(R, e, pitch).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-14)
+    assert Seat(R, e + 1e-5, pitch).clearance(SHAPES[shape]) < gap < largest_gap(SHAPES[shape], R, pitch)
 
 
 def test_nose_at_the_top_leaves_no_place() -> None:
     steep = np.radians(44)
     assert largest_gap(SHAPES["rounded"], R, steep) == pytest.approx(R - 0.009 - 0.0085 * np.sin(steep), abs=1e-9)
-    assert np.isnan(offset_for_gap(SHAPES["rounded"], R, 0.0052, steep))
-    assert not np.isnan(offset_for_gap(SHAPES["rounded"], R, 0.005, steep))
+    assert np.isnan(Seat.at_gap(SHAPES["rounded"], R, 0.0052, steep).offset)
+    assert not np.isnan(Seat.at_gap(SHAPES["rounded"], R, 0.005, steep).offset)
 
 
 @given(e=st.floats(0.0, 0.005), pitch=pitches, drop=st.floats(0.0, 0.002))
 def test_straight_rod(e: float, pitch: float, drop: float) -> None:
     """A rod on the motor axis: its far end is lowest, -e - x sin(pitch) - drop cos(pitch)."""
     rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
-    found = tail_clearance(rod, 0.0005, R, e, pitch, drop)
+    found = Seat(R, e, pitch, drop).tail_clearance(rod, 0.0005)
     depth = e + 0.0875 * np.sin(pitch) + drop * np.cos(pitch)
     assert found.clearance == pytest.approx(R - 0.0005 - depth, abs=1e-15)
     assert found.index == 60 or pitch < 1e-12
@@ -129,18 +134,24 @@ def test_straight_rod(e: float, pitch: float, drop: float) -> None:
 def test_whole_turn_in_closed_form(e: float, pitch: float, drop: float) -> None:
     """The closed form is the limit of many phases, attained at the phase and point that it names."""
     points = helix(count=301)
-    whole = tail_clearance(points, 0.0005, R, e, pitch, drop)
-    many = tail_clearance(points, 0.0005, R, e, pitch, drop, np.linspace(0, 2 * np.pi, 361))
-    assert 0 <= many.clearance - whole.clearance + 1e-15 <= 0.0025 * np.radians(1) ** 2
-    there = tail_clearance(points, 0.0005, R, e, pitch, drop, np.array([whole.phase]))
-    assert there.clearance == pytest.approx(whole.clearance, abs=1e-14)
+    whole = Seat(R, e, pitch, drop).tail_clearance(points, 0.0005)
+    lowered = e + drop * np.cos(pitch)
+    phases = np.linspace(0, 2 * np.pi, 361)
+    many = min(R - 0.0005 - in_tube(turned(points, phase), lowered, pitch).max() for phase in phases)
+    assert 0 <= many - whole.clearance + 1e-15 <= 0.0025 * np.radians(1) ** 2
+    there = R - 0.0005 - in_tube(turned(points, whole.phase), lowered, pitch)
+    assert there.min() == pytest.approx(whole.clearance, abs=1e-14)
+    assert there[whole.index] == pytest.approx(whole.clearance, abs=1e-14)
 
 
 @given(phase=st.floats(0.0, 6.28), e=st.floats(0.0, 0.009), pitch=pitches)
 def test_phase_is_that_of_the_wires_equation(phase: float, e: float, pitch: float) -> None:
-    found = tail_clearance(helix(count=301), 0.0005, R, e, pitch, phases=np.array([phase]))
-    turned = in_tube(helix(phase, count=301), e, pitch)
-    assert found.clearance == pytest.approx(R - 0.0005 - turned.max(), abs=1e-14)
+    """The phase of closest approach does not depend on the phase at which the centreline is given."""
+    seat = Seat(R, e, pitch)
+    found, ahead = (seat.tail_clearance(helix(at, count=301), 0.0005) for at in (0.0, phase))
+    assert ahead.clearance == pytest.approx(found.clearance, abs=1e-14)
+    there = in_tube(helix(found.phase, count=301), e, pitch)
+    assert found.clearance == pytest.approx(R - 0.0005 - there.max(), abs=1e-14)
 
 
 def test_contact_of_a_straight_rod_against_its_angle() -> None:
@@ -158,11 +169,11 @@ def test_contact_of_the_papers_robot(batch_of: Callable[..., Any]) -> None:
     coupling = solid_outlines(body, 0.035, 0.008, 0.01, 0.0005)["coupling"]
     for gap in (1e-4, 5e-4, 1e-3):
         found = contact_pitch(body, helix(), 0.0005, R, gap, coupling=coupling)
-        e = offset_for_gap(body, R, gap, found)
-        assert tail_clearance(helix(), 0.0005, R, e, found).clearance == pytest.approx(0, abs=1e-10)
+        e = Seat.at_gap(body, R, gap, found).offset
+        assert Seat(R, e, found).tail_clearance(helix(), 0.0005).clearance == pytest.approx(0, abs=1e-10)
         steeper = found + 1e-4
-        lower = offset_for_gap(body, R, gap, steeper)
-        assert tail_clearance(helix(), 0.0005, R, lower, steeper).clearance < 0
+        lower = Seat.at_gap(body, R, gap, steeper).offset
+        assert Seat(R, lower, steeper).tail_clearance(helix(), 0.0005).clearance < 0
         assert contact_pitch(body, helix(), 0.0005, R, gap, tail_drop=1e-3) < found
 
 
@@ -170,8 +181,8 @@ def test_contact_is_bounded_by_coupling_nose_and_the_largest_pitch() -> None:
     body, stub = SHAPES["sphere"], np.array([[-0.0275, 0.0, 0.0], [-0.028, 0.0, 0.0]])
     thick = cylinder_outline(0.014, -0.0095, -0.027)
     by_coupling = contact_pitch(body, stub, 0.0005, R, 5e-4, coupling=thick)
-    e = offset_for_gap(body, R, 5e-4, by_coupling)
-    assert body_gap(thick, R, e, by_coupling) == pytest.approx(0, abs=1e-10)
+    e = Seat.at_gap(body, R, 5e-4, by_coupling).offset
+    assert Seat(R, e, by_coupling).clearance(thick) == pytest.approx(0, abs=1e-10)
     assert contact_pitch(body, stub, 0.0005, 0.03, 0.015) == STEEPEST_PITCH
     assert np.isnan(contact_pitch(body, stub, 0.0005, R, 5e-4, tail_drop=0.012))
     assert np.isnan(contact_pitch(body, stub, 0.0005, R, 0.0111))  # no place for that gap, even level

@@ -10,11 +10,11 @@ import pytest
 import spirillum as sp
 from spirillum.answer import quantity
 from spirillum.cli import main
-from spirillum.fluid.tube.place import WIRE_FILM
-from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry, wire_of_geometry
+from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import body_gap, offset_for_gap, tail_clearance
+from spirillum.robot.seat import Seat
 from spirillum.swimming.answer import Swimming
 from spirillum.swimming.band import TOLERANCE, at_place, band_places, left_open
 
@@ -58,13 +58,12 @@ def test_places_go_over_a_tenth_of_a_millimetre_to_one_and_from_level_to_contact
 
 
 def test_steepest_place_keeps_the_film_that_is_resolved(walled: Any) -> None:
-    g = Geometry.of(RobotBatch.of(sp.load(WIDE)), 0)
-    body = next(outline for name, outline, _ in solids_of_geometry(g) if name == "body")
-    wire = wire_of_geometry(g, 1.0)
+    g = RobotGeometry.of(RobotBatch.of(sp.load(WIDE)))
+    wire = g.wire()
     for place in places(walled)[2::3]:
-        offset = offset_for_gap(body, RADIUS, place.gap or 0.0, place.pitch or 0.0)
-        assert body_gap(body, RADIUS, offset, place.pitch or 0.0) == pytest.approx(place.gap)
-        clear = tail_clearance(wire.points, wire.radius, RADIUS, offset, place.pitch or 0.0).clearance
+        seat = Seat.at_gap(g.body, RADIUS, place.gap or 0.0, place.pitch or 0.0)
+        assert seat.clearance(g.body) == pytest.approx(place.gap)
+        clear = seat.tail_clearance(wire.points, wire.radius).clearance
         assert WIRE_FILM * wire.radius <= clear < (WIRE_FILM + 0.2) * wire.radius
 
 

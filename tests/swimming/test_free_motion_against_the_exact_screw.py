@@ -85,10 +85,10 @@ def test_lateral_freedom_costs_a_little_speed() -> None:
 def test_reversed_tail_retraces_the_path() -> None:
     links = links_of(robot())
     drive = links.drive.copy()
-    drive[0], drive[3] = 2.0, 8.0  # a prescribed rate
+    drive[kernel.KIND], drive[kernel.GIVEN] = kernel.RATE, 8.0
     there = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
     drive = drive.copy()
-    drive[3] = -8.0
+    drive[kernel.GIVEN] = -8.0
     back = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
     start = np.zeros(kernel.STATES)
     start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = (0.8, 0.3, -0.1, np.sqrt(1 - 0.74))

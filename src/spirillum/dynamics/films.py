@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.kernels import two_links as kernel
 from spirillum.robot.robot import Robot
 
 __all__ = ["ROUGHNESS_SHARE", "Films", "films_of"]
@@ -38,9 +39,9 @@ class Films:
     """Rings of a robot that may near the wall, as `kernels.two_links` reads them."""
 
     wall: Samples
-    """Radius of the channel (infinite: none), roughness, m; largest resistance of a film, N s/m; load, N (4,)."""
+    """Radius of the channel (infinite: none), roughness, largest resistance of a film, load: `kernel.WALL` columns."""
     spots: Samples
-    """Place x, radius, half-length along the axis, resistance, power, reach (n, 6).
+    """Rings (n, 6), `kernel.RING` columns: x, radius, half-length along the axis, resistance, power, reach.
 
     A film of thickness h resists with c ((reach/h)^power - 1): as lubrication has it where it is thin, and not at all
     beyond its reach, where the resistance in open fluid is all there is.
@@ -59,11 +60,11 @@ def films_of(robot: Robot, roughness: float | None, drag: float, load: float) ->
     radius = 0.5 * robot.body.diameter
     height = ROUGHNESS_SHARE * radius if roughness is None else roughness
     if robot.channel is None:
-        return Films(np.array([np.inf, height, np.inf, load]), np.zeros((0, 6)))
+        return Films(np.array([np.inf, height, np.inf, load]), np.zeros((0, kernel.RING)))
     channel = 0.5 * robot.channel.diameter
     rows = [*_body_rings(robot, channel), *_tail_rings(robot, channel)]
     spots = np.array(rows)
-    spots[:, 3] /= spots[:, 5] ** spots[:, 4]
+    spots[:, kernel.FILM_RESISTANCE] /= spots[:, kernel.FILM_REACH] ** spots[:, kernel.FILM_POWER]
     return Films(np.array([channel, height, _STIFFEST * drag, load]), spots)
 
 

@@ -181,11 +181,11 @@ def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
         def room(y: Samples) -> Samples:
             w, i, j, k = y[kernel.ATTITUDE : kernel.ATTITUDE + 4]
             along = 1.0 - 2.0 * (j * j + k * k) / (w * w + i * i + j * j + k * k)
-            place = y[0] - reach.middle
-            return np.asarray(reach.channel - np.maximum(place + reach.nose * along, -place - reach.tip * along))
+            x = y[kernel.POSITION] - reach.middle
+            return np.asarray(reach.channel - np.maximum(x + reach.nose * along, -x - reach.tip * along))
 
         found.append(_Watch(_END, room, last=True))
-    if np.isfinite(reach.charge) and links.drive[0] == kernel.MOTOR and not spent:
+    if np.isfinite(reach.charge) and links.drive[kernel.KIND] == kernel.MOTOR and not spent:
         found.append(_Watch(_SPENT, lambda y: reach.charge - y[kernel.CHARGE], last=True))
     return found
 
@@ -199,7 +199,7 @@ class _Film(_Watch):
 
     def __init__(self, links: TwoLinks, tell: Callable[[float], None]) -> None:
         super().__init__(_FILM, float, last=False)
-        self._wall, self._spots, self._rough = links.wall, links.spots, float(links.wall[1])
+        self._wall, self._spots, self._rough = links.wall, links.spots, float(links.wall[kernel.ROUGHNESS])
         self._tell, self._calls, self._walled = tell, 0, links.spots.size > 0
 
     def __call__(self, time: float, y: Samples, _data: Samples) -> float:
@@ -283,8 +283,9 @@ def _tolerances(links: TwoLinks) -> Samples:
 def _scales(links: TwoLinks) -> Samples:
     """Sizes of the state's components below which nothing matters, (17,)."""
     drive, length, torque = links.drive, links.length, links.torque
-    current = drive[18] / drive[12] if drive[12] > 0 else 1.0
-    electrical = max(drive[18] * current, torque)
+    resistance = drive[kernel.CONSTANT]
+    current = drive[kernel.VOLTAGE] / resistance if resistance > 0 else 1.0
+    electrical = max(drive[kernel.VOLTAGE] * current, torque)
     scales = np.ones(kernel.STATES)
     scales[kernel.POSITION : kernel.POSITION + 3] = length
     scales[kernel.CURRENT] = scales[kernel.CHARGE] = current

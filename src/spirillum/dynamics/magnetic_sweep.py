@@ -161,7 +161,7 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
 def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
     """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
     drive = links.drive.copy()
-    drive[7] = rate
+    drive[kernel.FIELD_RATE] = rate
     here = replace(links, drive=drive)
     start: Samples = np.zeros(kernel.STATES)
     start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = attitude
@@ -182,7 +182,7 @@ def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _
 
     attitudes = Rotation.from_quat(states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4], scalar_first=True)
     rotation = np.asarray(attitudes.as_matrix())
-    moment = rotation @ links.drive[3:6]
+    moment = rotation @ links.drive[kernel.MOMENT : kernel.FIELD]
     behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     slipped = behind - behind[0]
     follows = abs(float(slipped[-1])) < 0.5 * np.pi

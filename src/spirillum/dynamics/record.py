@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["dataset_of"]
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
+_MOMENT = slice(kernel.MOMENT, kernel.FIELD)
 
 
 _SOURCE = "two rigid links, (15) with all rows"
@@ -51,17 +52,17 @@ def dataset_of(
         series |= _electrics(prediction, run)
     if prediction.batch.drive == "magnetic":
         series |= _magnetics(links, run, rotation)
-    if np.isfinite(links.wall[0]):
-        gap = run.observed[:, 8] + links.wall[1]
+    if np.isfinite(links.wall[kernel.RADIUS]):
+        gap = run.observed[:, kernel.FILM] + links.wall[kernel.ROUGHNESS]
         series["wall_gap"] = gap
-    stored = _potential(links, run, rotation) + run.observed[:, 12]
+    stored = _potential(links, run, rotation) + run.observed[:, kernel.PRESSED]
     series["potential_energy"] = stored
     attitude = run.states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
-    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, :3])
-    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, 3:6])
+    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, : kernel.ROTATION])
+    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, kernel.ROTATION : kernel.JOINT])
     vectors = {
-        "position": ("axis", run.states[:, :3]),
+        "position": ("axis", run.states[:, : kernel.ATTITUDE]),
         "velocity": ("axis", velocity),
         "angular_velocity": ("axis", spin),
         "attitude": ("quaternion", attitude),
@@ -120,14 +121,15 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     axis = rotation[:, :, 0]
     roll, phase = states[:, kernel.ROLL], states[:, kernel.PHASE]
+    body_rate, motor_rate = rates[:, kernel.ROTATION], rates[:, kernel.JOINT]
     return {
         "tail_phase": phase,
         "tail_angle": roll + phase - phase[0],
         "body_angle": roll,
-        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, :3], axis=1),
-        "tail_rotation_rate": rates[:, 3] + rates[:, 6],
-        "body_rotation_rate": rates[:, 3],
-        "motor_rotation_rate": rates[:, 6],
+        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : kernel.ROTATION], axis=1),
+        "tail_rotation_rate": body_rate + motor_rate,
+        "body_rotation_rate": body_rate,
+        "motor_rotation_rate": motor_rate,
         "pitch": np.arcsin(np.clip(axis[:, 2], -1.0, 1.0)),
         "yaw": np.arctan2(axis[:, 1], axis[:, 0]),
         "duty": run.duty,
@@ -136,19 +138,20 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
 
 def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
-    drive = rates[:, 7]
-    if links.drive[1]:  # one piece, driven from outside
+    drive, motor_rate = rates[:, kernel.DRIVE_TORQUE], rates[:, kernel.JOINT]
+    if links.drive[kernel.FIXED]:  # one piece, driven from outside
         torque = drive + _field_torque(links, run, rotation)
-        shaft = rates[:, 11]
+        shaft = rates[:, kernel.DRIVE_POWER]
     else:  # what is left of the motor's torque after friction in the joint
-        torque = drive - links.friction[6, 3] * rates[:, 3] - links.friction[6, 6] * rates[:, 6]
-        shaft = torque * rates[:, 6]
+        against_body, against_motor = links.friction[kernel.JOINT, [kernel.ROTATION, kernel.JOINT]]
+        torque = drive - against_body * rates[:, kernel.ROTATION] - against_motor * motor_rate
+        shaft = torque * motor_rate
     return {
         "drive_torque": torque,
-        "drive_power": rates[:, 11],
+        "drive_power": rates[:, kernel.DRIVE_POWER],
         "shaft_power": shaft,
-        "friction_power": rates[:, 9],
-        "dissipated_power": rates[:, 10],
+        "friction_power": rates[:, kernel.FRICTION_POWER],
+        "dissipated_power": rates[:, kernel.DISSIPATED_POWER],
         "drive_energy": states[:, kernel.DRIVEN],
         "friction_energy": states[:, kernel.FRICTION],
         "dissipated_energy": states[:, kernel.DISSIPATED],
@@ -157,10 +160,10 @@ def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Sa
 
 def _field_torque(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
-    moment, angle = rotation @ links.drive[3:6], links.drive[7] * run.time
-    if links.drive[0] != kernel.MAGNETIC:
+    moment, angle = rotation @ links.drive[_MOMENT], links.drive[kernel.FIELD_RATE] * run.time
+    if links.drive[kernel.KIND] != kernel.MAGNETIC:
         return np.zeros_like(angle)
-    field = links.drive[6] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    field = links.drive[kernel.FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
@@ -172,7 +175,7 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
     current = states[:, kernel.CURRENT]
     voltage = battery_voltage(motor, current)
     return {
-        "motor_torque": run.observed[:, 7],
+        "motor_torque": run.observed[:, kernel.DRIVE_TORQUE],
         "motor_current": sign * current,
         "motor_resistance": winding_resistance(motor, current),
         "battery_voltage": voltage,
@@ -187,9 +190,9 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
 
 def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     """Where the moment and the robot's axis point against the field."""
-    moment = rotation @ links.drive[3:6]
-    field = 0.5 * np.pi + links.drive[7] * run.time
-    behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(links.drive[7])
+    moment, rate = rotation @ links.drive[_MOMENT], links.drive[kernel.FIELD_RATE]
+    field = 0.5 * np.pi + rate * run.time
+    behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
     behind = np.where(run.duty > 0, behind, np.nan)
     return {
@@ -202,11 +205,11 @@ def _potential(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
     """Energy of weight less buoyancy above the state at y = z = 0 and level, J."""
     weight, phase = links.weight, run.states[:, kernel.PHASE]
     cos, sin = np.cos(phase), np.sin(phase)
-    rotor = np.stack(
-        [np.full_like(phase, weight[5]), cos * weight[6] - sin * weight[7], sin * weight[6] + cos * weight[7]], axis=-1
-    )
-    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[2:5] + rotor)
-    return np.asarray((weight[0] + weight[1]) * run.states[:, 2] + lift)
+    x, y, z = weight[kernel.MOMENT_ROTOR :]
+    rotor = np.stack([np.full_like(phase, x), cos * y - sin * z, sin * y + cos * z], axis=-1)
+    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[kernel.MOMENT_BODY : kernel.MOMENT_ROTOR] + rotor)
+    heavy = weight[kernel.WEIGHT_BODY] + weight[kernel.WEIGHT_ROTOR]
+    return np.asarray(heavy * run.states[:, kernel.POSITION + 2] + lift)
 
 
 def _averages(dataset: xr.Dataset) -> dict[str, Any]:

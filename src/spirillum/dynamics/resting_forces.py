@@ -28,14 +28,14 @@ from spirillum.arrays import Samples
 from spirillum.robot.outline import Outline
 
 __all__ = [
+    "Descent",
     "Film",
-    "Path",
     "contact_line",
+    "descent_of",
     "film_of",
     "lubrication_resistance",
     "orbit_period",
     "settled_azimuth",
-    "settling_path",
     "settling_time",
 ]
 
@@ -141,7 +141,7 @@ def orbit_period(film: Film, weight: float) -> float:
     return 2.0 * np.pi * film.offset * film.sideways_resistance / float(np.sqrt(left))
 
 
-class Path(NamedTuple):
+class Descent(NamedTuple):
     """The way from the lowest place at the largest gap."""
 
     time: Samples
@@ -154,7 +154,7 @@ class Path(NamedTuple):
     """Whether it ends at the smallest gap; else the robot was carried up so far that the gap opened, or it stays."""
 
 
-def settling_path(films: Sequence[Film], weight: float) -> Path:
+def descent_of(films: Sequence[Film], weight: float) -> Descent:
     """Gap and azimuth over time of a level robot that starts at the lowest place at the largest gap.
 
     Resistances are interpolated as powers of the gap, forces as cubics in its logarithm.
@@ -193,7 +193,7 @@ def settling_path(films: Sequence[Film], weight: float) -> Path:
     )
     time = np.linspace(0.0, found.t[-1], _SAMPLES)
     u, azimuth = found.sol(time)
-    return Path(time, np.exp(u), azimuth, found.t_events[0].size > 0)
+    return Descent(time, np.exp(u), azimuth, found.t_events[0].size > 0)
 
 
 _RESISTANCES = ("sideways_resistance", "normal_resistance")
@@ -209,7 +209,7 @@ def _cubic(gaps: Samples, values: Sequence[float]) -> Callable[[float], float]:
 
 
 def _power(gaps: Samples, values: Sequence[float]) -> Callable[[float], float]:
-    """The same for the logarithm of positive values."""
+    """Cubic of the logarithm of positive values in the logarithm of the gap; constant beyond the last ones."""
     logarithm = _cubic(gaps, np.log(values).tolist())
     return lambda u: float(np.exp(logarithm(u)))
 

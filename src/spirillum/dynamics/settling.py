@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,27 +17,26 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.dynamics.resting_forces import (
+    Descent,
     Film,
-    Path,
     contact_line,
+    descent_of,
     film_of,
     lubrication_resistance,
     orbit_period,
     settled_azimuth,
-    settling_path,
     settling_time,
 )
 from spirillum.errors import InputError
 from spirillum.fields.grid import Progress
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.place import GAP_BAND, GAP_SHARE, seat_of
-from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry, wire_of_geometry
+from spirillum.fluid.tube.domain import seat_of
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.options import Resolution
-from spirillum.robot.outline import Outline
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
-from spirillum.robot.seat import contact_pitch
+from spirillum.robot.seat import GAP_BAND, contact_pitch, gap_of
 from spirillum.swimming.prediction import Prediction, checked_batch, predict, prepared
 from spirillum.swimming.steady import swim
 from spirillum.units import KINDS, parse_option, show
@@ -75,8 +74,8 @@ class Settling:
     force_error: float
     """Difference of the sideways force from another resolution, over its size."""
     films: tuple[Film, ...]
-    """The same at the gaps of the draining film, largest first."""
-    path: Path
+    """Forces and resistances at the gaps of the draining film, largest first."""
+    descent: Descent
     """The way of a level robot from the lowest place at the largest gap."""
     _batch: RobotBatch = field(repr=False)
 
@@ -98,7 +97,7 @@ class Settling:
     @property
     def contact(self) -> tuple[float, float]:
         """From where to where (x, rear and front) the body would touch the wall, m."""
-        return contact_line(_body_outline(self._batch))
+        return contact_line(RobotGeometry.of(self._batch).body)
 
     @property
     def centre_of_weight(self) -> float:
@@ -136,11 +135,9 @@ class Settling:
             return 0.0
         if self.rests != "tail down":
             return np.nan
-        g = Geometry.of(self._batch, 0)
-        wire = wire_of_geometry(g, 1.0)
-        solids = {name: outline for name, outline, _ in solids_of_geometry(g)}
-        coupling, seat = solids.get("coupling"), seat_of(self._batch)
-        return contact_pitch(solids["body"], wire.points, wire.radius, seat.radius, self.film.gap, coupling=coupling)
+        g, radius = RobotGeometry.of(self._batch), seat_of(self._batch).radius
+        wire, coupling = g.wire(), g.outlines.get("coupling")
+        return contact_pitch(g.body, wire.points, wire.radius, radius, self.film.gap, coupling=coupling)
 
     @property
     def tilting(self) -> tuple[float, float]:
@@ -158,7 +155,7 @@ class Settling:
     @property
     def drainage_time(self) -> float:
         """Time from the largest to the smallest gap, s; NaN where the robot is carried up before."""
-        return float(self.path.time[-1]) if self.path.drained else np.nan
+        return float(self.descent.time[-1]) if self.descent.drained else np.nan
 
     @property
     def exponents(self) -> Samples:
@@ -185,7 +182,7 @@ class Settling:
                 f"the sideways force {show(self.sideways_force, 'mN')} exceeds the submerged weight "
                 f"{show(self.weight, 'mN')}: at this gap the robot goes around the tube"
             )
-        if not self.path.drained:
+        if not self.descent.drained:
             found.append(
                 "the film does not drain: what turns in the fluid lifts the robot, or carries it up the wall, where "
                 "its weight no longer presses on it"
@@ -217,9 +214,9 @@ class Settling:
             "sideways_resistance": quantity([f.sideways_resistance for f in self.films], "N s/m"),
             "body_rotation_rate": quantity([f.body_rate for f in self.films], "rad/s"),
             "azimuth": quantity([settled_azimuth(f.sideways_force, self.weight) for f in self.films], "rad"),
-            "time": quantity(self.path.time, "s"),
-            "gap_over_time": quantity(self.path.gap, "m"),
-            "azimuth_over_time": quantity(self.path.azimuth, "rad"),
+            "time": quantity(self.descent.time, "s"),
+            "gap_over_time": quantity(self.descent.gap, "m"),
+            "azimuth_over_time": quantity(self.descent.azimuth, "rad"),
         }
         content = {
             "robot": self.robot.name,
@@ -255,7 +252,7 @@ class Settling:
 
 
 def settle(
-    robot: str | FilePath | Mapping[str, Any] | Robot,
+    robot: str | Path | Mapping[str, Any] | Robot,
     *,
     tail_rate: str | float | None = None,
     friction: str | None = None,
@@ -287,48 +284,48 @@ def settle(
     if not _FEWEST <= gaps <= _MOST:
         raise InputError(f"gaps = {gaps}; allowed: {_FEWEST} to {_MOST}")
     ready, model, batch = prepared(robot, MODEL, resolution=resolution, placement=_level(placement))
-    place = _placed(batch)
+    reference = _closed(batch)
     weight = _weight(ready)
     asked = _drain(drain, batch, gaps)
-    places = [_at_gap(place, gap) for gap in asked]
-    for there in (places[0], places[-1]):
+    placements = [_at_gap(reference, gap) for gap in asked]
+    for there in (placements[0], placements[-1]):
         checked_batch(ready, model, there)
     tell = progress or (lambda _what, _done, _total: None)
     tell("settling: where it is placed", 0, gaps + 1)
-    motion = predict(ready, model=MODEL, tail_rate=tail_rate, friction=friction, placement=place, band=False)
+    motion = predict(ready, model=MODEL, tail_rate=tail_rate, friction=friction, placement=reference, band=False)
     film = _film(motion, motion.batch, motion.model)
     check = motion.model.checked_by(ready.model)
     error = np.nan
     if check is not None and film.sideways_force != 0:
         error = abs(_film(motion, motion.batch, check).sideways_force / film.sideways_force - 1.0)
     films = []
-    for done, there in enumerate(places, start=1):
+    for done, there in enumerate(placements, start=1):
         tell(f"settling: gap {show(asked[done - 1], 'mm')}", done, gaps + 1)
         films.append(_film(motion, checked_batch(ready, model, there), motion.model))
     tell("settling", gaps + 1, gaps + 1)
-    return Settling(motion, weight, film, error, tuple(films), settling_path(films, weight), motion.batch)
+    return Settling(motion, weight, film, error, tuple(films), descent_of(films, weight), motion.batch)
 
 
 def _level(placement: Placement | Mapping[str, Any] | None) -> Placement:
     """The placement of a level robot in a fluid that is not made to flow."""
-    place = Placement.of(placement)
-    if place.pitch:
-        raise InputError(f"placement.pitch = {show(place.pitch, 'deg')}; allowed: 0 deg, for a level robot settles")
-    if place.flow:
-        raise InputError(f"placement.flow = {show(place.flow, 'mm/s')}; allowed: none, for its lift is not computed")
-    return place
+    asked = Placement.of(placement)
+    if asked.pitch:
+        raise InputError(f"placement.pitch = {show(asked.pitch, 'deg')}; allowed: 0 deg, for a level robot settles")
+    if asked.flow:
+        raise InputError(f"placement.flow = {show(asked.flow, 'mm/s')}; allowed: none, for its lift is not computed")
+    return asked
 
 
-def _at_gap(place: Placement, gap: float) -> Placement:
-    return Placement.of({"gap": gap, "pitch": 0.0, "tail_drop": place.tail_drop, "ends": place.ends})
+def _at_gap(placement: Placement, gap: float) -> Placement:
+    return Placement.of({"gap": gap, "pitch": 0.0, "tail_drop": placement.tail_drop, "ends": placement.ends})
 
 
-def _placed(batch: RobotBatch) -> Placement:
-    """Where the robot lies, with the model's own gap where none is given."""
-    place = batch.placement
-    if place.eccentricity is not None:
-        return place
-    return _at_gap(place, place.gap or min(GAP_SHARE * 0.5 * float(batch.body_diameter[0]), _room(batch)))
+def _closed(batch: RobotBatch) -> Placement:
+    """The placement with the model's own gap where none is given."""
+    placement = batch.placement
+    if placement.eccentricity is not None:
+        return placement
+    return _at_gap(placement, gap_of(placement, float(batch.body_diameter[0]), 0.5 * float(batch.channel_diameter[0])))
 
 
 def _room(batch: RobotBatch) -> float:
@@ -363,16 +360,12 @@ def _drain(drain: tuple[str | float, str | float] | None, batch: RobotBatch, cou
     return np.geomspace(largest, smallest, count)
 
 
-def _body_outline(batch: RobotBatch) -> Outline:
-    return next(outline for name, outline, _ in solids_of_geometry(Geometry.of(batch, 0)) if name == "body")
-
-
 def _film(motion: Prediction, batch: RobotBatch, model: SwimmerModel) -> Film:
     """The fluid's answer at a place, with the tail at the rate of `motion`."""
     turning = motion.tail_rotation_rate
     state = swim(batch, model, tail_rate=np.array([turning]), friction=motion.friction, calibrated=False)
     seat = seat_of(batch)
-    gap = seat.radius - 0.5 * float(batch.body_diameter[0]) - seat.offset
+    gap = seat.radius - 0.5 * float(batch.body_diameter[0]) - seat.offset  # level
     if not state.valid[0]:
         raise InputError(f"placement.gap = {show(gap, 'mm')}: the robot's drive has no steady motion there")
     count = batch.options.tube.phases

@@ -18,7 +18,7 @@ from spirillum.dynamics.start import reach_of, start_state
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels.two_links import thinnest_film
+from spirillum.kernels import two_links as kernel
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -115,7 +115,7 @@ def simulate(
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     switches = schedule(windows_of(on), duty, own, end)
     links = _links(steady, roughness, weight=weight)
-    start = start_state(steady.robot, placed, lying=float(links.weight[:2].sum()) > 0)
+    start = start_state(steady.robot, placed, lying=float(links.weight[: kernel.MOMENT_BODY].sum()) > 0)
     _check_clear(links, start, placed)
     reach = reach_of(steady.robot)
     run = integrate(links, start, time, switches, reach, progress)
@@ -134,7 +134,7 @@ def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
     """
     if not links.spots.size:
         return
-    film, rough = thinnest_film(start, links.wall, links.spots), float(links.wall[1])
+    film, rough = kernel.thinnest_film(start, links.wall, links.spots), float(links.wall[kernel.ROUGHNESS])
     if film > 0:
         return
     gap = film + rough
@@ -149,8 +149,8 @@ def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
             "smaller pitch, or a larger placement.gap"
         )
     raise InputError(
-        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[0], 'mm')}; allowed: a larger "
-        "placement.gap or a smaller placement.eccentricity"
+        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[kernel.RADIUS], 'mm')}; "
+        "allowed: a larger placement.gap or a smaller placement.eccentricity"
     )
 
 

@@ -1,4 +1,4 @@
-"""Where a run begins: the robot's place in its channel, at rest."""
+"""Initial state of a run: the robot at rest in its seat."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach
 from spirillum.errors import InputError
-from spirillum.fluid.tube.place import GAP_SHARE
-from spirillum.kernels.two_links import ATTITUDE, STATES
+from spirillum.kernels.two_links import ATTITUDE, POSITION, STATES
 from spirillum.robot.links import outlines_of
+from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import body_gap, largest_gap, offset_for_gap
+from spirillum.robot.seat import Seat, gap_of, largest_gap
 from spirillum.units import show
 
 __all__ = ["reach_of", "start_state"]
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
-    """The state of a robot at rest in its place, (17,).
+    """The state of a robot at rest in its seat, (17,).
 
     Args:
         robot: the robot.
@@ -36,7 +36,7 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
     state[ATTITUDE], state[ATTITUDE + 2] = np.cos(0.5 * pitch), -np.sin(0.5 * pitch)
     if robot.channel is None:
         return state
-    state[2] = -_offset(robot, placement, pitch, lying=lying)
+    state[POSITION + 2] = -_seat(robot, placement, robot.channel, lying=lying).offset
     return state
 
 
@@ -53,30 +53,23 @@ def _check(robot: Robot, placement: Placement) -> None:
         raise InputError(f"placement.{name} is set, but the robot has no channel; allowed: a pitch, or a [channel]")
 
 
-def _offset(robot: Robot, placement: Placement, pitch: float, *, lying: bool) -> float:
-    """How far below the channel's axis the body's mid-length lies, m."""
-    channel = robot.channel
-    assert channel is not None  # noqa: S101 - the caller asked
-    radius, body = 0.5 * channel.diameter, outlines_of(robot)["body"]
-    room = radius - 0.5 * robot.body.diameter
+def _seat(robot: Robot, placement: Placement, channel: Channel, *, lying: bool) -> Seat:
+    radius, body, pitch = 0.5 * channel.diameter, outlines_of(robot)["body"], placement.pitch or 0.0
     if placement.eccentricity is not None:
-        return placement.eccentricity * room
+        return Seat.of(placement, body, robot.body.diameter, radius)
     most = largest_gap(body, radius, pitch)
-    if placement.gap is None:
-        gap = min(GAP_SHARE * 0.5 * robot.body.diameter, most) if lying else None
-    elif placement.gap <= most:
-        gap = placement.gap
-    else:
+    if placement.gap is not None and placement.gap > most:
         raise InputError(f"placement.gap = {show(placement.gap, 'mm')}; allowed: at most {show(most, 'mm')}")
-    if gap is None:
-        offset = 0.0
-        if body_gap(body, radius, offset, pitch) > 0:
-            return offset
+    if placement.gap is None and not lying:
+        seat = Seat(radius, 0.0, pitch)
+        fits = seat.clearance(body) > 0
+    else:
+        gap = min(gap_of(placement, robot.body.diameter, radius), most)
+        seat = Seat.at_gap(body, radius, gap, pitch)
+        fits = bool(np.isfinite(seat.offset))
+    if not fits:
         raise InputError(f"placement.pitch = {show(pitch, 'deg')}: the body does not fit; allowed: a smaller pitch")
-    offset = offset_for_gap(body, radius, gap, pitch)
-    if not np.isfinite(offset):
-        raise InputError(f"placement.pitch = {show(pitch, 'deg')}: the body does not fit; allowed: a smaller pitch")
-    return offset
+    return seat
 
 
 def reach_of(robot: Robot) -> Reach:

@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.films import films_of
 from spirillum.fluid.model import SwimmerModel
-from spirillum.kernels.two_links import MAGNETIC, MOTOR, RATE, TORQUE, packed
+from spirillum.kernels import two_links as kernel
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.links import links_of
@@ -24,22 +24,22 @@ from spirillum.swimming.steady import calibrated_resistance
 
 __all__ = ["TwoLinks", "two_links"]
 
-_KINDS = {"dc-motor": MOTOR, "torque": TORQUE, "rate": RATE, "magnetic": MAGNETIC}
-_MOTOR = (
-    "polarity",
-    "torque_constant",
-    "back_emf_constant",
-    "inductance",
-    "constant",
-    "decay",
-    "decay_rate",
-    "growth",
-    "growth_rate",
-    "slope",
-    "voltage",
-    "internal_resistance",
-)
-_DRIVE_LENGTH = 8 + len(_MOTOR)
+_KINDS = {"dc-motor": kernel.MOTOR, "torque": kernel.TORQUE, "rate": kernel.RATE, "magnetic": kernel.MAGNETIC}
+_ELECTRICS = {
+    "polarity": kernel.POLARITY,
+    "torque_constant": kernel.TORQUE_CONSTANT,
+    "back_emf_constant": kernel.BACK_EMF,
+    "inductance": kernel.INDUCTANCE,
+    "constant": kernel.CONSTANT,
+    "decay": kernel.DECAY,
+    "decay_rate": kernel.DECAY_RATE,
+    "growth": kernel.GROWTH,
+    "growth_rate": kernel.GROWTH_RATE,
+    "slope": kernel.SLOPE,
+    "voltage": kernel.VOLTAGE,
+    "internal_resistance": kernel.INTERNAL_RESISTANCE,
+    "duty": kernel.DUTY,
+}
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class TwoLinks:
     weight: Samples
     """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
     wall: Samples
-    """Radius of the channel, roughness, m; largest resistance of a film, N s/m; load, N (4,)."""
+    """The channel's wall (4,), see `spirillum.dynamics.films`."""
     spots: Samples
     """Rings that may near the wall (n, 6), see `spirillum.dynamics.films`."""
     drive: Samples
@@ -62,7 +62,7 @@ class TwoLinks:
     @property
     def data(self) -> Samples:
         """All of them in one array, for `kernels.two_links.rates`."""
-        return packed(self.drag, self.friction, self.weight, self.wall, self.spots, self.drive)
+        return kernel.packed(self.drag, self.friction, self.weight, self.wall, self.spots, self.drive)
 
     @property
     def length(self) -> float:
@@ -75,9 +75,9 @@ class TwoLinks:
         return _torque(self.drag, self.weight, self.drive)
 
     def at_duty(self, duty: float) -> TwoLinks:
-        """The same while the remote asks for another duty; a field or a prescribed rate is on at any duty but 0."""
+        """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
-        drive[2] = duty
+        drive[kernel.DUTY] = duty
         return replace(self, drive=drive)
 
 
@@ -96,7 +96,7 @@ def two_links(
 
     Args:
         robot: the robot.
-        batch: the same as a batch of one.
+        batch: that robot as a batch of one.
         model: a model that knows all entries of R.
         friction: reading of the friction.
         effective: its B_eff, or B of the wall, N m s/rad.
@@ -106,7 +106,7 @@ def two_links(
     """
     resistance = calibrated_resistance(batch, model, calibrated=calibrated)[0]
     drag = np.ascontiguousarray(LINKS.T @ resistance @ LINKS)
-    heavy, drive = _weight(robot) if weight else np.zeros(8), _drive(batch)
+    heavy, drive = _weight(robot) if weight else np.zeros(kernel.WEIGHT), _drive(batch)
     films = films_of(robot, roughness, float(drag[1, 1]), _torque(drag, heavy, drive) / _length(drag))
     return TwoLinks(
         drag=drag,
@@ -124,11 +124,13 @@ def _length(drag: Samples) -> float:
 
 def _torque(drag: Samples, weight: Samples, drive: Samples) -> float:
     """Largest of the motor's stall torque, m B, a prescribed torque or that of a prescribed rate, and weight's."""
-    stall = drive[9] * drive[18] / drive[12] if drive[12] > 0 else 0.0
-    field = float(np.linalg.norm(drive[3:6])) * drive[6]
-    given = abs(drive[3]) * (float(drag[6, 6]) if drive[0] == RATE else 1.0)
-    heavy = float(np.abs(weight[:2]).sum()) * _length(drag)
-    return float(max(stall, field, given if drive[0] in (TORQUE, RATE) else 0.0, heavy, 1e-300))
+    kind = drive[kernel.KIND]
+    field = float(np.linalg.norm(drive[kernel.MOMENT : kernel.FIELD])) * drive[kernel.FIELD]
+    given = abs(drive[kernel.GIVEN]) * (float(drag[kernel.JOINT, kernel.JOINT]) if kind == kernel.RATE else 1.0)
+    heavy = float(np.abs(weight[: kernel.MOMENT_BODY]).sum()) * _length(drag)
+    resistance = drive[kernel.CONSTANT]
+    stall = drive[kernel.TORQUE_CONSTANT] * drive[kernel.VOLTAGE] / resistance if resistance > 0 else 0.0
+    return float(max(stall, field, given if kind in (kernel.TORQUE, kernel.RATE) else 0.0, heavy, 1e-300))
 
 
 def _friction(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:
@@ -137,8 +139,9 @@ def _friction(batch: RobotBatch, reading: FrictionReading, effective: float) -> 
     t = friction_torques(reading, np.array([effective]), rotor)
     bb, br, rb, rr = (float(entry[0]) for entry in (t.bb, t.br, t.rb, t.rr))
     found = np.zeros((7, 7))
-    found[3, 3], found[3, 6] = (bb + br) + (rb + rr), br + rr
-    found[6, 3], found[6, 6] = rb + rr, rr
+    roll, joint = kernel.ROTATION, kernel.JOINT
+    found[roll, roll], found[roll, joint] = (bb + br) + (rb + rr), br + rr
+    found[joint, roll], found[joint, joint] = rb + rr, rr
     return found
 
 
@@ -146,7 +149,7 @@ def _weight(robot: Robot) -> Samples:
     """Weight less buoyancy of both links; zero where the masses are not known."""
     links = links_of(robot)
     if not np.isfinite([link.mass for link in links]).all():
-        return np.zeros(8)
+        return np.zeros(kernel.WEIGHT)
     density = robot.fluid.density
     sizes = [link.mass - density * link.volume for link in links]
     moments = [link.mass * link.centre - density * link.volume * link.centroid for link in links]
@@ -154,17 +157,18 @@ def _weight(robot: Robot) -> Samples:
 
 
 def _drive(batch: RobotBatch) -> Samples:
-    drive = np.zeros(_DRIVE_LENGTH)
-    drive[0], drive[1], drive[2] = _KINDS[str(batch.drive)], float(batch.joint == "fixed"), 1.0
+    drive = np.zeros(kernel.DRIVE)
+    drive[kernel.KIND], drive[kernel.FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
+    drive[kernel.DUTY] = 1.0
     if batch.drive == "torque":
-        drive[3] = batch.drive_torque[0]
+        drive[kernel.GIVEN] = batch.drive_torque[0]
     elif batch.drive == "rate":
-        drive[3] = batch.drive_rate[0]
+        drive[kernel.GIVEN] = batch.drive_rate[0]
     elif batch.drive == "magnetic":
         moment, angle = float(batch.magnetic_moment[0]), float(batch.moment_angle[0])
-        drive[3], drive[5] = moment * np.cos(angle), moment * np.sin(angle)
-        drive[6], drive[7] = batch.magnetic_field[0], batch.field_rate[0]
+        drive[kernel.MOMENT : kernel.FIELD] = moment * np.cos(angle), 0.0, moment * np.sin(angle)
+        drive[kernel.FIELD], drive[kernel.FIELD_RATE] = batch.magnetic_field[0], batch.field_rate[0]
     elif batch.electrics is not None:
-        drive[2] = batch.electrics.duty[0]
-        drive[8:] = [float(getattr(batch.electrics, name)[0]) for name in _MOTOR]
+        for name, column in _ELECTRICS.items():
+            drive[column] = getattr(batch.electrics, name)[0]
     return drive

@@ -14,10 +14,13 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
-from spirillum.fluid.tube.wall import Seat
+from spirillum.fields.in_tube import tube_flow_field
+from spirillum.fields.unbounded import flow_field
+from spirillum.fluid.tube.domain import seat_of
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import Seat
 from spirillum.swimming.prediction import Prediction, predict, prepared
 from spirillum.units import KINDS, Kind, parse_option
 from spirillum.version import versions
@@ -271,9 +274,6 @@ def _checked_model(model: str) -> str:
 
 def _field(prediction: Prediction, phase: float) -> FluidField:
     """The flow of the predicted motion."""
-    from spirillum.fields.in_tube import tube_flow_field
-    from spirillum.fields.unbounded import flow_field
-
     seat = _seat(prediction)
     pitch = 0.0 if seat is None else seat.pitch
     forward = prediction.forward_velocity * np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
@@ -287,9 +287,7 @@ def _field(prediction: Prediction, phase: float) -> FluidField:
 
 
 def _seat(prediction: Prediction) -> Seat | None:
-    from spirillum.fluid.tube.place import place_of
-
-    return place_of(prediction.batch, 0).seat if prediction.model.name == "tube" else None
+    return seat_of(prediction.batch) if prediction.model.name == "tube" else None
 
 
 def seat_in_tube(
@@ -309,11 +307,9 @@ def seat_in_tube(
     Raises:
         InputError: for wrong input, or a robot outside the domain of `tube`.
     """
-    from spirillum.fluid.tube.place import place_of
-
     if _checked_model(model) != "tube":
         return None
-    return place_of(prepared(robot, model, placement=placement, resolution=resolution)[2], 0).seat
+    return seat_of(prepared(robot, model, placement=placement, resolution=resolution)[2])
 
 
 def plane_around(

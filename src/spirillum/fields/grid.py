@@ -11,8 +11,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.fluid.tube.wall import Seat
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import Seat
 
 if TYPE_CHECKING:
     import xarray as xr

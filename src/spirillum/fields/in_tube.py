@@ -19,13 +19,14 @@ import numpy as np
 from spirillum.arrays import Amplitudes, Samples
 from spirillum.fields.unbounded import checked_points, in_fluid
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
+from spirillum.fluid.tube.domain import seat_of
 from spirillum.fluid.tube.model import held_robot
-from spirillum.fluid.tube.place import place_of
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.wall import Seat, waves_between
-from spirillum.fluid.wire.slender import solids_of
+from spirillum.fluid.tube.wall import waves_between
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
+from spirillum.robot.seat import Seat
 
 __all__ = ["TubeFlowField", "tube_flow_field"]
 
@@ -381,5 +382,5 @@ def tube_flow_field(
     """
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
     held = held_robot(batch, 0, phase)
-    solids = tuple((name, outline) for name, outline, _ in solids_of(batch, 0))
-    return TubeFlowField(held, place_of(batch, 0).seat, solids, twists, float(mean_flow), float(batch.viscosity[0]))
+    solids = tuple(RobotGeometry.of(batch).outlines.items())
+    return TubeFlowField(held, seat_of(batch), solids, twists, float(mean_flow), float(batch.viscosity[0]))

@@ -11,7 +11,8 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.wire.interaction import Solution
-from spirillum.fluid.wire.slender import robot_solution, solids_of
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.fluid.wire.slender import robot_solution
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import Outline
 
@@ -177,5 +178,5 @@ def flow_field(batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, pha
         phase: phase phi of the tail, rad.
     """
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
-    solids = tuple((name, outline) for name, outline, _ in solids_of(batch, 0))
+    solids = tuple(RobotGeometry.of(batch).outlines.items())
     return FlowField(robot_solution(batch), solids, twists, float(phase), float(batch.viscosity[0]))

@@ -18,34 +18,11 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = [
-    "ATTITUDE",
-    "CHARGE",
-    "CONVERSION",
-    "CURRENT",
-    "DISSIPATED",
-    "DRIVEN",
-    "ELECTRICAL",
-    "FRICTION",
-    "JOINT",
-    "MAGNETIC",
-    "MOTOR",
-    "OBSERVED",
-    "PHASE",
-    "POSITION",
-    "RATE",
-    "RESISTIVE",
-    "ROLL",
-    "STATES",
-    "TORQUE",
-    "film_of",
-    "observe",
-    "packed",
-    "rates",
-    "thinnest_film",
-]
+__all__ = ["film_of", "observe", "packed", "rates", "thinnest_film"]
 
-# Places in the state.
+# Columns of the arrays, by name on both sides: integers of the module are constants in compiled code.
+
+# The state.
 POSITION, ATTITUDE = 0, 3  # of the origin in the lab, m; unit quaternion (w, x, y, z), body axes to lab
 PHASE, ROLL = 7, 8  # tail angle phi against the body; integral of Omega_x, rad
 CURRENT = 9  # I in the motor's own sense, A
@@ -53,14 +30,44 @@ ELECTRICAL, RESISTIVE, CONVERSION, CHARGE = 10, 11, 12, 13  # integrals of power
 DRIVEN, FRICTION, DISSIPATED = 14, 15, 16  # work of the drive's torque on both links, and where it goes, J
 STATES = 17
 
-JOINT = 6  # the joint's place among the rates
+# What is observed: the seven rates first.
+VELOCITY, ROTATION, JOINT = 0, 3, 6  # U, m/s; Omega_b, rad/s, body axes; omega_m, rad/s
+DRIVE_TORQUE, FILM = 7, 8  # N m; thinnest film, m
+FRICTION_POWER, DISSIPATED_POWER, DRIVE_POWER = 9, 10, 11  # W; the last of field and drive
+PRESSED = 12  # energy of pressed roughness, J
 OBSERVED = 13
-"""Columns: seven rates, torque of the drive, thinnest film, powers of friction, fluid and drive, energy of pressed
-roughness."""
-_WORK = 161
 
-# Kinds of drive, drive[0].
-MOTOR, TORQUE, RATE, MAGNETIC = 0.0, 1.0, 2.0, 3.0
+# The drive.
+KIND, FIXED, DUTY = 0, 1, 2  # one of the kinds below; whether the joint is fixed; duty of the remote
+GIVEN = 3  # prescribed torque, N m, or rate, rad/s
+MOMENT, FIELD, FIELD_RATE = 3, 6, 7  # magnetic moment (3), A m^2; field, T; its rotation rate, rad/s
+POLARITY, TORQUE_CONSTANT, BACK_EMF, INDUCTANCE = 8, 9, 10, 11  # sign; K_m, N m/A; K_b, V s/rad; L, H
+CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE = 12, 13, 14, 15, 16, 17  # of R(I), Table II
+VOLTAGE, INTERNAL_RESISTANCE = 18, 19  # of the battery, V and ohm
+DRIVE = 20
+MOTOR, TORQUE, RATE, MAGNETIC = 0.0, 1.0, 2.0, 3.0  # kinds
+
+# The wall.
+RADIUS, ROUGHNESS, STIFFEST, LOAD = 0, 1, 2, 3  # m; m; largest resistance of a film, N s/m; pressing force, N
+WALL = 4
+
+# A ring that may near the wall.
+RING_X, RING_RADIUS, RING_REACH = 0, 1, 2  # on the axis, m; a, m; half-length b along the axis, m
+FILM_RESISTANCE, FILM_POWER, FILM_REACH = 3, 4, 5  # c, N s/m; p; H, m
+RING = 6
+
+# Weight: submerged weight of body and rotor, N, and first moments of the rest, N m, at phase 0.
+WEIGHT_BODY, WEIGHT_ROTOR, MOMENT_BODY, MOMENT_ROTOR = 0, 1, 2, 5
+WEIGHT = 8
+
+# The work space, and what `packed` puts behind it.
+_OUT, _ROTATION, _WORK = 139, 152, 161
+_DRAG = _WORK
+_FRICTION = _DRAG + 49
+_WEIGHT = _FRICTION + 49
+_WALL = _WEIGHT + WEIGHT
+_DRIVE = _WALL + WALL
+_RINGS = _DRIVE + DRIVE
 
 
 def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spots: Samples, drive: Samples) -> Samples:
@@ -69,12 +76,10 @@ def packed(drag: Samples, friction: Samples, weight: Samples, wall: Samples, spo
     Args:
         drag: A(0), 7x7, SI.
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
-        weight: submerged weight of body and rotor, N, and its first moments, N m (8).
-        wall: radius of the channel (infinite: none), roughness, m; largest resistance of a film, N s/m; load, N.
-        spots: rings that may near the wall (n, 6): x, a, b, coefficient c, power p, reach H. A film of thickness h
-            resists with c ((H/h)^p - 1).
-        drive: kind, fixed joint, duty, then: torque or rate; or moment (3), field, its rate; motor from place 8 on:
-            polarity, K_m, K_b, L, R(I) (6), voltage, internal resistance.
+        weight: submerged weight of body and rotor, and its first moments, (8,).
+        wall: the wall, (4,); an infinite radius means none.
+        spots: rings that may near the wall, (n, 6). A film of thickness h resists with c ((H/h)^p - 1).
+        drive: drive and motor, (20,).
     """
     parts = (np.zeros(_WORK), drag, friction, weight, wall, drive, spots)
     return np.concatenate([np.ravel(part) for part in parts])
@@ -122,7 +127,7 @@ def _solved(a: Samples, b: Samples) -> None:
 @compiled
 def _axes(y: Samples, rotation: Samples) -> None:
     """Rotation matrix, body axes to lab, of the state's quaternion made a unit one."""
-    w, i, j, k = y[3], y[4], y[5], y[6]
+    w, i, j, k = y[ATTITUDE], y[ATTITUDE + 1], y[ATTITUDE + 2], y[ATTITUDE + 3]
     s = 2.0 / (w * w + i * i + j * j + k * k)
     rotation[0, 0], rotation[0, 1], rotation[0, 2] = 1 - s * (j * j + k * k), s * (i * j - k * w), s * (i * k + j * w)
     rotation[1, 0], rotation[1, 1], rotation[1, 2] = s * (i * j + k * w), 1 - s * (i * i + k * k), s * (j * k - i * w)
@@ -137,10 +142,11 @@ def _loads(phase: float, rotation: Samples, weight: Samples, force: Samples) -> 
     """
     down_x, down_y, down_z = -rotation[2, 0], -rotation[2, 1], -rotation[2, 2]
     cos, sin = math.cos(phase), math.sin(phase)
-    rotor_x = weight[5]
-    rotor_y, rotor_z = cos * weight[6] - sin * weight[7], sin * weight[6] + cos * weight[7]
-    x, y, z = weight[2] + rotor_x, weight[3] + rotor_y, weight[4] + rotor_z
-    total = weight[0] + weight[1]
+    rotor, body = weight[MOMENT_ROTOR:WEIGHT], weight[MOMENT_BODY:MOMENT_ROTOR]
+    rotor_x = rotor[0]
+    rotor_y, rotor_z = cos * rotor[1] - sin * rotor[2], sin * rotor[1] + cos * rotor[2]
+    x, y, z = body[0] + rotor_x, body[1] + rotor_y, body[2] + rotor_z
+    total = weight[WEIGHT_BODY] + weight[WEIGHT_ROTOR]
     force[0], force[1], force[2] = total * down_x, total * down_y, total * down_z
     force[3] = y * down_z - z * down_y
     force[4] = z * down_x - x * down_z
@@ -151,12 +157,12 @@ def _loads(phase: float, rotation: Samples, weight: Samples, force: Samples) -> 
 @compiled
 def _field(time: float, rotation: Samples, drive: Samples, force: Samples) -> None:
     """Add the torque m x B of a field B that turns about the lab's +x, up at time 0; m is fixed in the body."""
-    angle = drive[7] * time
-    along, up = -drive[6] * math.sin(angle), drive[6] * math.cos(angle)
+    angle = drive[FIELD_RATE] * time
+    along, up = -drive[FIELD] * math.sin(angle), drive[FIELD] * math.cos(angle)
     b_x = rotation[1, 0] * along + rotation[2, 0] * up
     b_y = rotation[1, 1] * along + rotation[2, 1] * up
     b_z = rotation[1, 2] * along + rotation[2, 2] * up
-    m_x, m_y, m_z = drive[3], drive[4], drive[5]
+    m_x, m_y, m_z = drive[MOMENT], drive[MOMENT + 1], drive[MOMENT + 2]
     force[3] += m_y * b_z - m_z * b_y
     force[4] += m_z * b_x - m_x * b_z
     force[5] += m_x * b_y - m_y * b_x
@@ -166,24 +172,25 @@ def _field(time: float, rotation: Samples, drive: Samples, force: Samples) -> No
 def film_of(y: Samples, rotation: Samples, wall: Samples, spot: Samples, j: Samples) -> float:
     """Film between the wall and the surface about one ring of the robot, m; its loss per rate goes into `j`.
 
-    `wall` begins with radius R and roughness, `spot` with the ring's place x, its radius a, and its half-length b along
-    the axis (0 for an edge). With the ring's middle c off the channel's axis, n = c/|c| across it and n_1 = n.e_1, the
-    film is R - |c| - s less the roughness, where s^2 = b^2 n_1^2 + a^2 (1 - n_1^2) is how far a spheroid with semi-axes
-    b, a reaches along n. `j` is its gradient: with t across n in the channel's section and s' = ds/dn_1,
+    The ring of radius a is at x on the axis and has a half-length b along it (0 for an edge). With the ring's middle c
+    off the channel's axis, n = c/|c| across it and n_1 = n.e_1, the film is R - |c| - s less the roughness, where
+    s^2 = b^2 n_1^2 + a^2 (1 - n_1^2) is how far a spheroid with semi-axes b, a reaches along n. `j` is its gradient:
+    with t across n in the channel's section and s' = ds/dn_1,
 
         j_U = n + s' (t.e_1)/|c| t,   j_Omega = s' e_1 x n + x e_1 x j_U
     """
-    side = y[1] + rotation[1, 0] * spot[0]
-    height = y[2] + rotation[2, 0] * spot[0]
+    x, radius, half = spot[RING_X], spot[RING_RADIUS], spot[RING_REACH]
+    side = y[POSITION + 1] + rotation[1, 0] * x
+    height = y[POSITION + 2] + rotation[2, 0] * x
     distance = math.hypot(side, height)
-    near = distance < 1e-12 * wall[0]
+    near = distance < 1e-12 * wall[RADIUS]
     if near:
         side, height = 0.0, -1.0
     else:
         side, height = side / distance, height / distance
     n_1 = rotation[1, 0] * side + rotation[2, 0] * height
-    reach = max(math.sqrt((spot[2] * n_1) ** 2 + spot[1] ** 2 * max(1.0 - n_1 * n_1, 0.0)), 1e-12 * spot[1])
-    slope = (spot[2] ** 2 - spot[1] ** 2) * n_1 / reach
+    reach = max(math.sqrt((half * n_1) ** 2 + radius**2 * max(1.0 - n_1 * n_1, 0.0)), 1e-12 * radius)
+    slope = (half**2 - radius**2) * n_1 / reach
     turning = 0.0 if near else slope * (-rotation[1, 0] * height + rotation[2, 0] * side) / distance
     for i in range(3):
         normal = rotation[1, i] * side + rotation[2, i] * height
@@ -192,9 +199,9 @@ def film_of(y: Samples, rotation: Samples, wall: Samples, spot: Samples, j: Samp
         j[3 + i] = normal
     n_y, n_z = j[4], j[5]
     j[3] = 0.0
-    j[4] = -slope * n_z - spot[0] * j[2]
-    j[5] = slope * n_y + spot[0] * j[1]
-    return float(wall[0] - (0.0 if near else distance) - reach - wall[1])
+    j[4] = -slope * n_z - x * j[2]
+    j[5] = slope * n_y + x * j[1]
+    return float(wall[RADIUS] - (0.0 if near else distance) - reach - wall[ROUGHNESS])
 
 
 @compiled
@@ -207,18 +214,18 @@ def _films(
     N (s/h - 1) and the energy N (s log(s/h) - s + h) for a load N of the robot's order.
     """
     thinnest, energy = math.inf, 0.0
-    rough, load = wall[1], wall[3]
+    rough, load = wall[ROUGHNESS], wall[LOAD]
     j = work[0:6]
     for c in range(spots.shape[0]):
         spot = spots[c]
         film = film_of(y, rotation, wall, spot, j)
         thinnest = min(thinnest, film)
-        if film >= spot[5]:
+        if film >= spot[FILM_REACH]:
             continue
         film = max(film, 1e-9 * rough)
-        share = film / spot[5]
-        thinner = 1.0 / (share * math.sqrt(share)) if spot[4] == 1.5 else 1.0 / share
-        k = min(spot[3] * (thinner - 1.0), wall[2])
+        share = film / spot[FILM_REACH]
+        thinner = 1.0 / (share * math.sqrt(share)) if spot[FILM_POWER] == 1.5 else 1.0 / share
+        k = min(spot[FILM_RESISTANCE] * (thinner - 1.0), wall[STIFFEST])
         pressed = 0.0
         if film < rough:
             pressed = load * (rough / film - 1.0)
@@ -252,13 +259,13 @@ def _torque(y: Samples, drive: Samples, spin: float, spin_per_torque: float) -> 
 
     `spin` is the tail's rate about the motor axis without that torque, and what the torque adds to it.
     """
-    kind, on = drive[0], drive[2]
+    kind, on = drive[KIND], drive[DUTY]
     if kind == MOTOR:
-        return float(drive[8] * drive[9] * y[9])
+        return float(drive[POLARITY] * drive[TORQUE_CONSTANT] * y[CURRENT])
     if kind == TORQUE:
-        return float(on * drive[3])
+        return float(on * drive[GIVEN])
     if kind == RATE and on > 0.0:
-        return float((drive[3] - spin) / spin_per_torque)
+        return float((drive[GIVEN] - spin) / spin_per_torque)
     return 0.0
 
 
@@ -272,9 +279,9 @@ def _powers(fluid: Samples, friction: Samples, field: Samples, driven: float, ou
         for m in range(7):
             against += fluid[i, m] * out[m]
         dissipated += out[i] * against
-    out[9] = out[3] * (friction[3, 3] * out[3] + friction[3, 6] * out[6])
-    out[9] += out[6] * (friction[6, 3] * out[3] + friction[6, 6] * out[6])
-    out[10], out[11] = dissipated, worked
+    out[FRICTION_POWER] = out[3] * (friction[3, 3] * out[3] + friction[3, 6] * out[6])
+    out[FRICTION_POWER] += out[6] * (friction[6, 3] * out[3] + friction[6, 6] * out[6])
+    out[DISSIPATED_POWER], out[DRIVE_POWER] = dissipated, worked
 
 
 @compiled
@@ -294,15 +301,15 @@ def _motion(
     """Write what is in `OBSERVED` for a state."""
     a, fluid = work[0:49].reshape(7, 7), work[49:98].reshape(7, 7)
     b, force, field = work[98:112].reshape(7, 2), work[112:119], work[119:126]
-    fixed = drive[1] != 0.0
-    along = 3 if fixed else JOINT
+    fixed = drive[FIXED] != 0.0
+    along = ROTATION if fixed else JOINT
     _axes(y, rotation)
-    _turned(drag, y[7], fluid)
-    _loads(y[7], rotation, weight, force)
-    out[8], out[12] = _films(y, rotation, wall, spots, fluid, force, work[126:132])
+    _turned(drag, y[PHASE], fluid)
+    _loads(y[PHASE], rotation, weight, force)
+    out[FILM], out[PRESSED] = _films(y, rotation, wall, spots, fluid, force, work[126:132])
     _assembled(fluid, friction, fixed, a)
     field[:] = 0.0
-    if drive[0] == MAGNETIC and drive[2] > 0.0:
+    if drive[KIND] == MAGNETIC and drive[DUTY] > 0.0:
         _field(time, rotation, drive, field)
     if fixed:
         force[JOINT] = 0.0
@@ -313,7 +320,7 @@ def _motion(
     torque = _torque(y, drive, b[3, 0] + b[6, 0], b[3, 1] + b[6, 1])  # the joint's rate is 0 where it is fixed
     for i in range(7):
         out[i] = b[i, 0] + torque * b[i, 1]
-    out[7] = torque
+    out[DRIVE_TORQUE] = torque
     _powers(fluid, friction, field, torque * out[along], out)
 
 
@@ -328,34 +335,38 @@ def rates(dy: Samples, time: float, y: Samples, data: Samples) -> None:
         data: from `packed`; it holds the work space too, and serves one caller at a time.
     """
     work = data[:_WORK]
-    drag, friction = data[_WORK : _WORK + 49].reshape(7, 7), data[_WORK + 49 : _WORK + 98].reshape(7, 7)
-    weight, wall = data[_WORK + 98 : _WORK + 106], data[_WORK + 106 : _WORK + 110]
-    drive, spots = data[_WORK + 110 : _WORK + 130], data[_WORK + 130 :].reshape(-1, 6)
-    out, rotation = work[139:152], work[152:161].reshape(3, 3)
+    drag, friction = data[_DRAG:_FRICTION].reshape(7, 7), data[_FRICTION:_WEIGHT].reshape(7, 7)
+    weight, wall = data[_WEIGHT:_WALL], data[_WALL:_DRIVE]
+    drive, spots = data[_DRIVE:_RINGS], data[_RINGS:].reshape(-1, RING)
+    out, rotation = work[_OUT:_ROTATION], work[_ROTATION:_WORK].reshape(3, 3)
     _motion(time, y, drag, friction, weight, wall, spots, drive, rotation, out, work)
     for i in range(3):
         dy[i] = rotation[i, 0] * out[0] + rotation[i, 1] * out[1] + rotation[i, 2] * out[2]
-    w, i, j, k = y[3], y[4], y[5], y[6]
-    dy[3] = 0.5 * (-i * out[3] - j * out[4] - k * out[5])
-    dy[4] = 0.5 * (w * out[3] + j * out[5] - k * out[4])
-    dy[5] = 0.5 * (w * out[4] + k * out[3] - i * out[5])
-    dy[6] = 0.5 * (w * out[5] + i * out[4] - j * out[3])
-    dy[7], dy[8] = out[6], out[3]
-    dy[14], dy[15], dy[16] = out[11], out[9], out[10]
-    if drive[0] != MOTOR:
-        dy[9] = dy[10] = dy[11] = dy[12] = dy[13] = 0.0
+    w, i, j, k = y[ATTITUDE], y[ATTITUDE + 1], y[ATTITUDE + 2], y[ATTITUDE + 3]
+    turn_x, turn_y, turn_z = out[ROTATION], out[ROTATION + 1], out[ROTATION + 2]
+    dy[ATTITUDE] = 0.5 * (-i * turn_x - j * turn_y - k * turn_z)
+    dy[ATTITUDE + 1] = 0.5 * (w * turn_x + j * turn_z - k * turn_y)
+    dy[ATTITUDE + 2] = 0.5 * (w * turn_y + k * turn_x - i * turn_z)
+    dy[ATTITUDE + 3] = 0.5 * (w * turn_z + i * turn_y - j * turn_x)
+    dy[PHASE], dy[ROLL] = out[JOINT], turn_x
+    dy[DRIVEN], dy[FRICTION], dy[DISSIPATED] = out[DRIVE_POWER], out[FRICTION_POWER], out[DISSIPATED_POWER]
+    if drive[KIND] != MOTOR:
+        dy[CURRENT:DRIVEN] = 0.0
         return
-    current, slip = y[9], drive[8] * out[6]
+    current, slip = y[CURRENT], drive[POLARITY] * out[JOINT]
     size = abs(current)
     resistance = (
-        drive[12] + drive[13] * math.exp(-drive[14] * size) + drive[15] * math.exp(drive[16] * size) + drive[17] * size
+        drive[CONSTANT]
+        + drive[DECAY] * math.exp(-drive[DECAY_RATE] * size)
+        + drive[GROWTH] * math.exp(drive[GROWTH_RATE] * size)
+        + drive[SLOPE] * size
     )
-    supply = drive[2] * (drive[18] - drive[19] * size)
-    dy[9] = (supply - resistance * current - drive[10] * slip) / drive[11]
-    dy[10] = supply * current
-    dy[11] = resistance * current * current
-    dy[12] = (drive[10] - drive[9]) * slip * current
-    dy[13] = drive[2] * current
+    supply = drive[DUTY] * (drive[VOLTAGE] - drive[INTERNAL_RESISTANCE] * size)
+    dy[CURRENT] = (supply - resistance * current - drive[BACK_EMF] * slip) / drive[INDUCTANCE]
+    dy[ELECTRICAL] = supply * current
+    dy[RESISTIVE] = resistance * current * current
+    dy[CONVERSION] = (drive[BACK_EMF] - drive[TORQUE_CONSTANT]) * slip * current
+    dy[CHARGE] = drive[DUTY] * current
 
 
 @compiled
@@ -364,7 +375,7 @@ def observe(time: Samples, states: Samples, data: Samples, out: Samples) -> None
     work, dy = data[:_WORK], np.empty(STATES)
     for row in range(time.size):
         rates(dy, time[row], states[row], data)
-        out[row] = work[139:152]
+        out[row] = work[_OUT:_ROTATION]
 
 
 @compiled

@@ -15,9 +15,9 @@ import numpy as np
 from spirillum.arrays import Values
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.place import GAP_SHARE
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
+from spirillum.robot.seat import GAP_SHARE
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Part, Places, groups
 from spirillum.swimming.band import at_place, band_places, joined

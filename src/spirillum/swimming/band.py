@@ -23,14 +23,14 @@ import numpy as np
 from spirillum.answer import quantity
 from spirillum.arrays import PerRobot
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.place import GAP_BAND, WIRE_FILM
-from spirillum.fluid.wire.pieces import Geometry, solids_of_geometry
+from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.limits import broken
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.placement import Placement
-from spirillum.robot.seat import contact_pitch, largest_gap
+from spirillum.robot.seat import GAP_BAND, contact_pitch, largest_gap
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
@@ -119,7 +119,7 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     over = left_open(batch.placement, model)
     if not over:
         return []
-    g, radius = Geometry.of(batch, 0), 0.5 * float(batch.channel_diameter[0])
+    g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
     known = batch.placement
     gaps = _gaps(g, radius, known.pitch or 0.0) if "gap" in over else [known.gap]
     places = []
@@ -132,31 +132,29 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
     return places
 
 
-def _gaps(g: Geometry, radius: float, pitch: float) -> list[float]:
-    body = next(outline for name, outline, _ in solids_of_geometry(g) if name == "body")
-    room = largest_gap(body, radius, pitch)
+def _gaps(g: RobotGeometry, radius: float, pitch: float) -> list[float]:
+    room = largest_gap(g.body, radius, pitch)
     ends = [min(share * 0.5 * g.body_diameter, room) for share in GAP_BAND]
     return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
 
 
 @lru_cache(maxsize=4096)
-def _steepest(g: Geometry, radius: float, gap: float, drop: float) -> float:
+def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float) -> float:
     """Pitch at which tail or coupling keep no more than the clearance, rad; 0 where even a level robot does not.
 
     The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
     """
-    outlines = {name: outline for name, outline, _ in solids_of_geometry(g)}
     xi = g.tail_length * np.linspace(0.0, 1.0, _SWEPT)
     reach, _ = amplitude_envelope(xi, *(np.full(1, value) for value in (g.amplitude, g.tail_length, g.taper)))
     behind = -0.5 * g.body_length - g.coupling_length - xi
     wire = 0.5 * g.wire_diameter
     found = contact_pitch(
-        outlines["body"],
+        g.body,
         np.stack([behind, reach, np.zeros(_SWEPT)], axis=1),
         wire,
         radius,
         gap,
-        coupling=outlines.get("coupling"),
+        coupling=g.outlines.get("coupling"),
         tail_drop=drop,
         clearance=_SLACK * WIRE_FILM * wire,
     )

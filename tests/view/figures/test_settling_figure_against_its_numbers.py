@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.dynamics.resting_forces import Film, settling_path
+from spirillum.dynamics.resting_forces import Film, descent_of
 from spirillum.view.figures.settling import settling_figure
 
 
@@ -23,7 +23,7 @@ def settling() -> Any:
         prediction=SimpleNamespace(tail_rotation_rate=7.5),
         weight=0.028,
         films=films,
-        path=settling_path(films, 0.028),
+        descent=descent_of(films, 0.028),
         lubrication_ratios=np.array([1.0, 0.9, 0.8]),
     )
 
@@ -32,8 +32,8 @@ def test_panels_show_gap_azimuth_and_resistance(settling: Any) -> None:
     gap, azimuth, resistance = settling_figure(settling).axes
     assert gap.get_xlabel() == "time (s)"
     assert "(mm)" in gap.get_ylabel()
-    assert gap.lines[0].get_ydata() == pytest.approx(1e3 * settling.path.gap)
-    assert azimuth.lines[0].get_ydata() == pytest.approx(np.rad2deg(settling.path.azimuth))
+    assert gap.lines[0].get_ydata() == pytest.approx(1e3 * settling.descent.gap)
+    assert azimuth.lines[0].get_ydata() == pytest.approx(np.rad2deg(settling.descent.azimuth))
     thin, computed = resistance.lines
     assert computed.get_ydata() == pytest.approx([2.5e-6 * h**-1.5 for h in (1e-3, 5e-4, 2e-4)])
     assert np.asarray(computed.get_ydata()) / np.asarray(thin.get_ydata()) == pytest.approx([1.0, 0.9, 0.8])

@@ -1,15 +1,20 @@
-"""Answers of the model `tube` kept on disk, by the content of the question.
+"""Answers of the model `tube` kept on disk, by the content of the question and of the code that answers it.
 
 The folder is the user's cache folder, or what SPIRILLUM_CACHE names (`off` for none). It is safe to delete, and
 several runs may share it: files are written whole, and one that is damaged is computed anew.
+
+Every answer is filed under its question, the source of all modules of this package that the computing one imports,
+directly or not, and the versions of the numerical libraries. A changed byte in any of them makes a new key.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 from collections.abc import Callable
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TypeVar
 
@@ -20,10 +25,13 @@ from spirillum.errors import InputError
 from spirillum.files import whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = ["cache_folder", "kept_or_computed"]
+__all__ = ["cache_folder", "imported_sources", "kept_or_computed"]
 
-_EDITION = "tube 6"
-"""Changes with everything that changes an answer."""
+_PACKAGE = Path(__file__).parents[2]
+_LIBRARIES = ("numpy", "scipy", "numba")
+_IMPORT = re.compile(
+    rb"^[ \t]*(?:from (spirillum[\w.]*) import (\([^)]*\)|[^\n]*)|import (spirillum[\w.]*))", re.MULTILINE
+)
 
 _Q = TypeVar("_Q", bound=tuple[object, ...])
 
@@ -51,13 +59,14 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
     """The answer to a question, (13, 13), from the folder or computed and kept there.
 
     Args:
-        question: numbers and words that decide the answer; its text is the key, numbers to the last digit.
-        compute: answers it.
+        question: numbers and words that decide the answer; its text is part of the key, numbers to the last digit.
+        compute: answers it; the sources that its module imports are the other part.
     """
     folder = cache_folder()
-    if folder is None:
+    code = None if folder is None else _digest(compute.__module__)
+    if folder is None or code is None:
         return compute(question)
-    key = hashlib.sha256(f"{_EDITION} {question!r}".encode()).hexdigest()
+    key = hashlib.sha256(f"{code} {question!r}".encode()).hexdigest()
     path = folder / f"{key[:40]}.f64"
     found = _kept(path)
     if found is None:
@@ -81,3 +90,41 @@ def _kept(path: Path) -> Samples | None:
     if len(content) != 8 * MOTIONS**2 or hashlib.sha256(content).digest() != digest:
         return None
     return np.frombuffer(content, dtype="<f8").astype(np.float64).reshape(MOTIONS, MOTIONS)
+
+
+@lru_cache(maxsize=8)
+def _digest(module: str) -> str | None:
+    """What stands for the code behind a module, once per process; None where its source is not at hand."""
+    sources = imported_sources(module)
+    if module not in sources:
+        return None
+    found = hashlib.sha256(" ".join(version(name) for name in _LIBRARIES).encode())
+    for name in sorted(sources):
+        found.update(f" {name} {len(sources[name])} ".encode() + sources[name])
+    return found.hexdigest()
+
+
+def imported_sources(module: str) -> dict[str, bytes]:
+    """Source of a module and of all modules of this package that it imports, directly or not, at any depth of nesting.
+
+    Args:
+        module: dotted name.
+    """
+    found: dict[str, bytes] = {}
+    ahead = [module]
+    while ahead:
+        name = ahead.pop()
+        if name in found:
+            continue
+        place = _PACKAGE.joinpath(*name.split(".")[1:])
+        package = place.is_dir()
+        try:
+            found[name] = (place / "__init__.py" if package else place.with_suffix(".py")).read_bytes()
+        except OSError:  # a name that is imported from a package, not a module
+            continue
+        for source, names, whole in _IMPORT.findall(found[name]):
+            target = (source or whole).decode()
+            ahead.append(target)
+            if source and _PACKAGE.joinpath(*target.split(".")[1:]).is_dir():
+                ahead += [f"{target}.{each.decode()}" for each in re.findall(rb"\w+", names)]
+    return found

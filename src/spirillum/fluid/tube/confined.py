@@ -16,10 +16,11 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.tube.solids import MOTIONS, Solids
-from spirillum.fluid.tube.wall import Seat, point_reflection, waves_between
+from spirillum.fluid.tube.wall import point_reflection, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
+from spirillum.robot.seat import Seat
 
 __all__ = ["Held", "Strengths", "held_in_tube"]
 

@@ -14,6 +14,7 @@ makes 3 pi R/8 of it (Dagan, Weinbaum and Pfeffer, J. Fluid Mech. 115:505, 1982)
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -25,15 +26,16 @@ from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.cache import kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube
-from spirillum.fluid.tube.place import Place, number_of, place_of, placement_answer, seat_limits
+from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids
-from spirillum.fluid.wire.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
+from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
 from spirillum.fluid.wire.stokeslets import Wire
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
+from spirillum.robot.seat import Seat
 
 __all__ = ["END_LOSS", "Tube", "held_robot"]
 
@@ -51,11 +53,11 @@ _MOST_UNKNOWNS = 11_000
 """Of one parity: 2 GiB for the factors of both."""
 
 
-def _near(g: Geometry) -> Samples:
+def _near(g: RobotGeometry) -> Samples:
     """Where any tail's root may be, behind the coupling: (x, rho, blob radius), the same for all tails of a robot."""
     widest = max(0.5 * g.coupling_diameter, 4.0 * g.wire_diameter)
     rho = np.linspace(0.0, widest, 9)
-    blob = wire_of_geometry(g, 1.0).blob
+    blob = g.wire().blob
     return np.stack([np.full(9, -0.5 * g.body_length - g.coupling_length), rho, np.full(9, blob)], axis=1)
 
 
@@ -64,32 +66,31 @@ class _SolidKey(NamedTuple):
 
     solids: tuple[tuple[Outline, int], ...]
     near: tuple[tuple[float, ...], ...]
-    place: Place
+    seat: Seat
     fineness: Fineness
 
 
-def _solid_key(g: Geometry, part: str, place: Place, fineness: Fineness) -> _SolidKey:
-    solids = tuple((outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part])
+def _solid_key(g: RobotGeometry, part: str, seat: Seat, fineness: Fineness) -> _SolidKey:
     near = tuple(map(tuple, _near(g).tolist())) if "tail" in PIECES[part] else ()
-    return _SolidKey(solids, near, place._replace(drop=0.0), fineness)
+    return _SolidKey(tuple(g.solids(part)), near, replace(seat, tail_drop=0.0), fineness)
 
 
 @lru_cache(maxsize=1)
 def _solids(key: _SolidKey) -> Solids:
-    """The last one is kept: tails at one place come one after the other, and factors take memory."""
-    return Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    """The last one is kept: tails in one seat come one after the other, and factors take memory."""
+    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
 
 
 @lru_cache(maxsize=4096)
 def _size(key: _SolidKey) -> int:
     """Number of unknowns of one parity."""
-    return Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3)).size
+    return Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3)).size
 
 
 @lru_cache(maxsize=4096)
 def _waves(key: _SolidKey) -> int:
     """Number of waves between solids and wall."""
-    solids = Solids(key.solids, key.place.seat, key.fineness, np.array(key.near).reshape(-1, 3))
+    solids = Solids(key.solids, key.seat, key.fineness, np.array(key.near).reshape(-1, 3))
     return 0 if solids.none else sum(solids.waves(solids.gap).orders)
 
 
@@ -101,17 +102,17 @@ def _turned(wire: Wire, phase: float) -> Wire:
 class _Question(NamedTuple):
     """All that decides an answer, but for the viscosity and the ends."""
 
-    geometry: Geometry
+    geometry: RobotGeometry
     part: str
-    place: Place
+    seat: Seat
     fineness: Fineness
     phase: float
 
 
 def _held(question: _Question) -> Held:
-    g, part, place, fineness, phase = question
-    wires = [(_turned(wire_of_geometry(g, 1.0), phase), 1)] if "tail" in PIECES[part] else []
-    return held_in_tube(_solids(_solid_key(g, part, place, fineness)), wires, place.drop)
+    g, part, seat, fineness, phase = question
+    wires = [(_turned(g.wire(), phase), 1)] if "tail" in PIECES[part] else []
+    return held_in_tube(_solids(_solid_key(g, part, seat, fineness)), wires, seat.tail_drop)
 
 
 def _computed(question: _Question) -> Samples:
@@ -142,7 +143,7 @@ def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
         phase: of the tail, rad.
     """
     fineness = Tube().fineness(batch.options)
-    return _held(_Question(Geometry.of(batch, index), "robot", place_of(batch, index), fineness, phase))
+    return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
 
 
 class Tube(SwimmerModel):
@@ -187,10 +188,11 @@ class Tube(SwimmerModel):
         fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch) + limits), (batch.size,))
         unknowns, waves = np.zeros(batch.size), np.zeros(batch.size)
         for index in np.flatnonzero(fit).tolist():
-            g = Geometry.of(batch, index)
-            unknowns[index] = _size(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+            g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
+            key = _solid_key(g, part, seat, self.fineness(batch.options))
+            unknowns[index] = _size(key)
             if unknowns[index] <= _MOST_UNKNOWNS:
-                waves[index] = _waves(_solid_key(g, part, place_of(batch, index), self.fineness(batch.options)))
+                waves[index] = _waves(key)
         name, why = (
             "that gap and tolerance ask for",
             "a wider placement.gap, a larger model.tube.tolerance or a narrower",
@@ -268,8 +270,8 @@ class Tube(SwimmerModel):
         fineness = self.fineness(batch.options)
         turns = np.broadcast_to(phase, (batch.size,))
         for index in np.flatnonzero(answerable):
-            g, place = Geometry.of(batch, int(index)), place_of(batch, int(index))
+            g, seat = RobotGeometry.of(batch, int(index)), seat_of(batch, int(index))
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
-            question = _Question(g, part, place, fineness, turn)
+            question = _Question(g, part, seat, fineness, turn)
             found[index] = number_of(batch.viscosity, int(index)) * _answer(question)
         return found

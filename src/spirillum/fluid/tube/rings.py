@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.wall import Seat, Waves, each, extensions, point_waves, times_layers, weighted_layers
+from spirillum.fluid.tube.wall import Waves, each, extensions, point_waves, times_layers, weighted_layers
 from spirillum.fluid.wire.revolution import Panels
+from spirillum.robot.seat import Seat
 
 __all__ = ["LevelRings", "Rings", "Rows", "TiltedRings"]
 

@@ -18,11 +18,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, TiltedRings
-from spirillum.fluid.tube.wall import Seat, Waves, waves_between
+from spirillum.fluid.tube.wall import Waves, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy
 from spirillum.robot.outline import Outline
+from spirillum.robot.seat import Seat
 
 __all__ = ["MOTIONS", "Fineness", "Solids"]
 

@@ -20,7 +20,6 @@ import numpy as np
 from spirillum.arrays import Samples
 
 __all__ = [
-    "Seat",
     "Waves",
     "each",
     "extensions",
@@ -120,37 +119,6 @@ def weighted_layers(waves: Waves, number: int) -> Samples:
     layers[1:] *= 2.0
     layers *= waves.weight[number]
     return layers
-
-
-@dataclass(frozen=True)
-class Seat:
-    """A tube, and where in it the robot's axis runs; axes here are x along each, y up, z to the right."""
-
-    radius: float
-    """Of the tube, m."""
-    offset: float
-    """How far the body's mid-length lies below the tube's axis, m."""
-    pitch: float = 0.0
-    """Angle by which the nose is raised, rad."""
-
-    @property
-    def rotation(self) -> Samples:
-        """From the robot's axes to the tube's, 3x3."""
-        c, s = np.cos(self.pitch), np.sin(self.pitch)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-
-    def placed(self, points: Samples) -> Samples:
-        """Points in the robot's axes as points about the tube's axis, (n, 3)."""
-        moved: Samples = points @ self.rotation.T - np.array([0.0, self.offset, 0.0])
-        return moved
-
-    def distances(self, x: Samples, rho: Samples) -> Samples:
-        """Smallest distances from the wall of rings about the robot's axis."""
-        theta = np.linspace(0.0, np.pi, 181)
-        height = x[..., None] * np.sin(self.pitch) + rho[..., None] * np.cos(theta) * np.cos(self.pitch) - self.offset
-        farthest = np.max(np.hypot(height, rho[..., None] * np.sin(theta)), axis=-1)
-        nearest: Samples = self.radius - farthest
-        return nearest
 
 
 def times_layers(waves_at: Samples, waves: Waves, number: int) -> Samples:

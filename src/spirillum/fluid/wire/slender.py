@@ -17,15 +17,14 @@ from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, 
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.wire.interaction import Resolution, Solution, solve
-from spirillum.fluid.wire.pieces import PIECES, Geometry, solids_of_geometry, wire_of_geometry
-from spirillum.fluid.wire.stokeslets import Accuracy, Wire, closest_approach, station_count
+from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
+from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.options import ModelOptions
-from spirillum.robot.outline import Outline
 
-__all__ = ["Slender", "robot_solution", "solids_of", "tail_wire"]
+__all__ = ["Slender", "robot_solution"]
 
 _MOST_STATIONS: dict[Accuracy, int] = {"standard": 1500, "high": 800}
 _SMALLEST_CLEARANCE = 0.01  # relative to the coupling's diameter
@@ -42,25 +41,14 @@ _CHECKS = {  # what differs most from each: the form of the wire, and the spacin
 }
 
 
-def solids_of(batch: RobotBatch, index: int) -> tuple[tuple[str, Outline, int], ...]:
-    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution of robot number `index`."""
-    return tuple(solids_of_geometry(Geometry.of(batch, index)))
-
-
-def tail_wire(batch: RobotBatch, index: int) -> Wire:
-    """The tail of robot number `index` as a wire, at phase 0."""
-    return wire_of_geometry(Geometry.of(batch, index), 1.0)
-
-
 def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
     """Tractions on robot number `index` for all unit twists, at phase 0."""
-    return _solved(Geometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
+    return _solved(RobotGeometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
 
 
-def _solved(g: Geometry, part: str, resolution: Resolution) -> Solution:
-    solids = [(outline, moves) for name, outline, moves in solids_of_geometry(g) if name in PIECES[part]]
-    wires = [(wire_of_geometry(g, resolution.spacing), 1)] if "tail" in PIECES[part] else []
-    return solve(solids, wires, resolution)
+def _solved(g: RobotGeometry, part: str, resolution: Resolution) -> Solution:
+    wires = [(g.wire(resolution.spacing), 1)] if "tail" in PIECES[part] else []
+    return solve(g.solids(part), wires, resolution)
 
 
 def _slimness(batch: RobotBatch) -> list[Limit]:
@@ -82,18 +70,18 @@ def _apart(batch: RobotBatch, fit: Flags) -> Limit:
     fit = np.broadcast_to(fit & batch.known & all_hold(assembly_limits(batch)), (batch.size,))
     nearest = np.full(batch.size, np.inf)
     for index in np.flatnonzero(fit):
-        nearest[index] = _closest(Geometry.of(batch, int(index)))
+        nearest[index] = _closest(RobotGeometry.of(batch, int(index)))
     why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
     return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
 
 
 @lru_cache(maxsize=4096)
-def _closest(g: Geometry) -> float:
-    return closest_approach(wire_of_geometry(g, 1.0))
+def _closest(g: RobotGeometry) -> float:
+    return closest_approach(g.wire())
 
 
 @lru_cache(maxsize=4096)
-def _matrix(g: Geometry, part: str, resolution: Resolution) -> Samples:
+def _matrix(g: RobotGeometry, part: str, resolution: Resolution) -> Samples:
     """12x12 of a part at phase 0 and viscosity 1."""
     matrix = _solved(g, part, resolution).matrix
     matrix.flags.writeable = False
@@ -247,6 +235,6 @@ class Slender(SwimmerModel):
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
         found = np.full((batch.size, 12, 12), np.nan)
         for index in np.flatnonzero(answerable):
-            viscosity = float(batch.viscosity[index if batch.viscosity.size > 1 else 0])
-            found[index] = viscosity * _matrix(Geometry.of(batch, int(index)), part, resolution)
+            viscosity = number_of(batch.viscosity, int(index))
+            found[index] = viscosity * _matrix(RobotGeometry.of(batch, int(index)), part, resolution)
         return found

@@ -10,9 +10,9 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 
 from spirillum.arrays import Values
-from spirillum.fluid.tube.wall import Seat
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import Seat
 from spirillum.view.figures.solids import wire_line
 
 __all__ = ["draw_glass", "draw_section"]

@@ -41,19 +41,19 @@ def settling_figure(settling: Settling) -> Figure:
 
 
 def _gap(axes: Axes, settling: Settling) -> None:
-    path = settling.path
-    lengths = Scale.of(path.gap, "m")
-    axes.plot(path.time, lengths(path.gap), color=COLOURS["blue"])
+    descent = settling.descent
+    lengths = Scale.of(descent.gap, "m")
+    axes.plot(descent.time, lengths(descent.gap), color=COLOURS["blue"])
     axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, path.time[-1])
+    axes.set_xlim(0.0, descent.time[-1])
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"gap under the body ({lengths.unit})")
 
 
 def _azimuth(axes: Axes, settling: Settling) -> None:
-    path = settling.path
-    axes.plot(path.time, np.rad2deg(path.azimuth), color=COLOURS["vermillion"])
-    axes.set_xlim(0.0, path.time[-1])
+    descent = settling.descent
+    axes.plot(descent.time, np.rad2deg(descent.azimuth), color=COLOURS["vermillion"])
+    axes.set_xlim(0.0, descent.time[-1])
     axes.set_xlabel("time (s)")
     axes.set_ylabel("azimuth on the wall (deg)")
 

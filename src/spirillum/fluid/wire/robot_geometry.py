@@ -1,20 +1,20 @@
-"""The pieces of one robot as resolved models take them: what decides them, as a key, its solids and its wire."""
+"""Geometry of one robot as the resolved models take it: a hashable key with its solids of revolution and its wire."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from spirillum.arrays import PerRobot
 from spirillum.fluid.wire.stokeslets import Wire, stations_along
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import centreline
 from spirillum.robot.outline import Outline, body_outline, solid_outlines
 from spirillum.robot.parts import End, Shape
 
-__all__ = ["PIECES", "Geometry", "solids_of_geometry", "wire_of_geometry"]
+__all__ = ["PIECES", "RobotGeometry", "number_of"]
 
 _POINTS_PER_TURN = 200
 PIECES = {
@@ -26,23 +26,13 @@ PIECES = {
 }
 """Pieces of each part."""
 
-_NUMBERS = (
-    "body_diameter",
-    "body_length",
-    "fillet",
-    "coupling_diameter",
-    "coupling_length",
-    "coupling_clearance",
-    "wavelength",
-    "amplitude",
-    "tail_length",
-    "wire_diameter",
-    "taper",
-    "hand",
-)
+
+def number_of(column: PerRobot, index: int) -> float:
+    """Value of a column of a batch for robot number `index`."""
+    return float(column[index if column.size > 1 else 0])
 
 
-class Geometry(NamedTuple):
+class RobotGeometry(NamedTuple):
     """Everything that the resistance depends on, but for the viscosity; lengths in m."""
 
     shape: Shape
@@ -62,32 +52,38 @@ class Geometry(NamedTuple):
     hand: float
 
     @classmethod
-    def of(cls, batch: RobotBatch, index: int) -> Geometry:
+    def of(cls, batch: RobotBatch, index: int = 0) -> RobotGeometry:
         """Of robot number `index`."""
+        shared = {"shape": batch.shape, "front": batch.front, "rear": batch.rear}
+        numbers = {name: number_of(getattr(batch, name), index) for name in cls._fields if name not in shared}
+        return cls(**shared, **numbers)  # type: ignore[arg-type]
 
-        def number(name: str) -> float:
-            column = getattr(batch, name)
-            return float(column[index if column.size > 1 else 0])
+    @property
+    def body(self) -> Outline:
+        """Outline of the body."""
+        return body_outline(self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear)
 
-        return cls(
-            **{name: number(name) for name in _NUMBERS},
-            shape=batch.shape,
-            front=batch.front,
-            rear=batch.rear,
-        )
+    @property
+    def outlines(self) -> dict[str, Outline]:
+        """Outlines of the solids of revolution by name: `body`, and `coupling` where there is one."""
+        coupling = self.coupling_diameter, self.coupling_length, self.coupling_clearance
+        return solid_outlines(self.body, self.body_length, *coupling)
 
+    def solids(self, part: str) -> list[tuple[Outline, int]]:
+        """Outline and link (0 body, 1 rotor) of each solid of one of `PIECES`."""
+        return [(outline, int(name != "body")) for name, outline in self.outlines.items() if name in PIECES[part]]
 
-def solids_of_geometry(g: Geometry) -> Iterator[tuple[str, Outline, int]]:
-    """Name, outline and moving part (0 body, 1 rotor) of each solid of revolution."""
-    body = body_outline(g.shape, g.body_diameter, g.body_length, g.fillet, g.front, g.rear)
-    coupling = g.coupling_diameter, g.coupling_length, g.coupling_clearance
-    for name, outline in solid_outlines(body, g.body_length, *coupling).items():
-        yield name, outline, 0 if name == "body" else 1
+    def wire(self, spacing: float = 1.0) -> Wire:
+        """The tail at phase 0.
+
+        Args:
+            spacing: of the stations, relative to the standard one.
+        """
+        return _wire(self, spacing)
 
 
 @lru_cache(maxsize=64)
-def wire_of_geometry(g: Geometry, spacing: float) -> Wire:
-    """The tail at phase 0."""
+def _wire(g: RobotGeometry, spacing: float) -> Wire:
     turns = g.tail_length / g.wavelength
     count = int(np.ceil(_POINTS_PER_TURN * turns)) + 400
     share = np.linspace(0.0, 1.0, count)
