@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal
 
 from docutils import nodes
 from docutils.parsers.rst import directives
+from docutils.statemachine import StringList
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
@@ -20,12 +21,9 @@ from sphinx.util.docutils import SphinxDirective
 
 from spirillum.robot.fields import Section
 from spirillum.robot.meanings import meanings
-from spirillum.units import Kind, show
+from spirillum.units import Kind, for_people, show
 
 Rows = Iterable[Sequence[str]]
-
-# Units in which people read a default.
-_READABLE = {"m": "mm", "kg": "g"}
 
 
 def inline(text: str) -> list[nodes.Node]:
@@ -133,8 +131,8 @@ def _default(info: FieldInfo, kind: Kind | None) -> str:
     if value is None:
         return "unset"
     if kind is not None and isinstance(value, float):
-        unit = _READABLE.get(kind.unit)
-        return show(value, unit) if unit else f"{value:g} {kind.unit}"
+        unit = for_people(kind.unit)
+        return show(value, unit) if unit != kind.unit else f"{value:g} {kind.unit}"
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     if isinstance(value, (tuple, list)):
@@ -309,9 +307,9 @@ class Claims(SphinxDirective):
     """`claims`: the verdicts of the paper's study without observations."""
 
     def run(self) -> list[nodes.Node]:
-        from spirillum.papers.biorob2012.claims import evaluated
+        from spirillum.papers.registry import claims_of
 
-        rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in evaluated(_studied())]
+        rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
         header = ("Statement", "Paper", "Computed", "Verdict", "Reason")
         return [table(header, rows, (24, 12, 28, 12, 24))]
 
@@ -471,6 +469,29 @@ def _short_signature(
     return ("", None) if what == "class" and isinstance(obj, type) and issubclass(obj, BaseModel) else None
 
 
+class Room(SphinxDirective):
+    """`room NAME`: the reference of every module of a room, so that none can be forgotten."""
+
+    required_arguments = 1
+    option_spec: ClassVar[dict[str, Any]] = {}
+
+    def run(self) -> list[nodes.Node]:
+        import spirillum
+
+        base = Path(spirillum.__file__).parent
+        place = base / self.arguments[0]
+        found = sorted(place.rglob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
+        lines: list[str] = []
+        for path in found:
+            if path.stem != "__init__":
+                module = ".".join(("spirillum", *path.relative_to(base).with_suffix("").parts))
+                lines += [f"## `{module}`", "", "```{eval-rst}", f".. automodule:: {module}", "```", ""]
+        section = nodes.section()
+        section.document = self.state.document
+        self.state.nested_parse(StringList(lines), self.content_offset, section, match_titles=True)
+        return section.children
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     for name, directive in {
@@ -487,6 +508,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
         "models": Models,
         "reference-list": References,
         "command-options": CommandOptions,
+        "room": Room,
     }.items():
         app.add_directive(name, directive)
     app.connect("builder-inited", _draw_pictures)
