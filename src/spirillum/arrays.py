@@ -19,6 +19,7 @@ __all__ = [
     "Amplitudes",
     "Axial",
     "AxialLoad",
+    "AxialWhole",
     "Flags",
     "Matrix6",
     "Matrix12",
@@ -51,6 +52,8 @@ Axial: TypeAlias = Float[_Floats, "*#n 4 4"]
 """Axial resistance of both parts: rows and columns (F_x, T_x; U_x, Omega_x) of body, then of rotor."""
 AxialLoad: TypeAlias = Float[_Floats, "*#n 4"]
 """Axial wrench (F_x, T_x) on body, then on rotor."""
+AxialWhole: TypeAlias = Float[_Floats, "*#n 3 3"]
+"""Axial resistance of the whole robot: force on it, torque on body, torque on rotor against U, Omega, omega."""
 MeanFlow: TypeAlias = Float[_Floats, "*#n 5"]
 """Mean velocity of the fluid per unit (U_x, Omega_x) of body and of rotor, and with the robot at rest."""
 Matrix6: TypeAlias = Float[_Floats, "*#n 6 6"]

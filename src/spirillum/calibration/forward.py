@@ -8,7 +8,7 @@ polynomials through Chebyshev points, whose error is measured at points in betwe
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,15 @@ from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.batch import Electrics, RobotBatch
-from spirillum.swimming.balance import force_free, friction_torques, rates_per_torque
+from spirillum.swimming.balance import (
+    TorqueBalance,
+    body_per_tail,
+    force_free,
+    friction_torques,
+    joined,
+    rates_per_torque,
+    with_body_factors,
+)
 from spirillum.swimming.motor import steady_current
 
 __all__ = ["Draws", "Forward", "Predicted", "Table", "TableError", "axis_points", "kinematics", "tabulated"]
@@ -78,15 +86,9 @@ class TableError:
         return max(self.interpolation, self.resolution, self.whole)
 
 
-def _three(axial: Samples) -> Samples:
-    """The 4x4 of both parts as a 3x3: both share U, and their forces are added."""
-    rows = np.stack([axial[..., 0, :] + axial[..., 2, :], axial[..., 1, :], axial[..., 3, :]], axis=-2)
-    return np.stack([rows[..., 0] + rows[..., 2], rows[..., 1], rows[..., 3]], axis=-1)
-
-
 def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tuple[Samples, ...]:
     """Summands of the balance matrix; RFT is linear in both of its coefficients."""
-    whole = np.broadcast_to(_three(model.axial(batch)), (batch.size, 3, 3))
+    whole = np.broadcast_to(joined(model.axial(batch)), (batch.size, 3, 3))
     if not coefficients:
         return (whole,)
     own = batch.options.rft
@@ -95,7 +97,7 @@ def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tup
         value = getattr(own, name)
         doubled = own.model_copy(update={name: 2.0 * value})
         other = replace(batch, options=batch.options.model_copy(update={"rft": doubled}))
-        found.append((_three(model.axial(other)) - whole) / value)
+        found.append((joined(model.axial(other)) - whole) / value)
     rest = whole - own.normal_factor * found[0] - own.tangential_factor * found[1]
     return rest, found[0], found[1]
 
@@ -182,14 +184,10 @@ class Forward:
         m = parts[0]
         for part, name in zip(parts[1:], ("normal_factor", "tangential_factor"), strict=False):
             m = m + np.asarray(draws.get(name, self.factors.get(name, 1.0)))[..., None, None] * part
-        drag = (np.asarray(draws.get("body_drag", self.factors.get("body_drag", 1.0))) - 1.0) * table.drag
-        rotation = (
-            np.asarray(draws.get("body_rotation", self.factors.get("body_rotation", 1.0))) - 1.0
-        ) * table.rotation
-        shape = np.broadcast_shapes(m.shape[:2], np.shape(drag), np.shape(rotation))
-        full = np.array(np.broadcast_to(m, (*shape, 3, 3)))
-        full[..., 0, 0] += drag
-        full[..., 1, 1] += rotation
+        drag, rotation = (
+            np.asarray(draws.get(name, self.factors.get(name, 1.0))) for name in ("body_drag", "body_rotation")
+        )
+        full = with_body_factors(m, (drag, rotation), (table.drag, table.rotation))
         if "viscosity" in draws:
             full = full * (np.asarray(draws["viscosity"]) / self.viscosity)[..., None, None]
         return full
@@ -209,31 +207,27 @@ class Forward:
         both: Samples = np.einsum("wja,wjb,abjkl->wjkl", weights[0], weights[1], part, optimize=True)
         return both
 
-    def predict(self, draws: Draws) -> Predicted:
-        """Kinematics (15): what every turn of the tail gives, from zero force and zero torque on the whole."""
-        return kinematics(self.matrices(draws))
+    def balance(self, draws: Draws) -> TorqueBalance:
+        """Force-free torque balances, (draws, robots)."""
+        return force_free(self.matrices(draws))
 
-    def motor_rate(self, draws: Draws, friction: Samples) -> Samples:
+    def predict(self, draws: Draws) -> Predicted:
+        """Kinematics (15) at the draws."""
+        return kinematics(self.balance(draws))
+
+    def motor_rate(self, balance: TorqueBalance, draws: Draws, friction: Samples) -> Samples:
         """omega_m at full throttle with B_eff in the joint, from (15), (17) and (18), rad/s, (draws, robots).
 
         Args:
+            balance: `balance` of the draws.
             draws: parameters.
             friction: B_eff, N m s/rad.
         """
         motor = self._motor(draws)
-        m = self.matrices(draws)
-        shape = np.broadcast_shapes(m.shape[:2], np.shape(friction), *_motor_shapes(motor))
-        flat = np.broadcast_to(m, (*shape, 3, 3)).reshape(-1, 3, 3)
-        four = np.zeros((flat.shape[0], 4, 4))
-        pick = np.array([0, 1, 3])
-        four[:, pick[:, None], pick] = flat
-        balance = force_free(four, np.zeros((1, 4)))
-        joint = np.broadcast_to(friction, shape).reshape(-1)
-        body, tail = rates_per_torque(balance, friction_torques("rotor", joint, joint))
-        flat_motor, slip = _flat(motor, shape), tail - body
-        per_current = flat_motor.torque_constant * slip
-        current = steady_current(flat_motor, np.zeros(1), flat_motor.back_emf_constant * per_current)
-        found: Samples = (flat_motor.polarity * per_current * current).reshape(shape)
+        body, tail = rates_per_torque(balance, friction_torques("rotor", friction, friction))
+        per_current = motor.torque_constant * (tail - body)
+        current = steady_current(motor, np.zeros(1), motor.back_emf_constant * per_current)
+        found: Samples = motor.polarity * per_current * current
         return found
 
     def friction(
@@ -247,37 +241,29 @@ class Forward:
             tail_share: observed omega/omega_m of each robot; None or NaN: as the model turns the body.
             reading: `rotor`, or `paper`, in which the body's torque row holds -K_m I.
         """
-        m = self.matrices(draws)
-        found = kinematics(m)
-        torque, tail, rate = self._at_motor_rate(found, draws, motor_rate, tail_share)
-        if reading == "rotor":
-            joint: Samples = (torque - found.load * tail) / rate
-            return joint
-        body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
-        body = _printed_body(m, torque, tail)
-        load = (m[..., 2, 1] + m[..., 2, 0] * body_u) * body + (m[..., 2, 2] + m[..., 2, 0] * rotor_u) * tail
-        printed: Samples = (torque - load) / rate
-        return printed
+        s = self.balance(draws)
+        turning = kinematics(s).turning
+        torque, tail, rate = self._at_motor_rate(turning, draws, motor_rate, tail_share)
+        body = turning * tail if reading == "rotor" else s.body_rate_as_printed(torque, tail)
+        found: Samples = (torque - s.rotor_load(body, tail)) / rate
+        return found
 
     def printed_turning(self, draws: Draws, motor_rate: Samples, tail_share: Samples) -> Samples:
         """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates; arguments as `friction`."""
-        m = self.matrices(draws)
-        torque, tail, _ = self._at_motor_rate(kinematics(m), draws, motor_rate, tail_share)
-        found: Samples = _printed_body(m, torque, tail) / tail
+        s = self.balance(draws)
+        torque, tail, _ = self._at_motor_rate(kinematics(s).turning, draws, motor_rate, tail_share)
+        found: Samples = s.body_rate_as_printed(torque, tail) / tail
         return found
 
     def _at_motor_rate(
-        self, found: Predicted, draws: Draws, motor_rate: Samples, tail_share: Samples | None
+        self, turning: Samples, draws: Draws, motor_rate: Samples, tail_share: Samples | None
     ) -> tuple[Samples, Samples, Samples]:
         """K_m I of (17), the tail's rate and the motor's, all in the motor's own sense."""
         motor = self._motor(draws)
-        own = 1.0 / (1.0 - found.turning)
+        own = 1.0 / (1.0 - turning)
         share = own if tail_share is None else np.where(np.isnan(tail_share), own, tail_share)
-        shape = np.broadcast_shapes(share.shape, np.shape(motor_rate), *_motor_shapes(motor))
-        rate = np.broadcast_to(np.abs(motor_rate), shape)
-        flat_motor = _flat(motor, shape)
-        emf = flat_motor.back_emf_constant * rate.reshape(-1)
-        torque = motor.torque_constant * steady_current(flat_motor, emf, np.zeros(1)).reshape(shape)
+        rate = np.abs(motor_rate)
+        torque = motor.torque_constant * steady_current(motor, motor.back_emf_constant * rate, np.zeros(1))
         return torque, share * rate, rate
 
     def _motor(self, draws: Draws) -> Electrics:
@@ -297,34 +283,9 @@ class Forward:
         return max(float(np.max(np.abs(a / b - 1.0))) for a, b in pairs)
 
 
-def kinematics(m: Samples) -> Predicted:
-    """The balance of force and torque on the whole, per rate of the tail.
-
-    Args:
-        m: balance matrices, (..., 3, 3), as in `Table`.
-    """
-    force = m[..., 0, :]
-    torque = m[..., 1, :] + m[..., 2, :]
-    determinant = force[..., 0] * torque[..., 1] - force[..., 1] * torque[..., 0]
-    advance = (force[..., 1] * torque[..., 2] - force[..., 2] * torque[..., 1]) / determinant
-    turning = (force[..., 2] * torque[..., 0] - force[..., 0] * torque[..., 2]) / determinant
-    load = m[..., 2, 0] * advance + m[..., 2, 1] * turning + m[..., 2, 2]
-    return Predicted(advance, turning, load)
-
-
-def _printed_body(m: Samples, torque: Samples, tail: Samples) -> Samples:
-    """Omega from the body's torque row with -K_m I in it, as (15) with (19) is printed."""
-    body_u, rotor_u = -m[..., 0, 1] / m[..., 0, 0], -m[..., 0, 2] / m[..., 0, 0]
-    found: Samples = -(torque + (m[..., 1, 2] + m[..., 1, 0] * rotor_u) * tail) / (m[..., 1, 1] + m[..., 1, 0] * body_u)
-    return found
-
-
-def _motor_shapes(motor: Electrics) -> list[tuple[int, ...]]:
-    """Shapes of what may be free in a motor."""
-    return [motor.torque_constant.shape, motor.back_emf_constant.shape]
-
-
-def _flat(motor: Electrics, shape: tuple[int, ...]) -> Electrics:
-    """Every column laid out over draws and robots, as one axis."""
-    columns = {f.name: np.broadcast_to(getattr(motor, f.name), shape).reshape(-1) for f in fields(motor)}
-    return replace(motor, **columns)
+def kinematics(balance: TorqueBalance) -> Predicted:
+    """Kinematics (15) without an imposed flow: the motion per rate of the tail, from zero force and torque."""
+    turning, _ = body_per_tail(balance)
+    return Predicted(
+        advance=balance.u_b * turning + balance.u_r, turning=turning, load=balance.rb * turning + balance.rr
+    )

@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
-from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, tabulated
+from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, kinematics, tabulated
 from spirillum.calibration.parameters import PARAMETERS, Coordinate, LogNormal, LogUniform, Parameter, Uniform
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
@@ -118,14 +118,15 @@ class Problem:
     def predicted(self, z: Samples) -> dict[Quantity, Samples]:
         """What is compared, (draws, robots)."""
         draws = self.draws(z)
-        found = self.forward.predict(draws)
+        balance = self.forward.balance(draws)
+        found = kinematics(balance)
         answer: dict[Quantity, Samples] = {
             "advance": np.where(self.experiment.by_motor, found.over_motor(), found.advance),
             "turning": found.turning,
         }
         if self.by_motor_rate:
             friction = draws.get("shared_friction", self.fixed_friction[None])
-            answer["motor_rate"] = self.forward.motor_rate(draws, friction)
+            answer["motor_rate"] = self.forward.motor_rate(balance, draws, friction)
         # What does not depend on any free number comes back once for all draws.
         shape = (z.shape[0], self.experiment.size)
         return {name: np.broadcast_to(answer[name], shape) for name in self.quantities}

@@ -9,6 +9,8 @@ from outside but the fluid's, F = -R V + L, so the force row gives U, and two to
 with the joint torque tau (motor on rotor), friction torques T_b, T_r that are linear in the rates, and the torques
 t_b, t_r of an imposed flow, which are zero where none is. The rates are those of a robot that coasts in the flow
 (tau = 0) plus what the joint torque adds in proportion.
+
+Arrays may have any leading axes: robots, or draws of a posterior by robots.
 """
 
 from __future__ import annotations
@@ -17,66 +19,174 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, AxialLoad, PerRobot
+from spirillum.arrays import Axial, AxialLoad, AxialWhole, Matrix12, Samples, Values
 from spirillum.robot.actuation import FrictionReading
 
 __all__ = [
+    "FRICTIONLESS",
     "FrictionTorques",
     "TorqueBalance",
+    "body_per_tail",
     "coasting_rates",
     "force_free",
     "friction_torques",
+    "joined",
     "rates_per_torque",
+    "released",
+    "with_body_factors",
 ]
+
+_ZERO = np.zeros(1)
+_ZERO.setflags(write=False)
+
+_SPINS = np.zeros((12, 7))
+"""Twists from (U, Omega_y, Omega_z) of both parts and their own rates about x, Omega and omega."""
+for _column, _row in enumerate((0, 1, 2, 4, 5)):
+    _SPINS[_row, _column] = _SPINS[6 + _row, _column] = 1.0
+_SPINS[3, 5] = _SPINS[9, 6] = 1.0
 
 
 class TorqueBalance(NamedTuple):
     """The robot free of axial force: torques against rates, and the speed that goes with them."""
 
-    bb: PerRobot
-    br: PerRobot
-    rb: PerRobot
-    rr: PerRobot
+    bb: Values
+    br: Values
+    rb: Values
+    rr: Values
     """Torque on body (b) and rotor (r) per rate of body and rotor, N m s."""
-    u_b: PerRobot
-    u_r: PerRobot
+    u_b: Values
+    u_r: Values
     """Speed per rate of body and rotor, m."""
-    u_0: PerRobot
+    u_0: Values = _ZERO
     """Speed at which an imposed flow carries the robot while nothing turns, m/s."""
-    t_b: PerRobot
-    t_r: PerRobot
+    t_b: Values = _ZERO
+    t_r: Values = _ZERO
     """Torque of the imposed flow on body (b) and rotor (r) meanwhile, N m."""
 
-    def speed(self, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    def speed(self, body_rate: Values, tail_rate: Values) -> Values:
         """U, m/s."""
         return self.u_b * body_rate + self.u_r * tail_rate + self.u_0
 
-    def body_load(self, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    def body_load(self, body_rate: Values, tail_rate: Values) -> Values:
         """Torque that turns the body against the fluid, N m."""
         return self.bb * body_rate + self.br * tail_rate - self.t_b
 
-    def rotor_load(self, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    def rotor_load(self, body_rate: Values, tail_rate: Values) -> Values:
         """T_h of eq. (18): torque that turns the rotor against the fluid, N m."""
         return self.rb * body_rate + self.rr * tail_rate - self.t_r
+
+    def body_rate_as_printed(self, motor_torque: Values, tail_rate: Values) -> Values:
+        """Omega from the body's torque row with -K_m I in it, as (15) with (19) is printed, rad/s."""
+        return -(motor_torque + self.br * tail_rate - self.t_b) / self.bb
 
 
 class FrictionTorques(NamedTuple):
     """Friction torques as coefficients: -T_b = bb Omega + br omega, -T_r = rb Omega + rr omega."""
 
-    bb: PerRobot
-    br: PerRobot
-    rb: PerRobot
-    rr: PerRobot
-    determinant: PerRobot
+    bb: Values
+    br: Values
+    rb: Values
+    rr: Values
+    determinant: Values
     """bb rr - br rb, without the cancellation."""
 
-    def power(self, body_rate: PerRobot, tail_rate: PerRobot) -> PerRobot:
+    def power(self, body_rate: Values, tail_rate: Values) -> Values:
         """Power that friction takes, W."""
         on_body = self.bb * body_rate + self.br * tail_rate
         return on_body * body_rate + (self.rb * body_rate + self.rr * tail_rate) * tail_rate
 
 
-def rates_per_torque(s: TorqueBalance, t: FrictionTorques) -> tuple[PerRobot, PerRobot]:
+FRICTIONLESS = FrictionTorques(_ZERO, _ZERO, _ZERO, _ZERO, _ZERO)
+
+
+def joined(axial: Axial) -> AxialWhole:
+    """The axial resistance of both parts as that of the whole robot: the parts share U, and their forces are added."""
+    m = np.empty((*axial.shape[:-2], 3, 3))
+    m[..., 0, 0] = axial[..., 0, 0] + axial[..., 0, 2] + axial[..., 2, 0] + axial[..., 2, 2]
+    for row, part in ((1, 1), (2, 3)):
+        m[..., row, 0] = axial[..., part, 0] + axial[..., part, 2]
+        m[..., 0, row] = axial[..., 0, part] + axial[..., 2, part]
+        m[..., row, 1], m[..., row, 2] = axial[..., part, 1], axial[..., part, 3]
+    return m
+
+
+def with_body_factors(
+    r: Samples, factors: tuple[Values, Values], isolated: tuple[Values, Values], entries: tuple[int, int] = (0, 1)
+) -> Samples:
+    """R with calibration factors on the body's drag: a factor f adds (f - 1) times the isolated body's drag.
+
+    Args:
+        r: R, (..., k, k).
+        factors: on D_x and on E_x.
+        isolated: D_x, N s/m, and E_x, N m s, of the isolated body.
+        entries: places of U and Omega on the diagonal of R.
+    """
+    more = [(factor - 1.0) * drag for factor, drag in zip(factors, isolated, strict=True)]
+    shape = np.broadcast_shapes(r.shape[:-2], *(extra.shape for extra in more))
+    r = np.array(np.broadcast_to(r, (*shape, *r.shape[-2:])))
+    for entry, extra in zip(entries, more, strict=True):
+        r[..., entry, entry] += extra
+    return r
+
+
+def force_free(m: AxialWhole, load: AxialLoad | None = None) -> TorqueBalance:
+    """Eliminate U from F = -R V + L with zero total force.
+
+    Args:
+        m: R of the whole robot, from `joined`.
+        load: L, the wrench of an imposed flow on both parts at rest; None: no flow is imposed.
+    """
+    drag, body_u, rotor_u = m[..., 0, 0], m[..., 1, 0], m[..., 2, 0]
+    u_b, u_r = -m[..., 0, 1] / drag, -m[..., 0, 2] / drag
+    balance = TorqueBalance(
+        bb=m[..., 1, 1] + body_u * u_b,
+        br=m[..., 1, 2] + body_u * u_r,
+        rb=m[..., 2, 1] + rotor_u * u_b,
+        rr=m[..., 2, 2] + rotor_u * u_r,
+        u_b=u_b,
+        u_r=u_r,
+    )
+    if load is None:
+        return balance
+    u_0 = (load[..., 0] + load[..., 2]) / drag
+    return balance._replace(u_0=u_0, t_b=load[..., 1] - body_u * u_0, t_r=load[..., 3] - rotor_u * u_0)
+
+
+def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
+    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot.
+
+    Args:
+        r: R at phase 0 of the tail, 12x12. For a body of revolution the tail's phase does not matter.
+
+    Returns:
+        The torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
+    """
+    shared = np.swapaxes(_SPINS, 0, 1) @ r @ _SPINS
+    rates: Samples = -np.asarray(np.linalg.solve(shared[..., :5, :5], shared[..., :5, 5:]), dtype=np.float64)
+    s = shared[..., 5:, 5:] + shared[..., 5:, :5] @ rates
+    entries = s[..., 0, 0], s[..., 0, 1], s[..., 1, 0], s[..., 1, 1]
+    return TorqueBalance(*entries, u_b=rates[..., 0, 0], u_r=rates[..., 0, 1]), rates
+
+
+def body_per_tail(s: TorqueBalance, t: FrictionTorques | None = None) -> tuple[Values, Values]:
+    """Kinematics (15), from the sum of both torque rows, in which the joint torque cancels.
+
+    Args:
+        s: the torque balance.
+        t: friction; None: none.
+
+    Returns:
+        Omega/omega, and the rate Omega that an imposed flow adds, rad/s. NaN where reading `paper` has a B_eff
+        beyond E_x, which would push the tail backwards.
+    """
+    on_body, on_tail = s.bb + s.rb, s.br + s.rr
+    if t is not None:
+        on_body, on_tail = on_body + (t.bb + t.rb), on_tail + (t.br + t.rr)
+        on_body = np.where(on_body > 0, on_body, np.nan)
+    return -on_tail / on_body, (s.t_b + s.t_r) / on_body
+
+
+def rates_per_torque(s: TorqueBalance, t: FrictionTorques) -> tuple[Values, Values]:
     """(Omega, omega) per joint torque: the solution of both torque rows for tau alone.
 
     Friction is kept apart from the fluid's torques, since most of it cancels: added to them first, a large
@@ -88,7 +198,7 @@ def rates_per_torque(s: TorqueBalance, t: FrictionTorques) -> tuple[PerRobot, Pe
     return body / determinant, tail / determinant
 
 
-def coasting_rates(s: TorqueBalance, t: FrictionTorques) -> tuple[PerRobot, PerRobot]:
+def coasting_rates(s: TorqueBalance, t: FrictionTorques) -> tuple[Values, Values]:
     """(Omega, omega) in an imposed flow without joint torque, rad/s: the solution of both torque rows for tau = 0."""
     determinant = _determinant(s, t)
     body = (s.rr * s.t_b - s.br * s.t_r) + (t.rr * s.t_b - t.br * s.t_r)
@@ -96,39 +206,14 @@ def coasting_rates(s: TorqueBalance, t: FrictionTorques) -> tuple[PerRobot, PerR
     return body / determinant, tail / determinant
 
 
-def _determinant(s: TorqueBalance, t: FrictionTorques) -> PerRobot:
+def _determinant(s: TorqueBalance, t: FrictionTorques) -> Values:
     """Of both torque rows, fluid and friction together."""
     fluid = s.bb * s.rr - s.br * s.rb
     mixed = s.bb * t.rr + t.bb * s.rr - s.br * t.rb - t.br * s.rb
     return fluid + mixed + t.determinant
 
 
-def force_free(r: Axial, load: AxialLoad) -> TorqueBalance:
-    """Eliminate U from F = -R V + L with zero total force.
-
-    Args:
-        r: R, the axial resistance of both parts.
-        load: L, the wrench of an imposed flow on the robot at rest.
-    """
-    body_u, rotor_u = r[..., 1, 0] + r[..., 1, 2], r[..., 3, 0] + r[..., 3, 2]
-    drag = r[..., 0, 0] + r[..., 0, 2] + r[..., 2, 0] + r[..., 2, 2]
-    u_b = -(r[..., 0, 1] + r[..., 2, 1]) / drag
-    u_r = -(r[..., 0, 3] + r[..., 2, 3]) / drag
-    u_0 = (load[..., 0] + load[..., 2]) / drag
-    return TorqueBalance(
-        bb=r[..., 1, 1] + body_u * u_b,
-        br=r[..., 1, 3] + body_u * u_r,
-        rb=r[..., 3, 1] + rotor_u * u_b,
-        rr=r[..., 3, 3] + rotor_u * u_r,
-        u_b=u_b,
-        u_r=u_r,
-        u_0=u_0,
-        t_b=load[..., 1] - body_u * u_0,
-        t_r=load[..., 3] - rotor_u * u_0,
-    )
-
-
-def friction_torques(reading: FrictionReading, effective: PerRobot, rotor_friction: PerRobot) -> FrictionTorques:
+def friction_torques(reading: FrictionReading, effective: Values, rotor_friction: Values) -> FrictionTorques:
     """The readings of eqs (18) and (19).
 
     Args:
@@ -138,12 +223,11 @@ def friction_torques(reading: FrictionReading, effective: PerRobot, rotor_fricti
         effective: B_eff (it contains B_m), or B for `body`, N m s/rad.
         rotor_friction: B_m, N m s/rad.
     """
-    zero = np.zeros(1)
     if reading == "rotor":
-        return FrictionTorques(effective, -effective, -effective, effective, zero)
+        return FrictionTorques(effective, -effective, -effective, effective, _ZERO)
     if reading == "body":
         joint, wall = rotor_friction, effective
         return FrictionTorques(joint + wall, -joint, -joint, joint, joint * wall)
     if reading == "paper":
-        return FrictionTorques(zero, zero, -effective, effective, zero)
-    return FrictionTorques(zero, zero, zero, zero, zero)
+        return FrictionTorques(_ZERO, _ZERO, -effective, effective, _ZERO)
+    return FRICTIONLESS

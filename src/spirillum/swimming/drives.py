@@ -11,8 +11,10 @@ from spirillum.errors import InputError
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.swimming.balance import (
+    FRICTIONLESS,
     FrictionTorques,
     TorqueBalance,
+    body_per_tail,
     coasting_rates,
     friction_torques,
     rates_per_torque,
@@ -55,7 +57,7 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
     t = friction_torques(friction, effective, rotor)
     none = np.full(1, np.nan)
     if batch.drive == "rate":
-        body_rate, tail = _rates_by_torque_sum(s, t, batch.drive_rate, none)
+        body_rate, tail = _rates_at(s, t, batch.drive_rate, none)
         return DriveState(body_rate, tail, none, effective, t, none)
     body_coasting, tail_coasting = coasting_rates(s, t)
     body_per_torque, tail_per_torque = rates_per_torque(s, t)
@@ -89,13 +91,13 @@ def at_rate(
     motor = batch.electrics
     if batch.drive != "dc-motor" or motor is None:
         t = friction_torques(friction, effective, rotor)
-        body_rate, tail = _rates_by_torque_sum(s, t, tail_rate, motor_rate)
+        body_rate, tail = _rates_at(s, t, tail_rate, motor_rate)
         return DriveState(body_rate, tail, none, effective, t, none)
     if friction == "paper":
         return _at_rate_paper(s, motor, tail_rate, motor_rate)
     wall = effective if friction == "body" else np.zeros(1)
     # What acts inside the joint cancels in the sum of both torques and does not change the motion.
-    body_rate, tail = _rates_by_torque_sum(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
+    body_rate, tail = _rates_at(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
     slip = np.where(np.isnan(motor_rate), tail - body_rate, motor_rate)
     current = _current_at(motor, slip)
     spare = motor.torque_constant * current - s.rotor_load(body_rate, tail)
@@ -108,15 +110,13 @@ def at_rate(
     return DriveState(body_rate, tail, current, effective, t, residual)
 
 
-def _rates_by_torque_sum(
+def _rates_at(
     s: TorqueBalance, t: FrictionTorques, tail_rate: PerRobot, motor_rate: PerRobot
 ) -> tuple[PerRobot, PerRobot]:
-    """(Omega, omega) from the sum of both torque rows, in which the joint torque cancels."""
-    on_body, on_tail = (s.bb + s.rb) + (t.bb + t.rb), (s.br + s.rr) + (t.br + t.rr)
-    on_body = np.where(on_body > 0, on_body, np.nan)  # `paper` beyond E_x: as in `driven`
-    flow = s.t_b + s.t_r
-    tail = np.where(np.isnan(tail_rate), (motor_rate * on_body + flow) / (on_body + on_tail), tail_rate)
-    return -on_tail / on_body * tail + flow / on_body, tail
+    """(Omega, omega) at a tail rate, or where that is NaN at a motor rate."""
+    turning, drift = body_per_tail(s, t)
+    tail = np.where(np.isnan(tail_rate), (motor_rate + drift) / (1.0 - turning), tail_rate)
+    return turning * tail + drift, tail
 
 
 def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, motor_rate: PerRobot) -> DriveState:
@@ -126,7 +126,7 @@ def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, moto
     emf = k_b * motor.polarity * np.where(observed, motor_rate, tail_rate * (1.0 + s.br / s.bb) - s.t_b / s.bb)
     current = motor.polarity * steady_current(motor, emf, np.where(observed, 0.0, k_b * k / s.bb))
     from_motor = -(k * current + s.br * motor_rate - s.t_b) / (s.bb + s.br)
-    body_rate = np.where(np.isnan(tail_rate), from_motor, -(k * current + s.br * tail_rate - s.t_b) / s.bb)
+    body_rate = np.where(np.isnan(tail_rate), from_motor, s.body_rate_as_printed(k * current, tail_rate))
     tail = np.where(np.isnan(tail_rate), body_rate + motor_rate, tail_rate)
     slip = np.where(observed, motor_rate, tail - body_rate)
     inferred = (k * current - s.rotor_load(body_rate, tail)) / slip
@@ -145,14 +145,13 @@ def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
 def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> DriveState:
     """Fixed joint: body and tail turn together under an external torque or rate."""
     load, flow = s.bb + s.br + s.rb + s.rr, s.t_b + s.t_r
-    zero, none = np.zeros(1), np.full(1, np.nan)
-    frictionless = FrictionTorques(zero, zero, zero, zero, zero)
+    none = np.full(1, np.nan)
     if batch.drive == "magnetic" and np.all(np.isnan(tail_rate)):
         step_out, lag, rate = _in_rotating_field(batch, load, flow)
-        return DriveState(rate, rate, none, none, frictionless, none, step_out, lag, batch.field_rate)
+        return DriveState(rate, rate, none, none, FRICTIONLESS, none, step_out, lag, batch.field_rate)
     own = batch.drive_rate if batch.drive == "rate" else (batch.drive_torque + flow) / load
     rate = np.where(np.isnan(tail_rate), own, tail_rate)
-    return DriveState(rate, rate, none, none, frictionless, none)
+    return DriveState(rate, rate, none, none, FRICTIONLESS, none)
 
 
 def _in_rotating_field(batch: RobotBatch, load: PerRobot, flow: PerRobot) -> tuple[PerRobot, PerRobot, PerRobot]:

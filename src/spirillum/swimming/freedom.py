@@ -11,12 +11,11 @@ from typing import Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
-from spirillum.arrays import Matrix12, PerRobot, Samples
+from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.swimming.balance import TorqueBalance
 
-__all__ = ["LINKS", "Motion", "Screw", "check_full", "motion_of", "released"]
+__all__ = ["LINKS", "Motion", "Screw", "check_full", "motion_of"]
 
 Motion = Literal["held", "free"]
 """Lateral motion and tilt held, or released."""
@@ -25,12 +24,6 @@ LINKS = np.zeros((12, 7))
 """Twists of body and rotor from the seven rates (U, Omega_b, omega_m), all about the origin in body axes."""
 LINKS[:6, :6] = LINKS[6:, :6] = np.eye(6)
 LINKS[9, 6] = 1.0
-
-_SPINS = np.zeros((12, 7))
-"""Twists from (U, Omega_y, Omega_z) of both parts and their own rates about x, Omega and omega."""
-for _column, _row in enumerate((0, 1, 2, 4, 5)):
-    _SPINS[_row, _column] = _SPINS[6 + _row, _column] = 1.0
-_SPINS[3, 5] = _SPINS[9, 6] = 1.0
 
 
 class Screw(NamedTuple):
@@ -48,7 +41,7 @@ class Screw(NamedTuple):
         """The screw of robots with such rates.
 
         Args:
-            shared: U (3), Omega_y and Omega_z per rate of body and rotor, (n, 5, 2), from `released`.
+            shared: U (3), Omega_y and Omega_z per rate of body and rotor, (n, 5, 2), from `balance.released`.
             body_rate: Omega, rad/s.
             tail_rate: omega, rad/s.
         """
@@ -90,30 +83,3 @@ def check_full(model: SwimmerModel) -> None:
     else:
         return
     raise InputError(f"motion = 'free' with model '{model.name}', which {why}; allowed: motion 'held', or rft, slender")
-
-
-def released(r: Matrix12) -> tuple[TorqueBalance, Samples]:
-    """Eliminate U, Omega_y and Omega_z: no force and no lateral torque acts on the whole robot.
-
-    Args:
-        r: R at phase 0 of the tail, 12x12. For a body of revolution the tail's phase does not matter.
-
-    Returns:
-        The torque balance about the motor axis, and U, Omega_y, Omega_z per rate of body and rotor, (n, 5, 2).
-    """
-    shared = np.swapaxes(_SPINS, 0, 1) @ r @ _SPINS
-    rates: Samples = -np.asarray(np.linalg.solve(shared[..., :5, :5], shared[..., :5, 5:]), dtype=np.float64)
-    s = shared[..., 5:, 5:] + shared[..., 5:, :5] @ rates
-    zero = np.zeros(s.shape[:-2])
-    balance = TorqueBalance(
-        bb=s[..., 0, 0],
-        br=s[..., 0, 1],
-        rb=s[..., 1, 0],
-        rr=s[..., 1, 1],
-        u_b=rates[..., 0, 0],
-        u_r=rates[..., 0, 1],
-        u_0=zero,
-        t_b=zero,
-        t_r=zero,
-    )
-    return balance, rates

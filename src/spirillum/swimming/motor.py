@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from spirillum.arrays import PerRobot
+from spirillum.arrays import Values
 from spirillum.robot.batch import Electrics
 
 __all__ = ["battery_voltage", "run_time", "steady_current", "winding_resistance"]
 
 
-def winding_resistance(motor: Electrics, current: PerRobot) -> PerRobot:
+def winding_resistance(motor: Electrics, current: Values) -> Values:
     """R(I) of Table II, ohm; takes |I|."""
     i = np.abs(current)
     return (
@@ -26,12 +26,12 @@ def winding_resistance(motor: Electrics, current: PerRobot) -> PerRobot:
     )
 
 
-def _bounded(exponent: PerRobot) -> PerRobot:
+def _bounded(exponent: Values) -> Values:
     """An exponent whose exponential is still a number: far currents are tried on the way to a root."""
     return np.minimum(exponent, 600.0)
 
 
-def _resistance_slope(motor: Electrics, i: PerRobot) -> PerRobot:
+def _resistance_slope(motor: Electrics, i: Values) -> Values:
     return (
         -motor.decay * motor.decay_rate * np.exp(-motor.decay_rate * i)
         + motor.growth * motor.growth_rate * np.exp(_bounded(motor.growth_rate * i))
@@ -39,12 +39,12 @@ def _resistance_slope(motor: Electrics, i: PerRobot) -> PerRobot:
     )
 
 
-def battery_voltage(motor: Electrics, current: PerRobot) -> PerRobot:
+def battery_voltage(motor: Electrics, current: Values) -> Values:
     """V(I) of Table II at the terminals, V; takes |I|."""
     return motor.voltage - motor.internal_resistance * np.abs(current)
 
 
-def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: PerRobot) -> PerRobot:
+def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
     """Steady root of (17): R(I) I = duty V(I) - (back_emf + back_emf_per_current I).
 
     Args:
@@ -62,7 +62,7 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
     drive = np.abs(open_voltage)
     linear = back_emf_per_current + sense * motor.duty * motor.internal_resistance
 
-    def excess(i: PerRobot) -> PerRobot:
+    def excess(i: Values) -> Values:
         return (winding_resistance(motor, i) + linear) * i - drive
 
     low = np.zeros(np.broadcast_shapes(drive.shape, linear.shape, motor.constant.shape))
@@ -89,7 +89,7 @@ def steady_current(motor: Electrics, back_emf: PerRobot, back_emf_per_current: P
     return np.where(battery_voltage(motor, i) < 0, np.nan, sense * i)
 
 
-def run_time(motor: Electrics, current: PerRobot) -> PerRobot:
+def run_time(motor: Electrics, current: Values) -> Values:
     """Time for which the rated charge lasts at a constant motor current, s; NaN without a rating."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return motor.capacity / (motor.duty * np.abs(current))

@@ -17,9 +17,9 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, all_hold, assembly_limits
 from spirillum.robot.robot import STANDARD_GRAVITY
 from spirillum.swimming.answer import Swimming
-from spirillum.swimming.balance import TorqueBalance, force_free
+from spirillum.swimming.balance import TorqueBalance, force_free, joined, released, with_body_factors
 from spirillum.swimming.drives import DriveState, at_rate, driven, one_piece
-from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of, released
+from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of
 from spirillum.swimming.motor import battery_voltage, run_time
 
 __all__ = [
@@ -42,27 +42,23 @@ def requirements(batch: RobotBatch, model: SwimmerModel) -> list[Limit]:
 
 def calibrated_balance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> TorqueBalance:
     """The force-free torque balance; a calibration factor f adds (f - 1) times the isolated body's drag."""
-    r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
+    r = _with_factors(joined(model.axial(batch)), (0, 1), batch, model, calibrated=calibrated)
     return force_free(r, model.axial_load(batch))
 
 
 def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated: bool = True) -> Matrix12:
-    """R of both parts at phase 0 with the same factors, for a motion that is not held to the axis."""
+    """R of both parts at phase 0 with calibration factors, for a motion that is not held to the axis."""
     return _with_factors(model.resistance(batch, np.zeros(1)), (0, 3), batch, model, calibrated=calibrated)
 
 
 def _with_factors(
-    r: Samples, places: tuple[int, int], batch: RobotBatch, model: SwimmerModel, *, calibrated: bool
+    r: Samples, entries: tuple[int, int], batch: RobotBatch, model: SwimmerModel, *, calibrated: bool
 ) -> Samples:
-    """R with calibration factors on the body's axial drag and rotation, whose places in R are given."""
+    """R with the batch's calibration factors for the model, if it has any; `entries` as `with_body_factors`."""
     factors = batch.calibration.get(model.name) if calibrated else None
     if factors is None:
         return r
-    size = np.broadcast_shapes(r.shape[:1], factors.body_drag.shape)
-    r = np.array(np.broadcast_to(r, (*size, *r.shape[1:])))
-    for place, factor, entry in zip(places, (factors.body_drag, factors.body_rotation), body_axial(batch), strict=True):
-        r[:, place, place] += (factor - 1.0) * entry
-    return r
+    return with_body_factors(r, (factors.body_drag, factors.body_rotation), body_axial(batch), entries)
 
 
 def swim(
