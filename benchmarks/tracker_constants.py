@@ -64,7 +64,7 @@ def errors(films: list[Path]) -> np.ndarray:
     for row, film in zip(found, films, strict=True):
         try:
             measured = sp.measure([film], film.with_suffix(".setup.toml"), annotated=False)
-        except sp.InputError:
+        except (sp.InputError, ValueError):  # half or twice may be beyond what the tracker can work with
             continue
         trial = measured.to_dict()["trials"][0]
         truth = json.loads(film.with_suffix(".truth.json").read_text(encoding="utf-8"))

@@ -96,9 +96,7 @@ def followed(monkeypatch: pytest.MonkeyPatch, make_track: Make) -> dict[str, Any
         assert isinstance(found, Track)
         return found
 
-    import spirillum.vision.track.follow as module
-
-    monkeypatch.setattr(module, "follow", follow)
+    monkeypatch.setattr("spirillum.measurement.measure.follow", follow)
     return tracks
 
 
