@@ -1,5 +1,6 @@
 """The commands of the documentation run and print what it shows, and its options exist."""
 
+import importlib
 import importlib.util
 import re
 import subprocess
@@ -116,6 +117,17 @@ def test_reference_covers_every_module_of_the_layers_it_names() -> None:
         if path.stem not in ("__init__", "fields")
     }
     assert modules - documented == set()
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.stem)
+def test_references_into_the_code_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\{py:\w+\}`([\w.]+)`", page.read_text("utf-8")):
+        parts = target.split(".")
+        found: Any = importlib.import_module(parts[0])
+        for place, name in enumerate(parts[1:], 2):
+            if not hasattr(found, name):
+                importlib.import_module(".".join(parts[:place]))
+            found = getattr(found, name)
 
 
 def test_every_dependency_has_its_reason() -> None:
