@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize.elementwise import find_root
 
 from spirillum.errors import InputError
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current, winding_resistance
@@ -42,6 +43,18 @@ def test_current_solves_17_for_the_papers_motor(wide: Any, duty: float, per_curr
     left_over = duty * 3.7 - back_emf
     np.testing.assert_array_equal(np.sign(current), np.sign(np.where(np.abs(left_over) < 1e-300, 0.0, left_over)))
     assert np.all(np.diff(current) < 0)
+
+
+def test_every_current_of_many_is_as_good_as_rounding(wide: Any) -> None:
+    """Against Chandrupatla's method, for loads at which the search ends by halving its bracket, too."""
+    per_current = np.random.default_rng(0).uniform(0.5, 40, 4096)
+
+    def excess(i: np.ndarray, load: np.ndarray) -> np.ndarray:
+        return (table_ii_resistance(i) + load) * i - (3.7 - 0.8 * i)
+
+    root = find_root(excess, (np.zeros(4096), np.full(4096, 3.0)), args=(per_current,)).x
+    current = steady_current(wide.electrics, np.zeros(1), per_current)
+    np.testing.assert_allclose(current, root, rtol=1e-13)
 
 
 motors = st.fixed_dictionaries(
