@@ -79,8 +79,8 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
         high = np.where(short, 2.0 * high, high)
     high = np.where(excess(high) < 0, np.nan, high)  # driven too fast: V(|I|) falls faster than R(I) I rises
     last = high - low
-    # scipy.optimize.elementwise.find_root is as fast for a million robots, but takes six times as long for one robot and
-    # five times for the few hundred currents that every step of a posterior's sampler asks for.
+    # scipy.optimize.elementwise.find_root is as fast for a million robots, but six times slower for one robot and five
+    # times slower for the few hundred currents that every step of a posterior's sampler asks for.
     for _ in range(200):
         f = excess(i)
         low, high = np.where(f < 0, i, low), np.where(f < 0, high, i)
@@ -91,7 +91,7 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
         last, i = np.abs(new - i), new
         if not np.any(last > 1e-9 * np.abs(i)):
             break
-    # Newton's error is the square of the step before, but where rounding led out of the bracket the last step halved it.
+    # Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it.
     newton = newton_step(i, excess(i))
     i = np.where(np.isfinite(newton), np.clip(newton, low, high), i)
     return np.where(battery_voltage(motor, i) < 0, np.nan, sense * i)
