@@ -9,76 +9,46 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from spirillum.calibration.calibrated import Calibrated
-    from spirillum.calibration.ranking import Ranking, rank_models
-    from spirillum.calibration.suggest import Suggestion, suggest
-    from spirillum.citations import citation
-    from spirillum.dynamics.magnetic_sweep import magnetic_sweep
-    from spirillum.dynamics.settling import Settling, settle
-    from spirillum.dynamics.simulation import simulate
-    from spirillum.errors import InputError
-    from spirillum.exports.write import Export, export
-    from spirillum.fields.flow import Flow, flow
-    from spirillum.fluid.resistance import Resistance, resistance
-    from spirillum.measurement.feasibility import Feasibility, feasibility
-    from spirillum.measurement.measure import Measurement
-    from spirillum.results.calibration import calibrate
-    from spirillum.results.measurement import measure
-    from spirillum.results.study import study
-    from spirillum.robot.batch import RobotBatch
-    from spirillum.robot.load import load
-    from spirillum.robot.robot import Robot
-    from spirillum.swimming.answer import Swimming
-    from spirillum.swimming.comparison import ModelComparison, compare_models
-    from spirillum.swimming.prediction import Prediction, predict
-    from spirillum.swimming.steady import swim
-    from spirillum.view.scene3d.film import Film, film
-    from spirillum.view.scene3d.show import Picture3D, show
-    from spirillum.virtual.experiment import virtual_experiment
-    from spirillum.virtual.trial import render
+    from spirillum.calibration.calibrated import Calibrated as Calibrated
+    from spirillum.calibration.ranking import Ranking as Ranking
+    from spirillum.calibration.ranking import rank_models as rank_models
+    from spirillum.calibration.suggest import Suggestion as Suggestion
+    from spirillum.calibration.suggest import suggest as suggest
+    from spirillum.citations import citation as citation
+    from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
+    from spirillum.dynamics.settling import Settling as Settling
+    from spirillum.dynamics.settling import settle as settle
+    from spirillum.dynamics.simulation import simulate as simulate
+    from spirillum.errors import InputError as InputError
+    from spirillum.exports.write import Export as Export
+    from spirillum.exports.write import export as export
+    from spirillum.fields.flow import Flow as Flow
+    from spirillum.fields.flow import flow as flow
+    from spirillum.fluid.resistance import Resistance as Resistance
+    from spirillum.fluid.resistance import resistance as resistance
+    from spirillum.measurement.feasibility import Feasibility as Feasibility
+    from spirillum.measurement.feasibility import feasibility as feasibility
+    from spirillum.measurement.measure import Measurement as Measurement
+    from spirillum.results.calibration import calibrate as calibrate
+    from spirillum.results.measurement import measure as measure
+    from spirillum.results.study import study as study
+    from spirillum.robot.batch import RobotBatch as RobotBatch
+    from spirillum.robot.load import load as load
+    from spirillum.robot.robot import Robot as Robot
+    from spirillum.swimming.answer import Swimming as Swimming
+    from spirillum.swimming.comparison import ModelComparison as ModelComparison
+    from spirillum.swimming.comparison import compare_models as compare_models
+    from spirillum.swimming.prediction import Prediction as Prediction
+    from spirillum.swimming.prediction import predict as predict
+    from spirillum.swimming.steady import swim as swim
+    from spirillum.view.scene3d.film import Film as Film
+    from spirillum.view.scene3d.film import film as film
+    from spirillum.view.scene3d.show import Picture3D as Picture3D
+    from spirillum.view.scene3d.show import show as show
+    from spirillum.virtual.experiment import virtual_experiment as virtual_experiment
+    from spirillum.virtual.trial import render as render
 
     __version__: str
-
-__all__ = [
-    "Calibrated",
-    "Export",
-    "Feasibility",
-    "Film",
-    "Flow",
-    "InputError",
-    "Measurement",
-    "ModelComparison",
-    "Picture3D",
-    "Prediction",
-    "Ranking",
-    "Resistance",
-    "Robot",
-    "RobotBatch",
-    "Settling",
-    "Suggestion",
-    "Swimming",
-    "calibrate",
-    "citation",
-    "compare_models",
-    "export",
-    "feasibility",
-    "film",
-    "flow",
-    "load",
-    "magnetic_sweep",
-    "measure",
-    "predict",
-    "rank_models",
-    "render",
-    "resistance",
-    "settle",
-    "show",
-    "simulate",
-    "study",
-    "suggest",
-    "swim",
-    "virtual_experiment",
-]
 
 _HOME = {
     "Calibrated": "spirillum.calibration.calibrated",
@@ -120,6 +90,8 @@ _HOME = {
     "swim": "spirillum.swimming.steady",
     "virtual_experiment": "spirillum.virtual.experiment",
 }
+
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:
