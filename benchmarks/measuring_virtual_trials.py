@@ -44,9 +44,12 @@ def rendered(folder: Path, number: int, preset: str, duration: float) -> Path:
     if film.with_suffix(".truth.json").exists():
         return film
     rng, speed, tail, body = drawn(number)
-    how = {
+    camera = {
         "view": "side" if rng.random() < 0.2 else "top",
         "direction": "left" if rng.random() < 0.5 else "right",
+    }
+    trial = {
+        "duration": duration,
         "body_angle": float(rng.uniform(0.0, 2.0 * np.pi)),
         "tail_phase": float(rng.uniform(0.0, 2.0 * np.pi)),
         "lateral": float(rng.uniform(-2e-3, 2e-3)),
@@ -55,13 +58,11 @@ def rendered(folder: Path, number: int, preset: str, duration: float) -> Path:
     sp.render(
         str(rng.choice(["biorob2012-wide", "biorob2012-narrow"])),
         film,
-        forward_velocity=f"{speed} mm/s",
-        tail_rate=f"{tail} Hz",
-        body_rate=f"{-body} Hz",
-        duration=duration,
+        motion={"forward_velocity": f"{speed} mm/s", "tail_rate": f"{tail} Hz", "body_rate": f"{-body} Hz"},
+        trial=trial,
+        camera=camera,
         degradation=preset,
         seed=number,
-        **how,
     )
     return film
 

@@ -40,7 +40,13 @@ with tempfile.TemporaryDirectory() as name:
         "robots": [robot_file(folder, *t) for t in TAILS],
     }
     sp.virtual_experiment(
-        study, folder / "films", trials=2, duration="5 s", tail_rate="1.2 Hz", size="320x240", fps=10, seed=1
+        study,
+        folder / "films",
+        trials=2,
+        motion={"tail_rate": "1.2 Hz"},
+        duration="5 s",
+        camera={"size": "320x240", "fps": 10},
+        seed=1,
     )
 
     files = []

@@ -39,7 +39,13 @@ if __name__ == "__main__":
         print(target.name, target.stat().st_size, "bytes")
     with TemporaryDirectory() as name:
         folder = Path(name)
-        sp.render("biorob2012-wide", folder / "trial.mp4", tail_rate="1.2 Hz", duration="4 s", degradation="degraded")
+        sp.render(
+            "biorob2012-wide",
+            folder / "trial.mp4",
+            motion={"tail_rate": "1.2 Hz"},
+            trial={"duration": "4 s"},
+            degradation="degraded",
+        )
         sp.measure([folder / "trial.mp4"], folder / "trial.setup.toml", output=folder)
         frame = _frame(folder / "trial.annotated.mp4", 60)
         frame.save(FOLDER / "measured.png")

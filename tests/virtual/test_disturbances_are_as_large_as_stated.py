@@ -9,7 +9,7 @@ from PIL import Image
 
 import spirillum as sp
 from spirillum.robot.load import load
-from spirillum.virtual.degradation import PRESETS, Degradation, degradation_of
+from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.painter import Painter
@@ -25,7 +25,11 @@ def of(seed: int = 0, **what: Any) -> Disturbances:
 
 
 def test_noise_has_its_standard_deviation(tmp_path: Path) -> None:
-    options: dict[str, Any] = {"size": (160, 120), "duration": "0.1 s", "tail_rate": "1 Hz"}
+    options: dict[str, Any] = {
+        "camera": {"size": (160, 120)},
+        "trial": {"duration": "0.1 s"},
+        "motion": {"tail_rate": "1 Hz"},
+    }
     for name, what in (("clean", Degradation()), ("noisy", Degradation(noise=8.0))):
         render("biorob2012-wide", tmp_path / name, **options, degradation=what)
     clean, noisy = (
@@ -67,7 +71,7 @@ def test_glare_covers_its_share_of_the_body() -> None:
     lens = Lens(0.21, 0.06, 1.4, 740.0, (640, 480))
     light = np.zeros((480, 640, 3), dtype=np.float32)
     place = np.array([0.01, 0.0, 0.0115])
-    Disturbances(Degradation(glare=0.2), 3, lens, 20.0, BODY, 0.03).spoil(light, 1.0, place)
+    Disturbances(Degradation(glare=0.2), 3, lens, 20.0, BODY, 0.03).disturb(light, 1.0, place)
     edge = lens.seen(place + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))[:, 0]
     body = (abs(edge[1] - edge[0]) / 1e-3) ** 2 * BODY[0] * BODY[1] * 0.94
     assert (light[..., 0] > 0.4).sum() == pytest.approx(0.2 * body, rel=0.1)
@@ -78,7 +82,7 @@ def test_glare_goes_along_or_stands_still() -> None:
         centres = []
         for x in (0.0, 0.01):
             light = np.zeros((240, 320, 3), dtype=np.float32)
-            of(3, glare=0.2, glare_moves=moves).spoil(light, 1.0, np.array([x, 0.0, 0.0115]))
+            of(3, glare=0.2, glare_moves=moves).disturb(light, 1.0, np.array([x, 0.0, 0.0115]))
             weight = light[..., 0].sum(axis=0)
             centres.append(float((weight * np.arange(320)).sum() / weight.sum()))
         assert centres[1] - centres[0] == pytest.approx(expected, abs=0.3)
@@ -90,12 +94,12 @@ def test_a_hand_passes_and_bubbles_stay_few() -> None:
     darkest = []
     for time in np.linspace(0, 20, 81):
         picture = light.copy()
-        hand.spoil(picture, float(time), np.zeros(3))
+        hand.disturb(picture, float(time), np.zeros(3))
         darkest.append(picture.min())
     assert min(darkest) == pytest.approx(0.55, abs=0.02)
     assert darkest[0] == pytest.approx(1.0, abs=1e-3) or darkest[-1] == pytest.approx(1.0, abs=1e-3)
     picture = light.copy()
-    of(1, bubbles=5).spoil(picture, 0.0, np.zeros(3))
+    of(1, bubbles=5).disturb(picture, 0.0, np.zeros(3))
     assert 0 < (picture != light).mean() < 0.05
 
 
@@ -105,20 +109,20 @@ def test_one_disturbance_does_not_change_another() -> None:
 
 
 def test_presets_and_wrong_values() -> None:
-    assert PRESETS["degraded"].noise == 8.0
-    assert PRESETS["degraded"].dropped == 0.05
-    assert degradation_of("degraded", noise=None, crf=20) == Degradation(
-        **(PRESETS["degraded"].to_dict() | {"crf": 20})
-    )
+    degraded = Degradation.of("degraded")
+    assert degraded.noise == 8.0
+    assert degraded.dropped == 0.05
+    changed = Degradation.of({"preset": "degraded", "noise": None, "crf": 20})
+    assert changed == degraded.model_copy(update={"crf": 20})
     for wrong in ({"noise": -1.0}, {"crf": 60}, {"dropped": 1.0}, {"tilt": 1.0}, {"glare": 2.0}, {"bubbles": 1.5}):
         with pytest.raises(sp.InputError, match="allowed"):
-            Degradation(**wrong)
+            Degradation.of(wrong)
     with pytest.raises(sp.InputError, match="did you mean noise"):
-        degradation_of("clean", nois=3.0)
+        Degradation.of({"preset": "clean", "nois": 3.0})
 
 
 def test_the_glass_darkens_its_edges_and_leaves_the_middle() -> None:
-    tank = tank_of(load("biorob2012-wide"), "top", 2e-3, 0.03)
+    tank = tank_of(load("biorob2012-wide"), "top")
     over = Painter(load("biorob2012-wide"), tank, LENS).still.over
     edge = LENS.seen(np.array([[0.0, 0.5 * (tank.tube + tank.outside), tank.tube_height]]))[0]
     assert over[round(edge[1]), 160] < 0.8

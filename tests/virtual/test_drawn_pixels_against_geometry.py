@@ -10,7 +10,7 @@ from spirillum.virtual.lens import Lens
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.solids import solids_of
 from spirillum.virtual.tank import backdrop, spots, tank_of
-from spirillum.virtual.trajectory import steady_way
+from spirillum.virtual.trajectory import steady_trajectory
 
 
 def coverage(corners: np.ndarray, faces: np.ndarray, heights: np.ndarray, size: tuple[int, int]) -> np.ndarray:
@@ -80,7 +80,7 @@ def test_shortened_triangles_keep_the_robots_volume_and_area() -> None:
 def test_straight_edges_stand_for_bent_ones(view: str) -> None:
     robot = sp.load("biorob2012-wide")
     lens = Lens(0.21, 0.06, 1.4, 740.0, (640, 480), distortion=(-0.02, 0.0), tilt=(0.025, -0.025))
-    tank = tank_of(robot, view, 2e-3, 0.03)
+    tank = tank_of(robot, view)
     for x in (-0.02, 0.035, 0.062):
         for solid in solids_of(robot):
             ends = solid.vertices + np.array([x, 0.0, tank.tube_height - 0.0105])
@@ -111,7 +111,7 @@ def test_the_silhouette_of_the_body_moves_as_its_vertices_do() -> None:
 def test_ruler_lines_lie_where_the_lens_sees_them() -> None:
     robot = sp.load("biorob2012-wide", channel="none")
     lens = Lens(0.21, 0.06, 1.4, 740.0, (320, 200), distortion=(-0.02, 0.0))
-    tank = tank_of(robot, "top", 2e-3, 0.03)
+    tank = tank_of(robot, "top")
     still = backdrop(tank, lens)
     across = tank.ruler + 4e-3
     for x in np.arange(-30, 31, 2) * 1e-3:
@@ -125,12 +125,12 @@ def test_ruler_lines_lie_where_the_lens_sees_them() -> None:
 def test_a_blurred_edge_spreads_over_its_way() -> None:
     robot = sp.load("biorob2012-wide", channel="none")
     lens = Lens(0.21, 0.06, 1.4, 370.0, (320, 240))
-    tank = tank_of(robot, "top", 2e-3, 0.03)
+    tank = tank_of(robot, "top")
     painter = Painter(robot, tank, lens)
     place = np.array([0.03, 0.0, tank.tube_height])
     rates = {"forward_velocity": 0.0, "body_rotation_rate": 0.0, "tail_rotation_rate": 30.0}
-    way = steady_way(1.0, **rates, position=place)
-    sharp, blurred = (painter.light(way, 0.5, exposure) for exposure in (0.0, 1 / 60))
+    trajectory = steady_trajectory(1.0, **rates, position=place)
+    sharp, blurred = (painter.light(trajectory, 0.5, exposure) for exposure in (0.0, 1 / 60))
     body = lens.seen(np.array([[0.02, -0.009, 0.0], [0.04, 0.009, 0.0]]))[:, :2].round().astype(int)
     rows, columns = slice(body[1, 1], body[0, 1]), slice(body[0, 0], body[1, 0])
     assert np.abs(sharp[rows, columns] - blurred[rows, columns]).max() < 0.05  # the body stands still

@@ -12,7 +12,12 @@ from spirillum.units import Hz
 from spirillum.virtual.experiment import virtual_experiment
 from spirillum.vision.setup import load_setup
 
-SMALL: dict[str, Any] = {"trials": 2, "duration": "0.1 s", "size": (96, 64), "tail_rate": "1.2 Hz"}
+SMALL: dict[str, Any] = {
+    "trials": 2,
+    "duration": "0.1 s",
+    "camera": {"size": (96, 64)},
+    "motion": {"tail_rate": "1.2 Hz"},
+}
 
 
 def test_all_files_are_there_and_a_rerun_keeps_them(tmp_path: Path) -> None:
@@ -79,11 +84,12 @@ def test_a_grid_gives_each_tail_a_folder_and_the_spread_its_size(tmp_path: Path)
 
 def test_the_planted_spread_has_its_size() -> None:
     from spirillum.robot.load import load
-    from spirillum.virtual.experiment import _planned
+    from spirillum.virtual.experiment import _Plan, _planned
+    from spirillum.virtual.options import CameraOptions
 
     steady = {"forward_velocity": 1e-3, "tail_rotation_rate": 7.0, "body_rotation_rate": -0.5}
-    look = {"view": "top", "size": (640, 480), "direction": "right"}
-    plans = _planned("w", load("biorob2012-wide"), steady, 400, 0.02, None, look, (0, 0))
+    plan = _Plan.of({"trials": 400, "spread": 0.02})
+    plans = _planned("w", load("biorob2012-wide"), steady, plan, CameraOptions(), 0)
     factors = np.array([plan.rates["tail_rotation_rate"] for plan in plans]) / 7.0
     assert factors.std() == pytest.approx(0.02, rel=0.1)
     assert factors.mean() == pytest.approx(1.0, abs=0.003)
@@ -95,7 +101,7 @@ def test_the_planted_spread_has_its_size() -> None:
         ({"trials": 0}, "trials"),
         ({"spread": 0.5}, "spread"),
         ({"jobs": 0}, "jobs"),
-        ({"model": "x"}, "model"),
+        ({"motion": {"model": "x"}}, "model"),
         ({"duration": "0 s"}, "duration"),
     ],
 )

@@ -12,20 +12,24 @@ import xarray as xr
 import spirillum as sp
 from spirillum.robot.load import load, preset_names
 from spirillum.units import Hz
-from spirillum.virtual.degradation import Degradation, degradation_of
+from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.robot_file import is_preset, robot_text
-from spirillum.virtual.trajectory import lab_to_camera, run_way, steady_way
+from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial import render
 from spirillum.vision.setup import load_setup
 
 ROBOT = "biorob2012-wide"
 SMALL: dict[str, Any] = {
-    "size": (160, 120),
-    "forward_velocity": "1 mm/s",
-    "tail_rate": "1.2 Hz",
-    "body_rate": "-0.1 Hz",
-    "duration": "0.5 s",
+    "motion": {"forward_velocity": "1 mm/s", "tail_rate": "1.2 Hz", "body_rate": "-0.1 Hz"},
+    "trial": {"duration": "0.5 s"},
+    "camera": {"size": (160, 120)},
 }
+
+
+def small(**options: Any) -> dict[str, Any]:
+    """The options of a small trial, with others in their tables."""
+    tables = {**SMALL, "setup_errors": {}}
+    return tables | {name: {**tables[name], **fields} if name in tables else fields for name, fields in options.items()}
 
 
 def frames_of(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -66,7 +70,7 @@ def test_the_truth_of_every_frame_is_at_its_time(trial: Any) -> None:
 
 @pytest.mark.parametrize("fps", [29.97, 1000 / 33, 12.3456789])
 def test_odd_paces_keep_their_times(tmp_path: Path, fps: float) -> None:
-    render(ROBOT, tmp_path / "a.mp4", **(SMALL | {"size": (96, 64)}), fps=fps)
+    render(ROBOT, tmp_path / "a.mp4", **small(camera={"size": (96, 64), "fps": fps}))
     times, _ = frames_of(tmp_path / "a.mp4")
     with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
         assert np.allclose(truth["time"], times, atol=2e-5)
@@ -82,7 +86,7 @@ def test_the_setup_is_one_and_knows_the_heights(trial: Any) -> None:
 
 
 def test_a_planted_wrong_depth_stands_in_the_setup_alone(tmp_path: Path) -> None:
-    options = SMALL | {"depth_error": "-5 mm", "depth_uncertainty": "4 mm"}
+    options = small(setup_errors={"depth_error": "-5 mm", "depth_uncertainty": "4 mm"})
     wrong = render(ROBOT, tmp_path / "a.mp4", **options)
     right = render(ROBOT, tmp_path / "b.mp4", **SMALL)
     setup, true = load_setup(wrong.setup)[0], load_setup(right.setup)[0]
@@ -107,7 +111,7 @@ def test_lost_frames_leave_the_times_of_the_others_true(tmp_path: Path) -> None:
 
 
 def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
-    options = SMALL | {"degradation": degradation_of("degraded", bubbles=3, hand=True), "duration": "0.2 s"}
+    options = small(degradation={"preset": "degraded", "bubbles": 3, "hand": True}, trial={"duration": "0.2 s"})
     first, again, other = (
         render(ROBOT, tmp_path / f"{name}.mp4", **options, seed=seed) for name, seed in (("a", 5), ("b", 5), ("c", 6))
     )
@@ -117,7 +121,7 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_pngs_hold_their_numbers_and_the_setup_their_pace(tmp_path: Path) -> None:
     what = Degradation(dropped=0.2)
-    found = render(ROBOT, tmp_path / "frames", **(SMALL | {"duration": "0.3 s"}), degradation=what, fps=30.0)
+    found = render(ROBOT, tmp_path / "frames", **small(trial={"duration": "0.3 s"}), degradation=what)
     names = sorted(path.name for path in (tmp_path / "frames").iterdir())
     with xr.open_dataset(tmp_path / "frames.truth.nc") as truth:
         assert names == [f"{number:05d}.png" for number in truth["frame"].values]
@@ -126,7 +130,7 @@ def test_pngs_hold_their_numbers_and_the_setup_their_pace(tmp_path: Path) -> Non
 
 def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
     run = sp.simulate(ROBOT, model="rft", motion="held", duration="0.6 s")
-    found = render(ROBOT, tmp_path / "a.mp4", run=run, duration="0.5 s", size=(160, 120))
+    found = render(ROBOT, tmp_path / "a.mp4", run=run, trial={"duration": "0.5 s"}, camera={"size": (160, 120)})
     with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
         there = np.interp(truth["time"], run["time"], run["position"])
         assert np.allclose(truth["x"] - truth["x"][0], there - there[0], atol=1e-9)
@@ -138,7 +142,7 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("view", ["top", "side"])
 @pytest.mark.parametrize("leftwards", [False, True])
-def test_the_way_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:
+def test_the_trajectory_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -> None:
     from spirillum.dynamics.poses import rolled, rotation_matrix
 
     time = np.linspace(0.0, 3.0, 31)
@@ -155,15 +159,15 @@ def test_the_way_of_a_free_run_is_its_rigid_motion(view: str, leftwards: bool) -
         },
         {"time": time},
     )
-    way = run_way(run, view, leftwards=leftwards, axis=0.022, level=0.0)
+    trajectory = run_trajectory(run, view, leftwards=leftwards, axis=0.022, level=0.0)
     turn = lab_to_camera(view, leftwards=leftwards)
     for place, moment in enumerate(time):
-        now = way.at(float(moment))
+        now = trajectory.at(float(moment))
         body = turn @ rotation_matrix(attitude[place])
         assert np.allclose(now.body, body, atol=1e-12)
         assert np.allclose(now.rotor, body @ rotation_matrix(rolled(7.0 * moment)), atol=1e-12)
         assert np.allclose(now.position, turn @ position[place] + [0.0, 0.0, 0.022])
-    assert np.ptp(way.body_angle) == pytest.approx(12.0, abs=0.1)  # nearly two turns, unwrapped
+    assert np.ptp(trajectory.body_angle) == pytest.approx(12.0, abs=0.1)  # nearly two turns, unwrapped
 
 
 def _about(axis: int, angle: float) -> np.ndarray:
@@ -185,8 +189,8 @@ def _product(*quaternions: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("view", ["top", "side"])
 @pytest.mark.parametrize("direction", ["right", "left"])
 def test_a_robot_aside_keeps_its_gap(tmp_path: Path, view: str, direction: str) -> None:
-    options = SMALL | {"duration": "0.1 s", "view": view, "direction": direction, "lateral": "3 mm", "gap": "1 mm"}
-    render(ROBOT, tmp_path / "a.mp4", **options)
+    trial = {"duration": "0.1 s", "lateral": "3 mm", "gap": "1 mm"}
+    render(ROBOT, tmp_path / "a.mp4", **small(trial=trial, camera={"view": view, "direction": direction}))
     axis = 0.022 if view == "top" else 0.030
     with xr.open_dataset(tmp_path / "a.truth.nc") as truth:
         y, z = float(truth["y"][0]), float(truth["z"][0]) - axis
@@ -206,19 +210,19 @@ def test_a_robot_file_holds_every_field(name: str, tmp_path: Path) -> None:
 
 def test_a_changed_robot_lies_beside_its_setup(tmp_path: Path) -> None:
     changed = load(ROBOT, **{"tail.wavelength": "20 mm"})
-    found = render(changed, tmp_path / "a.mp4", **(SMALL | {"duration": "0.1 s"}))
+    found = render(changed, tmp_path / "a.mp4", **small(trial={"duration": "0.1 s"}))
     assert load_setup(found.setup)[1] == changed
 
 
-def test_steady_ways_are_straight_and_wobbles_come_back() -> None:
+def test_steady_trajectories_are_straight_and_wobbles_come_back() -> None:
     rates = {"forward_velocity": 1e-3, "body_rotation_rate": -0.5, "tail_rotation_rate": 4.0 * np.pi}
-    way = steady_way(3.0, **rates, position=np.array([0.01, 0.0, 0.02]), wobble=2e-4, heading=0.02)
+    trajectory = steady_trajectory(3.0, **rates, position=np.array([0.01, 0.0, 0.02]), wobble=2e-4, heading=0.02)
     times = np.linspace(0.0, 3.0, 7)  # every half turn, and whole ones
-    series = way.series(times)
+    series = trajectory.series(times)
     assert np.allclose(series["x"], 0.01 + 1e-3 * times)
     assert np.allclose(series["y"], 2e-4 * np.cos(4.0 * np.pi * times), atol=2e-7)
-    assert way.rates()["motor_rotation_rate"] == pytest.approx(4.0 * np.pi + 0.5)
-    now = way.at(1.3)
+    assert trajectory.rates()["motor_rotation_rate"] == pytest.approx(4.0 * np.pi + 0.5)
+    now = trajectory.at(1.3)
     assert np.allclose(now.body @ now.body.T, np.eye(3))
     assert np.arctan2(now.body[1, 0], now.body[0, 0]) == pytest.approx(0.02)
 
@@ -226,24 +230,24 @@ def test_steady_ways_are_straight_and_wobbles_come_back() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"size": (161, 120)}, "even numbers"),
-        ({"view": "front"}, "allowed: top, side"),
-        ({"direction": "up"}, "allowed: right, left"),
-        ({"fps": 0.0}, "fps"),
-        ({"exposure": "1 s"}, "exposure"),
-        ({"gap": "12 mm"}, "allowed: 0 to 11 mm"),
-        ({"lateral": "11 mm"}, "at most 10.5 mm"),
-        ({"wobble": "1 m"}, "0 to 11 mm, the room in the channel"),
-        ({"start": "1 m"}, "never in the picture"),
-        ({"duration": "0 s"}, "makes 1 frames"),
+        ({"camera": {"size": (161, 120)}}, "even numbers"),
+        ({"camera": {"view": "front"}}, "allowed: top, side"),
+        ({"camera": {"direction": "up"}}, "allowed: right, left"),
+        ({"camera": {"fps": 0.0}}, "fps"),
+        ({"camera": {"exposure": "1 s"}}, "exposure"),
+        ({"trial": {"gap": "12 mm"}}, "allowed: 0 to 11 mm"),
+        ({"trial": {"lateral": "11 mm"}}, "at most 10.5 mm"),
+        ({"trial": {"wobble": "1 m"}}, "0 to 11 mm, the room in the channel"),
+        ({"trial": {"start": "1 m"}}, "never in the picture"),
+        ({"trial": {"duration": "0 s"}}, "makes 1 frames"),
         ({"seed": -1}, "seed"),
         ({"degradation": "bad"}, "allowed: clean, degraded"),
-        ({"tail_rate": "1.2"}, "unit"),
+        ({"motion": {"tail_rate": "1.2"}}, "unit"),
     ],
 )
 def test_wrong_options_get_one_sentence_and_leave_nothing(tmp_path: Path, options: dict[str, Any], words: str) -> None:
     with pytest.raises(sp.InputError, match=words):
-        render(ROBOT, tmp_path / "a.mp4", **(SMALL | options))
+        render(ROBOT, tmp_path / "a.mp4", **small(**options))
     assert not list(tmp_path.iterdir())
 
 

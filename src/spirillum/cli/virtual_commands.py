@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,7 +12,7 @@ from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
 
 if TYPE_CHECKING:
-    from spirillum.virtual.degradation import Degradation
+    from spirillum.virtual.options import Options
 
 __all__ = ["render", "virtual_experiment"]
 
@@ -111,72 +112,39 @@ def render(
 
     Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
     """
+    given = locals()
     from spirillum.cli import renderer
+    from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
     from spirillum.virtual.trial import render as answer
 
-    spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded_robot(robot, settings),
             output,
-            model=model,
-            tail_rate=tail_rate,
-            friction=friction,
-            forward_velocity=forward_velocity,
-            body_rate=body_rate,
+            motion=_fields(MotionOptions, given),
             run=run,
-            duration=duration,
-            start=start,
-            lateral=lateral,
-            heading=heading,
-            wobble=wobble,
-            body_angle=body_angle,
-            tail_phase=tail_phase,
-            gap=gap,
-            view=view,
-            direction=direction,
-            fps=fps,
-            size=size,
-            exposure=exposure,
-            distortion=distortion,
-            degradation=spoiled,
+            trial=_fields(TrialOptions, given),
+            camera=_fields(CameraOptions, given),
+            degradation=_degradation(given),
+            setup_errors=_fields(SetupErrors, given),
             seed=seed,
-            depth_error=depth_error,
-            depth_uncertainty=depth_uncertainty,
             progress=progress,
         )
     renderer.show(found.to_dict(), json=json)
 
 
-def _degradation(
-    preset: str,
-    noise: float | None,
-    lamp_drift: float | None,
-    crf: int | None,
-    dropped: float | None,
-    tilt: str | None,
-    glare: float | None,
-    bubbles: int | None,
-    *,
-    fixed: bool,
-    hand: bool,
-) -> Degradation:
-    """A preset with those fields replaced that were given."""
-    from spirillum.units import KINDS, parse_option
-    from spirillum.virtual.degradation import degradation_of
+def _fields(options: type[Options], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The options of a command that are fields of a table; they have the same names."""
+    return {name: given[name] for name in options.model_fields if name in given}
 
-    return degradation_of(
-        preset,
-        noise=noise,
-        lamp_drift=lamp_drift,
-        crf=crf,
-        dropped=dropped,
-        tilt=None if tilt is None else parse_option("tilt", tilt, KINDS["angle"]),
-        glare=glare,
-        glare_moves=False if fixed else None,
-        bubbles=bubbles,
-        hand=True if hand else None,
-    )
+
+def _degradation(given: Mapping[str, Any]) -> dict[str, Any]:
+    """A preset, and the fields that replace its own; a switch that is off replaces none."""
+    from spirillum.virtual.degradation import Degradation
+
+    moves = False if given["glare_fixed"] else None
+    hand = given["hand"] or None
+    return _fields(Degradation, given) | {"preset": given["preset"], "glare_moves": moves, "hand": hand}
 
 
 def virtual_experiment(
@@ -218,25 +186,21 @@ def virtual_experiment(
 
     Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
     """
+    given = locals()
     from spirillum.cli import renderer
     from spirillum.virtual.experiment import virtual_experiment as answer
+    from spirillum.virtual.options import CameraOptions, MotionOptions
 
-    spoiled = _degradation(preset, noise, lamp_drift, crf, dropped, tilt, glare, bubbles, fixed=glare_fixed, hand=hand)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             study,
             output,
             trials=trials,
-            model=model,
-            friction=friction,
-            tail_rate=tail_rate,
+            motion=_fields(MotionOptions, given),
             spread=spread,
             duration=duration,
-            degradation=spoiled,
-            view=view,
-            direction=direction,
-            fps=fps,
-            size=size,
+            camera=_fields(CameraOptions, given),
+            degradation=_degradation(given),
             seed=seed,
             jobs=jobs,
             progress=progress,

@@ -13,6 +13,7 @@ from spirillum.errors import InputError
 from spirillum.units import KINDS, Kind, parse_quantity
 
 __all__ = [
+    "Angle",
     "BackEmfConstant",
     "Charge",
     "Density",
@@ -129,6 +130,7 @@ Velocity = Annotated[float, *_quantity("velocity")]
 RotaryFriction = Annotated[float, *_quantity("rotary friction")]
 MagneticMoment = Annotated[float, *_quantity("magnetic moment")]
 MagneticField = Annotated[float, *_quantity("magnetic field")]
+Angle = Annotated[float, *_quantity("angle")]
 MomentAngle = Annotated[float, *_quantity("moment angle")]
 Time = Annotated[float, *_quantity("time")]
 Voltage = Annotated[float, *_quantity("voltage")]

@@ -1,91 +1,68 @@
-"""What spoils a video: noise, a lamp that drifts, compression, lost frames, tilt, glare, bubbles, a hand's shadow."""
+"""Options of the disturbances of a video."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
-from typing import Any
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self
 
-import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from spirillum.errors import InputError, did_you_mean
+from spirillum.robot.fields import Angle
+from spirillum.virtual.options import Options, in_range, whole
 
-__all__ = ["PRESETS", "Degradation", "degradation_of"]
+__all__ = ["Degradation"]
 
 
-@dataclass(frozen=True)
-class Degradation:
+class Degradation(Options):
     """How much of each disturbance a video has; the defaults are a clean one's."""
 
-    noise: float = 0.0
+    argument: ClassVar[str] = "degradation"
+
+    noise: Annotated[float, BeforeValidator(in_range(0.0, 64.0))] = 0.0
     """Standard deviation of the noise, in steps of 255; independent in every pixel and colour."""
-    lamp_drift: float = 0.0
+    lamp_drift: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
     """Share by which the lamp's brightness changes; its colour by a quarter of that."""
-    crf: int = 18
-    """Constant rate factor of the compression (H.264), 0 (no loss) to 51."""
-    dropped: float = 0.0
+    crf: Annotated[int, BeforeValidator(whole(0, 51))] = 18
+    """Constant rate factor of the compression (H.264), 0 (lossless) to 51."""
+    dropped: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
     """Share of frames that are lost; the time stamps of the others stay true."""
-    tilt: float = 0.0
-    """Angle between optical axis and vertical, in a random direction, rad."""
-    glare: float = 0.0
+    tilt: Annotated[Angle, AfterValidator(in_range(0.0, 0.2, " rad"))] = 0.0
+    """Angle between optical axis and vertical, in a random direction."""
+    glare: Annotated[float, BeforeValidator(in_range(0.0, 1.0))] = 0.0
     """Share of the body's picture under a spot of glare."""
-    glare_moves: bool = True
-    """Whether the glare goes along with the body, or stands still in the lab."""
-    bubbles: int = 0
+    glare_moves: Annotated[bool, Field(strict=True)] = True
+    """Whether the glare moves with the body, or stands still in the lab."""
+    bubbles: Annotated[int, BeforeValidator(whole(0, 200))] = 0
     """Number of bubbles that drift under the top of the tube."""
-    hand: bool = False
+    hand: Annotated[bool, Field(strict=True)] = False
     """Whether the shadow of a hand passes over the picture."""
 
-    def __post_init__(self) -> None:
-        _check("noise", self.noise, 0.0, 64.0)
-        _check("lamp_drift", self.lamp_drift, 0.0, 0.9)
-        _check("crf", self.crf, 0, 51)
-        _check("dropped", self.dropped, 0.0, 0.9)
-        _check("tilt", self.tilt, 0.0, 0.2, " rad")
-        _check("glare", self.glare, 0.0, 1.0)
-        _check("bubbles", self.bubbles, 0, 200)
+    @classmethod
+    def of(cls, value: str | Self | Mapping[str, Any] | None) -> Self:
+        """A degradation from what a caller may give.
 
-    def to_dict(self) -> dict[str, Any]:
-        """The fields, for the truth beside a video."""
-        return asdict(self)
+        Args:
+            value: `clean`, `degraded`, a `Degradation`, its fields by name, or None: a clean video. Among the fields
+                `preset` names the degradation whose fields the others replace.
 
-
-def _check(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """One number in its range.
-
-    Raises:
-        InputError: if it is not.
-    """
-    whole = isinstance(low, int)
-    good = isinstance(value, int) if whole else isinstance(value, float | int)
-    if isinstance(value, bool) or not good or not low <= value <= high:
-        kind = "a whole number from " if whole else ""
-        raise InputError(f"{name} = {value!r}; allowed: {kind}{low:g} to {high:g}{unit}")
+        Raises:
+            InputError: for an unknown name or field, or a value out of range.
+        """
+        given = {"preset": value} if isinstance(value, str) else value
+        if isinstance(given, Mapping) and given.get("preset") is not None:
+            name = str(given["preset"])
+            if name not in _PRESETS:
+                hint = did_you_mean(name, _PRESETS)
+                raise InputError(f"degradation = {name[:40]!r}{hint}; allowed: {', '.join(_PRESETS)}")
+            instead = {field: new for field, new in given.items() if field != "preset" and new is not None}
+            given = _PRESETS[name] | instead
+        return super().of(given)
 
 
-PRESETS: dict[str, Degradation] = {
-    "clean": Degradation(),
-    "degraded": Degradation(noise=8.0, lamp_drift=0.2, crf=33, dropped=0.05, tilt=float(np.radians(2.0)), glare=0.2),
+_PRESETS: dict[str, dict[str, Any]] = {
+    "clean": {},
+    "degraded": {"noise": 8.0, "lamp_drift": 0.2, "crf": 33, "dropped": 0.05, "tilt": math.radians(2.0), "glare": 0.2},
 }
 """Named degradations; `degraded` is what measuring is tested with."""
-
-
-def degradation_of(value: str | Degradation, **instead: Any) -> Degradation:
-    """A degradation by name, with single fields replaced.
-
-    Args:
-        value: `clean`, `degraded`, or a `Degradation`.
-        instead: fields to replace; None leaves a field as it is.
-
-    Raises:
-        InputError: for an unknown name, or a value out of range.
-    """
-    if isinstance(value, str):
-        if value not in PRESETS:
-            hint = did_you_mean(value, PRESETS)
-            raise InputError(f"degradation = {value[:40]!r}{hint}; allowed: {', '.join(PRESETS)}")
-        value = PRESETS[value]
-    known = {item.name for item in fields(Degradation)}
-    wrong = next((name for name in instead if name not in known), None)
-    if wrong is not None:
-        raise InputError(f"degradation {wrong!r}{did_you_mean(wrong, known)}; allowed: {', '.join(sorted(known))}")
-    return Degradation(**(asdict(value) | {name: new for name, new in instead.items() if new is not None}))

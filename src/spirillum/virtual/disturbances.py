@@ -1,4 +1,4 @@
-"""The disturbances of one video, drawn from its seed; each from random numbers of its own."""
+"""Disturbances of a video's pictures: lamp drift, lost frames, tilt, glare, bubbles, a hand's shadow, noise."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ __all__ = ["Disturbances", "tilt_of"]
 _LAMP, _LOST, _TILT, _GLARE, _BUBBLES, _HAND, _GRAIN = range(10, 17)
 _GRAINS = 1 << 21
 _GLARE_LIGHT, _BUBBLE_LIGHT = 1.3, 0.9
-_HAND_SHADE, _HAND_PASSES = 0.45, 4.0
-"""Share of light that a hand takes, and the seconds in which it passes; assumed."""
-_SLOWEST, _FASTEST = 0.05e-3, 0.4e-3
-"""Drift of bubbles, m/s; assumed."""
+_HAND_SHADE, _HAND_TIME = 0.45, 4.0
+"""Share of light that a hand blocks, and the time in which it passes, s; assumed."""
+_MIN_DRIFT, _MAX_DRIFT = 0.05e-3, 0.4e-3
+"""Speed of bubbles, m/s; assumed."""
 
 
 def tilt_of(degradation: Degradation, seed: int) -> tuple[float, float]:
     """Tilt of the camera about x and about y, rad: of the given size, in a random direction."""
-    way = float(np.random.default_rng([seed, _TILT]).uniform(0.0, 2.0 * np.pi))
-    return degradation.tilt * float(np.cos(way)), degradation.tilt * float(np.sin(way))
+    azimuth = float(np.random.default_rng([seed, _TILT]).uniform(0.0, 2.0 * np.pi))
+    return degradation.tilt * float(np.cos(azimuth)), degradation.tilt * float(np.sin(azimuth))
 
 
 class Disturbances:
-    """What spoils the pictures of one video."""
+    """The disturbances of one video, drawn from its seed; each kind from random numbers of its own."""
 
     def __init__(
         self, degradation: Degradation, seed: int, lens: Lens, duration: float, body: tuple[float, float], top: float
@@ -41,10 +41,10 @@ class Disturbances:
             body: length and diameter of the body, m.
             top: height at which bubbles drift, m.
         """
-        self._what, self._seed, self._lens, self._body = degradation, seed, lens, body
+        self._degradation, self._seed, self._lens, self._body = degradation, seed, lens, body
         rng = np.random.default_rng([seed, _LAMP])
-        self._even = bool(rng.integers(2))
-        self._start, self._period = rng.uniform(0.0, 2.0 * np.pi), duration / rng.uniform(0.5, 1.5)
+        self._linear = bool(rng.integers(2))
+        self._phase, self._period = rng.uniform(0.0, 2.0 * np.pi), duration / rng.uniform(0.5, 1.5)
         self._sign = rng.choice([-1.0, 1.0])
         self._duration = duration
         rng = np.random.default_rng([seed, _GLARE])
@@ -55,57 +55,59 @@ class Disturbances:
         places = rng.uniform([-reach, -0.35 * reach / 2], [reach, 0.35 * reach / 2], (count, 2))
         self._bubbles = np.column_stack([places, np.full(count, top)])
         self._bubble_radius = rng.uniform(0.4e-3, 1.3e-3, count)
-        speed, way = rng.uniform(_SLOWEST, _FASTEST, count), rng.uniform(0.0, 2.0 * np.pi, count)
-        self._drift = np.column_stack([speed * np.cos(way), 0.2 * speed * np.sin(way), np.zeros(count)])
+        speed, azimuth = rng.uniform(_MIN_DRIFT, _MAX_DRIFT, count), rng.uniform(0.0, 2.0 * np.pi, count)
+        self._drift = np.column_stack([speed * np.cos(azimuth), 0.2 * speed * np.sin(azimuth), np.zeros(count)])
         rng = np.random.default_rng([seed, _HAND])
         self._hand_time = rng.uniform(0.2, 0.8) * duration
-        self._hand_way = rng.choice([-1.0, 1.0])
-        self._hand_row = rng.uniform(0.3, 0.7)
-        self._grain_places = np.random.default_rng([seed, _GRAIN])
-        self.grain = self._grain_places.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
-        """A stock of normal noise; every row of every picture begins at a random place of it."""
+        self._hand_sign = rng.choice([-1.0, 1.0])
+        self._hand_height = rng.uniform(0.3, 0.7)
+        self.noise = float(degradation.noise)
+        """Standard deviation of the noise, bytes."""
+        self._grain_rng = np.random.default_rng([seed, _GRAIN])
+        self.grain = self._grain_rng.standard_normal(_GRAINS if degradation.noise > 0 else 1, dtype=np.float32)
+        """A pool of normal noise; every row of every picture starts at a random place of it."""
 
     def kept(self, count: int) -> np.ndarray:
-        """Which of a number of frames are not lost, (count,); the first and the last never are."""
-        lost = round(self._what.dropped * count)
-        stay = np.ones(count, dtype=bool)
+        """Whether each of a number of frames is kept, (count,); the first and the last always are."""
+        lost = round(self._degradation.dropped * count)
+        kept = np.ones(count, dtype=bool)
         if count > 2:
             chosen = np.random.default_rng([self._seed, _LOST]).permutation(count - 2)[: min(lost, count - 2)]
-            stay[1 + chosen] = False
-        return stay
+            kept[1 + chosen] = False
+        return kept
 
     def gain(self, time: float) -> Samples:
         """(3,) brightness of the lamp in red, green and blue."""
         share = time / self._duration if self._duration > 0 else 0.0
-        swing = float(np.sin(2.0 * np.pi * time / self._period + self._start))
-        drift = self._what.lamp_drift * (self._sign * share if self._even else swing)
+        swing = float(np.sin(2.0 * np.pi * time / self._period + self._phase))
+        drift = self._degradation.lamp_drift * (self._sign * share if self._linear else swing)
         return np.asarray((1.0 + drift) * (1.0 + 0.25 * drift * np.array([1.0, 0.0, -1.0])))
 
     def starts(self, rows: int) -> np.ndarray:
-        """Where in the stock of noise each row of the next picture begins, (rows,)."""
-        return self._grain_places.integers(0, self.grain.size, rows)
+        """Start of each row of the next picture in the pool of noise, (rows,)."""
+        return self._grain_rng.integers(0, self.grain.size, rows)
 
-    def spoil(self, light: Samples, time: float, position: Samples) -> None:
-        """Put shadow, bubbles and glare into a picture.
+    def disturb(self, light: Samples, time: float, position: Samples) -> None:
+        """Add shadow, bubbles and glare to a picture.
 
         Args:
             light: linear light, (rows, columns, 3); changed.
             time: of the picture, s.
             position: of the body's mid-length, m, (3,).
         """
-        if self._what.hand:
+        if self._degradation.hand:
             self._shade(light, time)
-        if self._what.bubbles:
+        if self._degradation.bubbles:
             self._add_bubbles(light, time)
-        if self._what.glare > 0:
+        if self._degradation.glare > 0:
             self._add_glare(light, position)
 
     def _shade(self, light: Samples, time: float) -> None:
         rows, columns, _ = light.shape
-        share = (time - self._hand_time) / _HAND_PASSES
-        middle = columns * (0.5 + self._hand_way * 1.6 * share)
+        share = (time - self._hand_time) / _HAND_TIME
+        middle = columns * (0.5 + self._hand_sign * 1.6 * share)
         across = np.exp(-(((np.arange(columns) - middle) / (0.28 * columns)) ** 4))
-        along = np.exp(-(((np.arange(rows) - self._hand_row * rows) / (0.55 * rows)) ** 4))
+        along = np.exp(-(((np.arange(rows) - self._hand_height * rows) / (0.55 * rows)) ** 4))
         if across.max() > 1e-3:
             light *= (1.0 - _HAND_SHADE * along[:, None] * across[None, :])[..., None]
 
@@ -122,12 +124,12 @@ class Disturbances:
             light[window] += (_BUBBLE_LIGHT * spot + 0.06 * (far < 0.9))[..., None]
 
     def _add_glare(self, light: Samples, position: Samples) -> None:
-        place = position.copy() if self._what.glare_moves else np.array([0.0, 0.0, position[2]])
+        place = position.copy() if self._degradation.glare_moves else np.array([0.0, 0.0, position[2]])
         place[:2] += self._glare_at
         length, diameter = self._body
         ends = self._lens.seen(place + np.array([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]]))
         scale = abs(ends[1, 0] - ends[0, 0]) / 1e-3
-        area = self._what.glare * scale**2 * length * diameter * 0.94  # of an ellipse of axes 1.6 to 1
+        area = self._degradation.glare * scale**2 * length * diameter * 0.94  # of an ellipse of axes 1.6 to 1
         minor = np.sqrt(area / (np.pi * 1.6))
         u, v = float(ends[0, 0]), float(ends[0, 1])
         window, du, dv = _around(light, u, v, 2.4 * minor + 2)

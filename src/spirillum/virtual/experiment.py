@@ -7,25 +7,28 @@ import json
 import re
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import asdict, dataclass
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import claim_folder, output_folder, write_text
+from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
-from spirillum.units import KINDS, Hz, parse_option
+from spirillum.units import Hz
 from spirillum.version import own_version
-from spirillum.virtual.degradation import Degradation, degradation_of
+from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
-from spirillum.virtual.options import DIRECTIONS, VIEWS, checked_fps, checked_seed, checked_size, one_of, whole_number
+from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions, in_range, whole
 from spirillum.virtual.robot_file import is_preset
-from spirillum.virtual.trial import render, room
+from spirillum.virtual.trial import render
 from spirillum.virtual.truth import SYNTHETIC, rate_quantities
 
 __all__ = ["Planned", "VirtualExperiment", "virtual_experiment"]
@@ -38,6 +41,15 @@ _COLUMNS = ["robot", "channel_diameter_mm", "wavelength_mm", "amplitude_mm", "tr
 _RATES = ["forward_velocity_mm_s", "tail_rate_Hz", "body_rate_Hz", "motor_rate_Hz"]
 
 
+class _Plan(Seeded):
+    """How many trials of each robot, how long, and how they differ."""
+
+    trials: Annotated[int, BeforeValidator(whole(1, 1000))] = 5
+    spread: Annotated[float, BeforeValidator(in_range(0.0, 0.3))] = 0.02
+    duration: Time | None = None
+    jobs: Annotated[int, BeforeValidator(whole(1, 64))] = 1
+
+
 @dataclass(frozen=True)
 class Planned:
     """One trial to render."""
@@ -46,12 +58,13 @@ class Planned:
     robot: Robot
     number: int
     rates: Mapping[str, float]
-    duration: float
-    options: Mapping[str, Any]
+    """The steady rates times the trial's random factor, SI."""
+    trial: TrialOptions
+    seed: int
 
     @property
-    def words(self) -> str:
-        """What it is called."""
+    def label(self) -> str:
+        """Path of the trial in the experiment's folder."""
         return f"{self.folder}/trial-{self.number}"
 
 
@@ -94,16 +107,11 @@ def virtual_experiment(
     output: str | Path = "spirillum-virtual-experiment",
     *,
     trials: int = 5,
-    model: str | None = None,
-    friction: str | None = None,
-    tail_rate: str | float | None = None,
+    motion: MotionOptions | Mapping[str, Any] | None = None,
     spread: float = 0.02,
     duration: str | float | None = None,
-    degradation: str | Degradation = "clean",
-    view: str = "top",
-    direction: str = "right",
-    fps: float = 30.0,
-    size: str | tuple[int, int] = (640, 480),
+    camera: CameraOptions | Mapping[str, Any] | None = None,
+    degradation: str | Degradation | Mapping[str, Any] | None = None,
     seed: int = 0,
     jobs: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
@@ -111,24 +119,20 @@ def virtual_experiment(
     """Render several trials of each robot of a study; all of it is synthetic.
 
     Every trial has the model's steady rates times one random factor, the planted spread of the motor's rate: without
-    inertia all rates go with it. Places and phases at the start are random.
+    inertia all rates are proportional to it. Positions and phases at the start are random.
 
     Args:
         study: study file or its tables; None: the paper's robots in both of its tubes.
         output: folder; a finished trial that is there and whole is kept, another experiment in it is refused.
         trials: of each robot, 1 to 1000.
-        model: hydrodynamic model; None: the study's first, `sbt` without a study.
-        friction: reading of the friction; None: the robot's own.
-        tail_rate: lab rotation rate of the tail, with its unit or a float in rad/s; None: each robot's drive.
+        motion: `MotionOptions`: model, tail rate, friction, prescribed rates; the model is by default the study's
+            first, `sbt` without a study.
         spread: relative standard deviation of the motor's rate from trial to trial, 0 to 0.3.
         duration: of each trial, with its unit or a float in s; None: as long as the robot is in view, at most 20 s.
-        degradation: `clean`, `degraded`, or a `Degradation`.
-        view: `top` or `side`.
-        direction: where the nose points in the picture, `right` or `left`.
-        fps: frames a second.
-        size: width and height in pixels, even numbers, or ``"640x480"``.
+        camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
+        degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         seed: of all random numbers.
-        jobs: trials that are rendered at the same time.
+        jobs: trials that are rendered at the same time, 1 to 64.
         progress: told what is done, how many trials are done, and how many there are.
 
     Returns:
@@ -137,66 +141,63 @@ def virtual_experiment(
     Raises:
         InputError: for wrong input, or a folder of another experiment.
     """
-    trials, jobs = whole_number("trials", trials, 1, 1000), whole_number("jobs", jobs, 1, 64)
-    seed = checked_seed(seed)
-    if isinstance(spread, bool) or not 0.0 <= spread <= 0.3:
-        raise InputError(f"spread = {spread!r}; allowed: 0 to 0.3")
-    look: dict[str, Any] = {
-        "degradation": degradation_of(degradation),
-        "view": one_of("view", view, VIEWS),
-        "direction": one_of("direction", direction, DIRECTIONS),
-        "fps": checked_fps(fps),
-        "size": checked_size(size),
-    }
-    longest = None if duration is None else parse_option("duration", duration, KINDS["time"])
-    if longest is not None and longest * look["fps"] < 1.0:
-        raise InputError(f"duration = {longest:g} s; allowed: at least the {1.0 / look['fps']:.4g} s of a frame")
-    robots, model = _robots(study, model)
-    if len(robots) * trials > _MOST:
-        raise InputError(f"{len(robots)} robots with {trials} trials each; allowed: at most {_MOST} videos")
+    plan = _Plan.of({"trials": trials, "jobs": jobs, "seed": seed, "spread": spread, "duration": duration})
+    motion, camera, degradation = MotionOptions.of(motion), CameraOptions.of(camera), Degradation.of(degradation)
+    if plan.duration is not None and plan.duration * camera.fps < 1.0:
+        frame = 1.0 / camera.fps
+        raise InputError(f"duration = {plan.duration:g} s; allowed: at least the {frame:.4g} s of a frame")
+    robots, default_model = _robots(study)
+    if len(robots) * plan.trials > _MOST:
+        raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
     steady, warnings = {}, []
     for name, robot in robots.items():
-        rates, _, said = steady_rates(robot, model=model, tail_rate=tail_rate, friction=friction)
-        steady[name] = rates
+        steady[name], _, said = steady_rates(robot, motion, default_model)
         warnings += [f"{name}: {sentence}" for sentence in said]
     folder = Path(output)
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,
-        "trials": trials,
-        "spread": spread,
-        "duration": longest,
-        "seed": seed,
-        "look": look | {"degradation": asdict(look["degradation"])},
+        "plan": plan.model_dump(exclude={"jobs"}),
+        "camera": camera.model_dump(),
+        "degradation": degradation.model_dump(),
         "version": own_version(),
     }
     mark = {
         "schema": "spirillum.virtual-experiment-folder/1",
         "synthetic": True,
         "fingerprint": hashlib.sha256(json.dumps(question, sort_keys=True).encode()).hexdigest(),
-        "spread": spread,
-        "seed": seed,
+        "spread": plan.spread,
+        "seed": plan.seed,
     }
     claim_folder(folder, _MARK, mark, "virtual experiment")
     planned = [
-        plan
+        item
         for place, name in enumerate(robots)
-        for plan in _planned(name, robots[name], steady[name], trials, spread, longest, look, (seed, place))
+        for item in _planned(name, robots[name], steady[name], plan, camera, place)
     ]
-    todo = [plan for plan in planned if not _finished(folder, plan)]
+    missing = [item for item in planned if not _finished(folder, item)]
     for name in robots:
         output_folder(folder / name)
-    _render_all(folder, todo, len(planned), jobs, progress or (lambda _what, _done, _total: None))
+    render_one = _renderer(folder, camera, degradation)
+    _render_all(render_one, missing, len(planned), plan.jobs, progress or (lambda _what, _done, _total: None))
     table = folder / _TABLE
     write_text(table, _table(planned))
-    kept = len(planned) - len(todo)
-    return VirtualExperiment(folder, tuple(robots), trials, kept, spread, table, steady, tuple(dict.fromkeys(warnings)))
+    return VirtualExperiment(
+        folder=folder,
+        robots=tuple(robots),
+        trials=plan.trials,
+        kept=len(planned) - len(missing),
+        spread=plan.spread,
+        observations=table,
+        rates=steady,
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
 
 
-def _robots(study: str | Path | Mapping[str, Any] | None, model: str | None) -> tuple[dict[str, Robot], str]:
-    """Robots by the names of their folders, and the model."""
+def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Robot], str]:
+    """Robots by the names of their folders, and the study's first model."""
     if study is None:
-        return {name: load(name) for name in PAPER_ROBOTS}, model or "sbt"
+        return {name: load(name) for name in PAPER_ROBOTS}, "sbt"
     from spirillum.studies.spec import load_study
 
     loaded = load_study(study)
@@ -214,47 +215,39 @@ def _robots(study: str | Path | Mapping[str, Any] | None, model: str | None) -> 
         if name in found:
             name = f"{name}-{place + 1}"
         found[name] = robot
-    return found, model or loaded.study.models[0]
+    return found, loaded.study.models[0]
 
 
 def _planned(
-    name: str,
-    robot: Robot,
-    steady: Mapping[str, float],
-    trials: int,
-    spread: float,
-    longest: float | None,
-    look: Mapping[str, Any],
-    seeds: tuple[int, int],
+    name: str, robot: Robot, steady: Mapping[str, float], plan: _Plan, camera: CameraOptions, place: int
 ) -> list[Planned]:
-    """The trials of one robot."""
-    plans = []
-    low, high = room(robot, look["view"], look["size"], leftwards=look["direction"] == "left")
-    for number in range(1, trials + 1):
-        rng = np.random.default_rng([*seeds, number])
-        factor = float(max(1.0 + spread * rng.standard_normal(), 0.1))
+    """The trials of the robot at a place in the study."""
+    planned = []
+    low, high = swimming_range(robot, camera)
+    for number in range(1, plan.trials + 1):
+        rng = np.random.default_rng([plan.seed, place, number])
+        factor = float(max(1.0 + plan.spread * rng.standard_normal(), 0.1))
         rates = {key: factor * value for key, value in steady.items()}
-        speed = abs(rates["forward_velocity"])
-        time = longest
-        if time is None:
-            time = min(_LONGEST, 0.9 * max(high - low, 0.1 * robot.body.length) / max(speed, 1e-12))
-        spare = max(high - low - speed * time, 0.0)
-        first = low + float(rng.uniform(0.1, 0.9)) * spare + (speed * time if rates["forward_velocity"] < 0 else 0.0)
-        options = {
-            **look,
-            "start": first,
-            "body_angle": float(rng.uniform(0.0, 2.0 * np.pi)),
-            "tail_phase": float(rng.uniform(0.0, 2.0 * np.pi)),
-            "seed": int(rng.integers(2**31)),
-        }
-        plans.append(Planned(name, robot, number, rates, time, options))
-    return plans
+        velocity = rates["forward_velocity"]
+        duration = plan.duration
+        if duration is None:
+            duration = min(_LONGEST, 0.9 * max(high - low, 0.1 * robot.body.length) / max(abs(velocity), 1e-12))
+        spare = max(high - low - abs(velocity) * duration, 0.0)
+        start = low + float(rng.uniform(0.1, 0.9)) * spare + (abs(velocity) * duration if velocity < 0 else 0.0)
+        trial = TrialOptions(
+            duration=duration,
+            start=start,
+            body_angle=float(rng.uniform(0.0, 2.0 * np.pi)),
+            tail_phase=float(rng.uniform(0.0, 2.0 * np.pi)),
+        )
+        planned.append(Planned(name, robot, number, rates, trial, int(rng.integers(2**31))))
+    return planned
 
 
-def _finished(folder: Path, plan: Planned) -> bool:
-    """Whether a trial is there: its files appear together, and none of them was damaged since in a way that shows."""
-    trial = folder / plan.folder / f"trial-{plan.number}"
-    known = ["setup.toml"] if is_preset(plan.robot) else ["setup.toml", "robot.toml"]
+def _finished(folder: Path, planned: Planned) -> bool:
+    """Whether a trial is there, with no file missing or visibly damaged."""
+    trial = folder / planned.label
+    known = ["setup.toml"] if is_preset(planned.robot) else ["setup.toml", "robot.toml"]
     try:
         json.loads(trial.with_name(f"{trial.name}.truth.json").read_text(encoding="utf-8"))
         begins = {end: _first_bytes(trial.with_name(f"{trial.name}.{end}")) for end in ("mp4", "truth.nc")}
@@ -270,60 +263,70 @@ def _first_bytes(path: Path) -> bytes:
         return file.read(8)
 
 
-def _render_all(
-    folder: Path, todo: list[Planned], total: int, jobs: int, tell: Callable[[str, int, int], None]
-) -> None:
-    """Render what is missing; when interrupted, what is finished stays and nothing half done."""
-    stop = threading.Event()
-    done = total - len(todo)
-    tell("virtual experiment", done, total)
-    with ThreadPoolExecutor(jobs) as pool:
-        waiting: set[Future[str]] = {pool.submit(_render, folder, plan, stop) for plan in todo}
-        try:
-            while waiting:
-                ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in ready:
-                    done += 1
-                    tell(future.result(), done, total)
-        except BaseException:
-            stop.set()
-            for future in waiting:
-                future.cancel()
-            raise
-
-
 class _Stopped(Exception):  # noqa: N818
     """Rendering was interrupted."""
 
 
-def _render(folder: Path, plan: Planned, stop: threading.Event) -> str:
-    def look_up(_what: str, _done: int, _total: int) -> None:
-        if stop.is_set():
-            raise _Stopped
+_Render = Callable[[Planned, threading.Event], None]
 
-    render(
-        plan.robot,
-        folder / plan.folder / f"trial-{plan.number}.mp4",
-        forward_velocity=plan.rates["forward_velocity"],
-        tail_rate=plan.rates["tail_rotation_rate"],
-        body_rate=plan.rates["body_rotation_rate"],
-        duration=plan.duration,
-        setup=folder / plan.folder / "setup.toml",
-        progress=look_up,
-        **plan.options,
-    )
-    return plan.words
+
+def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> _Render:
+    """A function that renders one trial into a folder, until an event stops it."""
+
+    def render_one(planned: Planned, stop: threading.Event) -> None:
+        def check_stop(_what: str, _done: int, _total: int) -> None:
+            if stop.is_set():
+                raise _Stopped
+
+        render(
+            planned.robot,
+            folder / f"{planned.label}.mp4",
+            motion={
+                "forward_velocity": planned.rates["forward_velocity"],
+                "tail_rate": planned.rates["tail_rotation_rate"],
+                "body_rate": planned.rates["body_rotation_rate"],
+            },
+            trial=planned.trial,
+            camera=camera,
+            degradation=degradation,
+            setup=folder / planned.folder / "setup.toml",
+            seed=planned.seed,
+            progress=check_stop,
+        )
+
+    return render_one
+
+
+def _render_all(
+    render_one: _Render, missing: list[Planned], total: int, jobs: int, tell: Callable[[str, int, int], None]
+) -> None:
+    """Render what is missing; after an interruption, finished trials stay and no unfinished one is left."""
+    stop = threading.Event()
+    done = total - len(missing)
+    tell("virtual experiment", done, total)
+    with ThreadPoolExecutor(jobs) as pool:
+        labels = {pool.submit(render_one, planned, stop): planned.label for planned in missing}
+        try:
+            for future in as_completed(labels):
+                future.result()
+                done += 1
+                tell(labels[future], done, total)
+        except BaseException:
+            stop.set()
+            for future in labels:
+                future.cancel()
+            raise
 
 
 def _table(planned: list[Planned]) -> str:
     """The truth as an observations file."""
     about = f"# {SYNTHETIC.replace('synthetic', 'SYNTHETIC', 1)}; true rates, with planted differences between trials"
     lines = [about, ",".join(_COLUMNS + _RATES)]
-    for plan in planned:
-        robot, rates = plan.robot, plan.rates
+    for item in planned:
+        robot, rates = item.robot, item.rates
         channel = "" if robot.channel is None else f"{1e3 * robot.channel.diameter:.9g}"
         tail, body = rates["tail_rotation_rate"] / Hz, rates["body_rotation_rate"] / Hz
         numbers = (1e3 * rates["forward_velocity"], tail, body, tail - body)
         shape = f"{channel},{1e3 * robot.tail.wavelength:.9g},{1e3 * robot.tail.amplitude:.9g}"
-        lines.append(f"{plan.folder},{shape},{plan.number},{','.join(f'{value:.9g}' for value in numbers)}")
+        lines.append(f"{item.folder},{shape},{item.number},{','.join(f'{value:.9g}' for value in numbers)}")
     return "\n".join(lines) + "\n"

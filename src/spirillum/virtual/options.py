@@ -1,171 +1,233 @@
-"""The options of a virtual trial, checked: one sentence for each that is wrong."""
+"""Options of virtual trials: tables whose fields are the same in TOML, in Python and on the command line."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from fractions import Fraction
-from pathlib import Path
+from numbers import Real
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, BeforeValidator, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
-from spirillum.files import output_target
-from spirillum.units import KINDS, parse_option
+from spirillum.robot.fields import Angle, LengthOrZero, Rate, Section, Time, Velocity, field_values
+from spirillum.robot.problems import problems_in
 
 __all__ = [
-    "DIRECTIONS",
-    "VIEWS",
-    "checked_axis",
-    "checked_distortion",
-    "checked_fps",
-    "checked_heading",
-    "checked_seed",
-    "checked_size",
-    "one_of",
-    "signed_length",
-    "video_target",
-    "whole_number",
+    "CameraOptions",
+    "MotionOptions",
+    "Options",
+    "Seeded",
+    "SetupErrors",
+    "TrialOptions",
+    "in_range",
+    "whole",
 ]
 
-VIEWS = ("top", "side")
-"""Where the camera is: above, or level beside the tank."""
-DIRECTIONS = ("right", "left")
-"""Where the nose points in the picture."""
 
-_SMALLEST, _LARGEST = 64, 4096
-_BENT = 0.5
-"""Largest coefficient of distortion: with more, the corners of a wide picture come out near its middle."""
-_OBLIQUE = 45.0
-"""Largest heading, degrees: the setup knows only right and left."""
-_THIN = 1e-6
-"""Least depth of floor and surface below and above the axis that a setup states, m."""
+class Options(Section):
+    """Options that belong together: frozen, closed to unknown fields, quantities in SI."""
 
+    argument: ClassVar[str] = "options"
+    """Name of the argument that takes them."""
 
-def video_target(path: str | Path) -> Path:
-    """The video to write, or the folder for its frames.
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any) -> Any:
+        """Numbers given for quantities are SI; a field that is None is as if left out."""
+        if not isinstance(given, Mapping):
+            return given
+        units = {item.path: item.unit for item in field_values(cls.model_construct())}
+        return {name: _with_unit(value, units.get(name)) for name, value in given.items() if value is not None}
 
-    Raises:
-        InputError: if it has another ending, or cannot be written.
-    """
-    path = Path(path)
-    if path.suffix:
-        return output_target(path, {".mp4": "a video, or a folder without an ending"}, "trial.mp4")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
-        raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
-    return path
+    @classmethod
+    def of(cls, value: Self | Mapping[str, Any] | None) -> Self:
+        """Options from what a caller may give.
 
+        Args:
+            value: options, their fields by name (quantities with their unit, or floats in SI), or None: the defaults.
 
-def one_of(name: str, value: str, allowed: tuple[str, ...]) -> str:
-    """A word that is allowed.
-
-    Raises:
-        InputError: if it is not.
-    """
-    if value not in allowed:
-        raise InputError(f"{name} = {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
-    return value
+        Raises:
+            InputError: for an unknown field or a wrong value.
+        """
+        if isinstance(value, cls):
+            return value
+        if not (value is None or isinstance(value, Mapping)):
+            allowed = ", ".join(cls.model_fields)
+            raise InputError(f"{cls.argument} = {str(value)[:60]!r}; allowed: {allowed}, each by name")
+        checked = problems_in(cls, value or {})
+        if isinstance(checked, list):
+            raise InputError(checked[0], checked)
+        return checked
 
 
-def whole_number(name: str, value: object, low: int, high: int) -> int:
-    """A whole number in a range.
-
-    Raises:
-        InputError: if it is not.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise InputError(f"{name} = {value!r}; allowed: a whole number from {low} to {high}")
-    return value
-
-
-def checked_seed(seed: object) -> int:
-    """The seed of all random numbers.
-
-    Raises:
-        InputError: if it is none.
-    """
-    return whole_number("seed", seed, 0, 2**31 - 1)
+def _with_unit(value: Any, unit: str | None) -> Any:
+    """A number as text with its SI unit, where the field is a quantity."""
+    if unit is None or isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    try:
+        return f"{float(value)!r} {unit}"
+    except OverflowError:
+        return f"inf {unit}"
 
 
-def signed_length(name: str, value: str | float) -> float:
-    """A length of either sign, with its unit or in m.
-
-    Raises:
-        InputError: if it is none.
-    """
-    if isinstance(value, str):
-        text = value.strip()
-        if text.startswith("-"):
-            return -parse_option(name, text[1:], KINDS["length or zero"])
-        return parse_option(name, text, KINDS["length or zero"])
-    return parse_option(name, abs(value), KINDS["length or zero"]) * (-1.0 if value < 0 else 1.0)
+def _refusal(sentence: str) -> PydanticCustomError:
+    """The error of a value; the sentence follows the field's name."""
+    return PydanticCustomError("quantity", "{sentence}", {"sentence": sentence})
 
 
-def checked_fps(fps: float) -> float:
-    """Frames a second, as the nearest fraction that a video can hold.
+def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
+    """A check of numbers from `low` to `high`; `unit` is for the sentence of an error."""
 
-    Raises:
-        InputError: if they are out of range.
-    """
-    if isinstance(fps, bool) or not 1.0 <= fps <= 1000.0:
-        raise InputError(f"fps = {fps!r}; allowed: 1 to 1000 frames a second")
-    return float(Fraction(fps).limit_denominator(1001))
+    def check(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, Real) or not low <= value <= high:
+            raise _refusal(f"= {value!r}; allowed: {low:g} to {high:g}{unit}")
+        return float(value)
+
+    return check
 
 
-def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
-    """Width and height in pixels, even numbers, from ``640x480`` or a pair.
+def whole(low: int, high: int) -> Callable[[Any], int]:
+    """A check of whole numbers from `low` to `high`."""
 
-    Raises:
-        InputError: if it is neither, odd, or out of range.
-    """
-    allowed = f"WIDTHxHEIGHT in pixels, even numbers from {_SMALLEST} to {_LARGEST}, for example 640x480"
-    parts = size.lower().replace("×", "x").split("x") if isinstance(size, str) else [str(value) for value in size]
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise _refusal(f"= {value!r}; allowed: a whole number from {low} to {high}")
+        return value
+
+    return check
+
+
+def _one_of(*allowed: str) -> Callable[[Any], Any]:
+    def check(value: Any) -> Any:
+        if value not in allowed:
+            raise _refusal(f"= {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
+        return value
+
+    return check
+
+
+def _read_size(value: Any) -> tuple[int, int]:
+    """Width and height from ``640x480`` or a pair."""
+    low, high = 64, 4096
+    allowed = f"WIDTHxHEIGHT in pixels, even numbers from {low} to {high}, for example 640x480"
+    pair = isinstance(value, tuple | list)
+    parts = [str(item) for item in value] if pair else str(value).lower().replace("×", "x").split("x")
     if len(parts) != 2 or not all(part.strip().isdecimal() and len(part) <= 6 for part in parts):
-        raise InputError(f"size = {str(size)[:40]!r}; allowed: {allowed}")
+        raise _refusal(f"= {str(value)[:40]!r}; allowed: {allowed}")
     width, height = (int(part) for part in parts)
-    if not all(_SMALLEST <= value <= _LARGEST and value % 2 == 0 for value in (width, height)):
-        raise InputError(f"size = {width}x{height}; allowed: {allowed}")
+    if not all(low <= length <= high and length % 2 == 0 for length in (width, height)):
+        raise _refusal(f"= {width}x{height}; allowed: {allowed}")
     return width, height
 
 
-def checked_distortion(value: float) -> float:
-    """The coefficient k1 of radial distortion.
-
-    Raises:
-        InputError: if it is no number, or out of range.
-    """
-    if isinstance(value, bool) or not abs(value) <= _BENT:
-        raise InputError(f"distortion = {value!r}; allowed: {-_BENT:g} to {_BENT:g}")
-    return float(value)
+def _read_signed(value: Any, read: ValidatorFunctionWrapHandler) -> float:
+    """A length of either sign; the sign is not a part of the quantity."""
+    negative = isinstance(value, str) and value.strip().startswith("-")
+    return -float(read(value.strip()[1:])) if negative else float(read(value))
 
 
-def checked_heading(value: str | float) -> float:
-    """The angle of the robot's axis to the channel, with its unit or in rad.
-
-    Raises:
-        InputError: if it is none, or so oblique that the nose points neither right nor left.
-    """
-    angle = parse_option("heading", value, KINDS["angle"])
-    if abs(angle) > math.radians(_OBLIQUE) * (1.0 + 1e-9):
-        raise InputError(f"heading = {math.degrees(angle):.4g} deg; allowed: {-_OBLIQUE:g} to {_OBLIQUE:g} deg")
+def _check_heading(angle: float) -> float:
+    most = 45.0  # a setup knows only right and left
+    if abs(angle) > math.radians(most) * (1.0 + 1e-9):
+        raise _refusal(f"= {math.degrees(angle):.4g} deg; allowed: {-most:g} to {most:g} deg")
     return angle
 
 
-def checked_axis(height: float, error: str | float, surface: float) -> float:
-    """The height of the robot's axis as the setup states it, m: wrong by an error, but between floor and surface.
+def _read_frame_rate(value: Any) -> float:
+    """Frames a second, as the nearest fraction that a video can hold."""
+    return float(Fraction(in_range(1.0, 1000.0, " frames a second")(value)).limit_denominator(1001))
 
-    Args:
-        height: the true height, m.
-        error: by which it is wrong, with its unit or in m.
-        surface: height of the oil's surface, m.
 
-    Raises:
-        InputError: if the error is no length, or a setup with it would not be valid.
-    """
-    wrong = signed_length("depth_error", error)
-    if not _THIN <= height + wrong <= surface - _THIN:
-        low, high = -1e3 * height, 1e3 * (surface - height)
-        raise InputError(
-            f"depth_error = {1e3 * wrong:.4g} mm; allowed: between {low:.4g} and {high:.4g} mm, "
-            "an axis above the floor and below the oil's surface"
-        )
-    return height + wrong
+SignedLength = Annotated[LengthOrZero, WrapValidator(_read_signed)]
+
+
+class MotionOptions(Options):
+    """Steady swimming: a model's rates, and those that are prescribed instead."""
+
+    argument: ClassVar[str] = "motion"
+
+    model: str | None = None
+    """Hydrodynamic model; None: `sbt`, in a virtual experiment the study's first."""
+    friction: str | None = None
+    """Reading of the friction; None: the robot's own."""
+    tail_rate: Rate | None = None
+    """Lab rotation rate of the tail; None: the robot's drive."""
+    forward_velocity: Velocity | None = None
+    """Instead of the model's."""
+    body_rate: Rate | None = None
+    """Lab rotation rate of the body instead of the model's."""
+
+
+class TrialOptions(Options):
+    """Length of a trial, and the robot's pose at its first frame."""
+
+    argument: ClassVar[str] = "trial"
+
+    duration: Time = 20.0
+    """Of the video."""
+    start: SignedLength | None = None
+    """x of the body's mid-length at the first frame, from below the lens; None: the path is centred in the picture."""
+    lateral: SignedLength = 0.0
+    """Horizontal offset across the channel (y of the lab, forward x and upward z)."""
+    heading: Annotated[Angle, AfterValidator(_check_heading)] = 0.0
+    """Angle of the robot's axis to the channel in the picture's plane, at most 45 degrees."""
+    wobble: LengthOrZero = 0.0
+    """Amplitude of a motion across the channel at the tail's rate, in the picture's plane."""
+    body_angle: Angle = 0.0
+    """Of the body at the first frame."""
+    tail_phase: Angle = 0.0
+    """Of the tail at the first frame."""
+    gap: LengthOrZero = 0.5e-3
+    """Between body and tube; a run has its own."""
+
+
+class CameraOptions(Options):
+    """The camera of a trial."""
+
+    argument: ClassVar[str] = "camera"
+
+    view: Annotated[Literal["top", "side"], BeforeValidator(_one_of("top", "side"))] = "top"
+    """From above, or level from beside the tank."""
+    direction: Annotated[Literal["right", "left"], BeforeValidator(_one_of("right", "left"))] = "right"
+    """Where the nose points in the picture."""
+    fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0
+    """Frames a second, as the nearest fraction that a video can hold."""
+    size: Annotated[tuple[int, int], BeforeValidator(_read_size)] = (640, 480)
+    """Width and height in pixels, even numbers, or ``"640x480"``."""
+    exposure: Time = 1.0 / 120.0
+    """Of each frame."""
+    distortion: Annotated[float, BeforeValidator(in_range(-0.5, 0.5))] = -0.02
+    """Coefficient k1 of the lens's radial distortion; beyond 0.5 the corners of a wide picture fold inwards."""
+
+    @model_validator(mode="after")
+    def _exposure_fits(self) -> Self:
+        if self.exposure > 1.0 / self.fps:
+            sentence = f"exposure = {self.exposure:.4g} s; allowed: at most the {1.0 / self.fps:.4g} s of a frame"
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+        return self
+
+    @property
+    def leftwards(self) -> bool:
+        """Whether the nose points to the left in the picture."""
+        return self.direction == "left"
+
+
+class SetupErrors(Options):
+    """Errors planted in the setup; the video does not know them."""
+
+    argument: ClassVar[str] = "setup_errors"
+
+    depth_error: SignedLength = 0.0
+    """By which the setup's height of the robot's axis is wrong; the stated axis stays in the oil."""
+    depth_uncertainty: LengthOrZero = 0.0
+    """Standard uncertainty of that height that the setup states."""
+
+
+class Seeded(Options):
+    """What depends on random numbers."""
+
+    seed: Annotated[int, BeforeValidator(whole(0, 2**31 - 1))] = 0
+    """Of all random numbers."""

@@ -10,7 +10,7 @@ from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import Solid, solids_of
 from spirillum.virtual.tank import Tank, backdrop, spots, tint
-from spirillum.virtual.trajectory import Moment, Way
+from spirillum.virtual.trajectory import Pose, Trajectory
 
 __all__ = ["Painter"]
 
@@ -54,16 +54,16 @@ class Painter:
         self._depth = np.empty(0, dtype=np.float32)
         self._samples = np.empty(0, dtype=np.float32)
 
-    def light(self, way: Way, time: float, exposure: float) -> np.ndarray:
+    def light(self, trajectory: Trajectory, time: float, exposure: float) -> np.ndarray:
         """(rows, columns, 3) linear light of an exposure about a time.
 
         Args:
-            way: where the robot is.
+            trajectory: where the robot is.
             time: the middle of the exposure, s.
             exposure: its length, s.
         """
-        middle = way.at(time)
-        parts = self._parts(way, middle, time, exposure)
+        middle = trajectory.at(time)
+        parts = self._parts(trajectory, middle, time, exposure)
         picture = self.still.light.copy()
         left, top, right, bottom = self._window([pixels for _, _, moments in parts for pixels in moments])
         if left >= right or top >= bottom:
@@ -80,14 +80,14 @@ class Painter:
         return picture
 
     def _parts(
-        self, way: Way, middle: Moment, time: float, exposure: float
+        self, trajectory: Trajectory, middle: Pose, time: float, exposure: float
     ) -> list[tuple[Solid, Samples, list[Samples]]]:
         """Body and rotor, how each is turned, and where its vertices are seen at the moments of an exposure."""
         found = []
         for solid, name in ((self.body, "body"), (self.rotor, "rotor")):
 
             def seen(share: float, every: int = 1, solid: Solid = solid, name: str = name) -> Samples:
-                moment = way.at(time + share * exposure) if share else middle
+                moment = trajectory.at(time + share * exposure) if share else middle
                 return self.lens.seen(solid.vertices[::every] @ getattr(moment, name).T + moment.position)
 
             blur = float(np.abs(seen(0.5, _FEW) - seen(-0.5, _FEW))[:, :2].max()) if exposure > 0 else 0.0
@@ -114,7 +114,7 @@ class Painter:
         shape = (rows, columns, _SAMPLES)
         return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
 
-    def _shadow(self, moment: Moment) -> Samples:
+    def _shadow(self, moment: Pose) -> Samples:
         """The soft shadow, as `blend` takes it; the lamp stands a little to one side."""
         half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
         drop = (-0.1 if self.lens.leftwards else 0.1) * moment.position[2]
@@ -125,8 +125,8 @@ class Painter:
 def _lamps(view: str, side: float) -> Samples:
     """Lamps as `shade` takes them: direction, strength, and the direction halfway to a camera far above."""
     rows = []
-    for *way, strength in _LAMPS[view]:
-        towards = np.array(way) * np.array([side, side, 1.0])
+    for *trajectory, strength in _LAMPS[view]:
+        towards = np.array(trajectory) * np.array([side, side, 1.0])
         towards /= np.linalg.norm(towards)
         half = towards + np.array([0.0, 0.0, 1.0])
         rows.append(np.concatenate([towards, [strength], half / np.linalg.norm(half)]))

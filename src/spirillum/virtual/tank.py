@@ -15,6 +15,10 @@ from spirillum.virtual.solids import linear
 
 __all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
 
+_SPACING = 2e-3
+"""From one line of the ruler to the next, m."""
+_SIDE_AXIS = 30e-3
+"""Height of the tube's axis above the far wall in the view from the side, m; assumed."""
 _GLASS = 2.0e-3
 """Thickness of the tube's wall, m; assumed."""
 _RULER_WIDTH, _RULER_LENGTH, _RULER_AWAY, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
@@ -65,30 +69,27 @@ class Backdrop:
     """x and y of the floor behind each pixel, m, (rows, columns, 2)."""
 
 
-def tank_of(robot: Robot, view: str, spacing: float, side_height: float) -> Tank:
+def tank_of(robot: Robot, view: str) -> Tank:
     """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
 
     Args:
         robot: a checked robot.
         view: `top` or `side`.
-        spacing: of the ruler's lines, m.
-        side_height: height of the tube's axis above the far wall in the view from the side, m.
     """
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
-    return Tank(view, tube, tube_height(robot, view, side_height), length, spacing, _reach(robot) + _RULER_AWAY)
+    return Tank(view, tube, tube_height(robot, view), length, _SPACING, _reach(robot) + _RULER_AWAY)
 
 
-def tube_height(robot: Robot, view: str, side_height: float) -> float:
-    """Height of the tube's axis above the reference plane, m; of the robot's way where there is no tube.
+def tube_height(robot: Robot, view: str) -> float:
+    """Height of the tube's axis above the reference plane, m; of the robot's path where there is no tube.
 
     Args:
         robot: a checked robot.
         view: `top` or `side`.
-        side_height: the height in the view from the side, m.
     """
-    return side_height if view == "side" else _reach(robot)
+    return _SIDE_AXIS if view == "side" else _reach(robot)
 
 
 def _reach(robot: Robot) -> float:

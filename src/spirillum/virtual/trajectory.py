@@ -1,4 +1,4 @@
-"""Where the robot is, as the virtual camera's frame has it: steady swimming, or a run of `spirillum simulate`."""
+"""Trajectory of the robot in the camera's frame: steady swimming, or a run of `spirillum simulate`."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Moment", "Way", "lab_to_camera", "run_way", "steady_way"]
+__all__ = ["Pose", "Trajectory", "lab_to_camera", "run_trajectory", "steady_trajectory"]
 
-_MOST_ASIDE = 0.5
+_MAX_OBLIQUITY = 0.5
 """Largest angle of a run's robot to the channel, rad."""
-_PER_TURN = 240
-"""Samples of a wobble in a turn of the tail."""
+_SAMPLES_PER_TURN = 240
+"""Samples of the wobble per turn of the tail."""
 
 
 @dataclass(frozen=True)
-class Moment:
-    """The robot at one time, in the camera's frame."""
+class Pose:
+    """Position and attitude of the robot at one time, in the camera's frame."""
 
     position: Samples
     """The body's mid-length, m, (3,)."""
@@ -34,8 +34,8 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way through time in the camera's frame, straight and even between its samples."""
+class Trajectory:
+    """Position and angles over time in the camera's frame, linear between samples."""
 
     time: Samples = field(repr=False)
     """(n,) increasing, s."""
@@ -56,28 +56,28 @@ class Way:
         return float(self.time[-1] - self.time[0])
 
     def series(self, times: Samples) -> dict[str, Samples]:
-        """Position, heading, body angle and tail phase at times."""
+        """`x`, `y`, `z`, heading, pitch, body angle and tail phase at times, by name."""
         names = ("heading", "pitch", "body_angle", "tail_phase")
         found = {name: np.interp(times, self.time, getattr(self, name)) for name in names}
         found |= {axis: np.interp(times, self.time, self.position[:, k]) for k, axis in enumerate("xyz")}
         return found
 
-    def at(self, time: float) -> Moment:
-        """The robot at a time."""
+    def at(self, time: float) -> Pose:
+        """Pose at a time."""
         now = {name: float(values[0]) for name, values in self.series(np.array([time])).items()}
         attitude = _attitude(now["heading"], now["pitch"])
         position = np.array([now["x"], now["y"], now["z"]])
-        return Moment(position, attitude @ _about_x(now["body_angle"]), attitude @ _about_x(now["tail_phase"]))
+        return Pose(position, attitude @ _about_x(now["body_angle"]), attitude @ _about_x(now["tail_phase"]))
 
-    def shifted(self, x: float) -> Way:
-        """The same way further along the channel, m."""
+    def shifted(self, x: float) -> Trajectory:
+        """Translated along the channel by `x`, m."""
         return replace(self, position=self.position + np.array([x, 0.0, 0.0]))
 
-    def until(self, end: float) -> Way:
-        """Its beginning, to a time.
+    def until(self, end: float) -> Trajectory:
+        """Truncated at a time.
 
         Raises:
-            InputError: if it is shorter.
+            InputError: if it ends earlier.
         """
         if end > float(self.time[-1]) * (1.0 + 1e-9):
             last = float(self.time[-1])
@@ -88,7 +88,7 @@ class Way:
             raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
         now = self.series(time)
         place = np.stack([now["x"], now["y"], now["z"]], axis=-1)
-        return Way(time, place, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
+        return Trajectory(time, place, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
 
     def rates(self) -> dict[str, float]:
         """Mean rates from the first sample to the last: `forward_velocity`, `body_rotation_rate`, ..."""
@@ -110,13 +110,14 @@ def _about_x(angle: float) -> Samples:
 
 
 def _attitude(heading: float, pitch: float) -> Samples:
+    """Rotation by the heading about z, after the nose was raised by the pitch."""
     (ch, sh), (cp, sp) = (np.cos(heading), np.sin(heading)), (np.cos(pitch), np.sin(pitch))
     turn = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
     raise_nose = np.array([[cp, 0.0, -sp], [0.0, 1.0, 0.0], [sp, 0.0, cp]])
     return np.asarray(turn @ raise_nose)
 
 
-def steady_way(
+def steady_trajectory(
     duration: float,
     *,
     forward_velocity: float,
@@ -127,7 +128,7 @@ def steady_way(
     wobble: float = 0.0,
     body_angle: float = 0.0,
     tail_phase: float = 0.0,
-) -> Way:
+) -> Trajectory:
     """Swimming at constant rates along the channel.
 
     Args:
@@ -137,15 +138,15 @@ def steady_way(
         tail_rotation_rate: about +x in the lab, rad/s.
         position: of the body's mid-length at the first frame, m, (3,).
         heading: angle of the robot's axis to the channel, rad.
-        wobble: amplitude of a motion across the channel at the tail's rate, m.
+        wobble: amplitude of a transverse oscillation at the tail's rate, m.
         body_angle: of the body at the first frame, rad.
         tail_phase: of the tail at the first frame, rad.
     """
     turns = abs(tail_rotation_rate) * duration / (2.0 * np.pi)
-    time = np.linspace(0.0, duration, 2 + (int(_PER_TURN * turns) if wobble > 0 else 0))
+    time = np.linspace(0.0, duration, 2 + (int(_SAMPLES_PER_TURN * turns) if wobble > 0 else 0))
     places = position + np.outer(time, [forward_velocity, 0.0, 0.0])
     places[:, 1] += wobble * np.cos(tail_phase + tail_rotation_rate * time)
-    return Way(
+    return Trajectory(
         time,
         places,
         np.full_like(time, heading),
@@ -163,8 +164,8 @@ def lab_to_camera(view: str, *, leftwards: bool) -> Samples:
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -side], [0.0, side, 0.0]])
 
 
-def run_way(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, level: float) -> Way:
-    """The way of a run.
+def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, level: float) -> Trajectory:
+    """Trajectory of a run.
 
     Args:
         dataset: what `spirillum.simulate` returns.
@@ -183,15 +184,15 @@ def run_way(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, lev
     turns = np.array([turn @ rotation_matrix(attitude) for attitude in poses.attitude])
     noses = turns[:, :, 0]
     heading, pitch = np.arctan2(noses[:, 1], noses[:, 0]), np.arcsin(np.clip(noses[:, 2], -1.0, 1.0))
-    if np.abs(heading).max() > _MOST_ASIDE or np.abs(pitch).max() > _MOST_ASIDE:
+    if np.abs(heading).max() > _MAX_OBLIQUITY or np.abs(pitch).max() > _MAX_OBLIQUITY:
         raise InputError(
-            f"the run's robot turns across the channel by more than {_MOST_ASIDE} rad; allowed: one that swims along"
+            f"the run's robot turns across the channel by more than {_MAX_OBLIQUITY} rad; allowed: one that swims along"
         )
     upright = np.array([_attitude(*angles) for angles in zip(heading.tolist(), pitch.tolist(), strict=True)])
     rolled = np.swapaxes(upright, 1, 2) @ turns
     angle = np.arctan2(rolled[:, 2, 1], rolled[:, 1, 1])
-    # The run's own count of turns says which of the angles, equal but for whole turns, it is.
+    # Unwrapped by the run's own count of turns.
     guess = angle[0] + poses.roll - poses.roll[0]
     roll = angle + 2.0 * np.pi * np.round((guess - angle) / (2.0 * np.pi))
     place = poses.position @ turn.T + np.array([0.0, 0.0, axis])
-    return Way(poses.time - poses.time[0], place, heading, pitch, roll, roll + poses.tail_phase)
+    return Trajectory(poses.time - poses.time[0], place, heading, pitch, roll, roll + poses.tail_phase)

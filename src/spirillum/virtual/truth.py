@@ -11,7 +11,9 @@ import numpy as np
 
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.virtual.trajectory import Way
+from spirillum.virtual.lens import Lens
+from spirillum.virtual.options import CameraOptions
+from spirillum.virtual.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,42 +34,29 @@ def _mm(value: float) -> str:
 
 
 def setup_text(
-    robot_file: str,
-    *,
-    view: str,
-    direction: str,
-    eye: float,
-    surface: float,
-    index: float,
-    spacing: float,
-    axis: float,
-    axis_uncertainty: float = 0.0,
-    fps: float | None = None,
+    robot_file: str, camera: CameraOptions, lens: Lens, spacing: float, axis: tuple[float, float], *, timed: bool
 ) -> str:
     """A setup file.
 
     Args:
         robot_file: preset or robot file beside it.
-        view: `top` or `side`.
-        direction: `right` or `left`.
-        eye: height of the lens, m.
-        surface: height of the oil's surface, m.
-        index: of the oil.
+        camera: view, direction and frame rate.
+        lens: heights and refractive index.
         spacing: of the ruler's lines, m.
-        axis: height of the robot's axis, m.
-        axis_uncertainty: its standard uncertainty, m.
-        fps: frames a second of a folder of pictures; None: a video has its own times.
+        axis: stated height of the robot's axis and its standard uncertainty, m.
+        timed: whether the video has times of its own; the pictures of a folder have none.
     """
+    height, uncertainty = axis
     lines = [
         f"# {SYNTHETIC}",
         "[camera]",
-        f'view = "{view}"',
-        f"height = {_mm(eye)}",
-        *([] if fps is None else [f"frames_per_second = {fps!r}"]),
+        f'view = "{camera.view}"',
+        f"height = {_mm(lens.eye)}",
+        *([] if timed else [f"frames_per_second = {camera.fps!r}"]),
         "",
         "[tank]",
-        f"surface = {_mm(surface)}",
-        f"index = {index!r}",
+        f"surface = {_mm(lens.surface)}",
+        f"index = {lens.index!r}",
         "",
         "[markers]",
         f"spacing = {_mm(spacing)}",
@@ -75,9 +64,9 @@ def setup_text(
         "",
         "[robot]",
         f'file = "{robot_file}"',
-        f"axis_height = {_mm(axis)}",
-        *([f"axis_height_uncertainty = {_mm(axis_uncertainty)}"] if axis_uncertainty > 0 else []),
-        f'direction = "{direction}"',
+        f"axis_height = {_mm(height)}",
+        *([f"axis_height_uncertainty = {_mm(uncertainty)}"] if uncertainty > 0 else []),
+        f'direction = "{camera.direction}"',
     ]
     return "\n".join(lines) + "\n"
 
@@ -101,18 +90,20 @@ def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
     return as_json(envelope("truth", {"synthetic": True, **rate_quantities(rates), **content}, (SYNTHETIC,))) + "\n"
 
 
-def truth_dataset(way: Way, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]) -> xr.Dataset:
+def truth_dataset(
+    trajectory: Trajectory, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]
+) -> xr.Dataset:
     """The truth on every frame of the video.
 
     Args:
-        way: where the robot is.
+        trajectory: of the robot.
         times: of the frames that are in the video, s, (n,).
         numbers: of those frames, counted as recorded, (n,).
         attributes: of the dataset.
     """
     import xarray as xr
 
-    series = way.series(times)
+    series = trajectory.series(times)
     about = {
         "x": ("m", "the body's mid-length along the channel, from below the lens"),
         "y": ("m", "the body's mid-length across, y = z x x with z towards the camera"),

@@ -1,0 +1,109 @@
+"""What of the channel is in the picture: the camera's optics, and whether and where the robot is seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.robot.robot import Robot
+from spirillum.virtual.lens import Lens
+from spirillum.virtual.options import CameraOptions
+from spirillum.virtual.tank import Tank, tank_of
+from spirillum.virtual.trajectory import Trajectory
+
+__all__ = ["check_size", "framed", "lens_of", "swimming_range"]
+
+_SURFACE = 60e-3
+"""Height of the oil's surface above the reference plane, m; assumed."""
+_EYE = _SURFACE + 150e-3
+"""Height of the lens: 150 mm above the oil, as the paper has its camera above the tank."""
+_INDEX = 1.40
+"""Refractive index of silicone oil."""
+_FOCAL = 740.0 / 640.0
+"""Focal length over the picture's width; assumed."""
+_SHORTEST, _LONGEST = 24, 2.0
+"""Shortest robot in pixels, longest in widths of the picture."""
+
+
+def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> Lens:
+    """The lens of a camera.
+
+    Args:
+        camera: its options.
+        tilt: angles of the optical axis to the vertical about x, then about y, rad.
+    """
+    return replace(_ideal_lens(camera), tilt=tilt, distortion=(camera.distortion, 0.0))
+
+
+def _ideal_lens(camera: CameraOptions) -> Lens:
+    """The lens without tilt and distortion."""
+    return Lens(_EYE, _SURFACE, _INDEX, _FOCAL * camera.size[0], camera.size, leftwards=camera.leftwards)
+
+
+def check_size(robot: Robot, tank: Tank, lens: Lens) -> None:
+    """The robot is large enough for this camera, and its tube small enough for the tank.
+
+    Raises:
+        InputError: if not.
+    """
+    if tank.tube is not None and tank.tube_height + tank.outside >= lens.surface:
+        most = 1e3 * (lens.surface - 2.0 * (tank.outside - tank.tube))
+        raise InputError(
+            f"channel.diameter = {2e3 * tank.tube:.4g} mm; allowed: less than {most:.4g} mm, a tube under the oil"
+        )
+    ends, (rear, nose) = _visible(lens, tank.tube_height), _extent(robot)
+    width, length = ends[1] - ends[0], nose - rear
+    low, high = _SHORTEST / lens.size[0] * width, _LONGEST * width
+    if not low <= length <= high:
+        allowed = f"{1e3 * low:.3g} to {1e3 * high:.4g} mm, which this camera can show"
+        raise InputError(f"{robot.name} is {1e3 * length:.4g} mm long; allowed: {allowed}")
+
+
+def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
+    """Smallest and largest x of the body's mid-length at which the whole robot is in the picture, m.
+
+    Args:
+        robot: a checked robot.
+        camera: view, direction and size of the picture; distortion is left out.
+    """
+    low, high = _visible(_ideal_lens(camera), tank_of(robot, camera.view).tube_height)
+    rear, nose = _extent(robot)
+    return low - rear, high - nose
+
+
+def framed(trajectory: Trajectory, robot: Robot, lens: Lens, start: float | None) -> Trajectory:
+    """The trajectory from a first x, or centred in the picture.
+
+    Args:
+        trajectory: of the robot.
+        robot: a checked robot.
+        lens: the camera.
+        start: x of the body's mid-length at the first frame, m; None: centred.
+
+    Raises:
+        InputError: if the robot is never in the picture.
+    """
+    x = trajectory.position[:, 0]
+    low, high = _visible(lens, float(trajectory.position[:, 2].mean()))
+    rear, nose = _extent(robot)
+    centred = 0.5 * (low - rear - float(x.min()) + high - nose - float(x.max()))
+    shift = centred if start is None else start - float(x[0])
+    if x.max() + shift + nose < low or x.min() + shift + rear > high:
+        first = 1e3 * (float(x[0]) + shift)
+        raise InputError(f"start = {first:.4g} mm: the robot is never in the picture; allowed: nearer to 0")
+    return trajectory.shifted(shift)
+
+
+def _visible(lens: Lens, height: float) -> tuple[float, float]:
+    """Smallest and largest x in the picture's middle row at a height, m."""
+    middle = 0.5 * (lens.size[1] - 1)
+    ends = lens.points(np.array([[0.0, middle], [lens.size[0] - 1.0, middle]]), height)[:, 0]
+    return float(ends.min()), float(ends.max())
+
+
+def _extent(robot: Robot) -> tuple[float, float]:
+    """Smallest and largest x of a robot from its body's mid-length, m."""
+    half = 0.5 * robot.body.length
+    return -half - robot.coupling.length - robot.tail.length, half
