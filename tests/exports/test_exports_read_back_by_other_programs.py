@@ -124,13 +124,13 @@ def test_glb_is_a_coloured_scene_with_two_links_and_y_up(tmp_path: Path) -> None
 
 def test_normals_of_the_scene_are_those_of_the_smooth_surface() -> None:
     """Radial on the wire and on the nose; along the axis on flat faces, whose edges stay sharp."""
-    from spirillum.exports.shading import corner_normals
     from spirillum.robot.mesh import tail_line
+    from spirillum.robot.surface import corner_normals
 
     robot = sp.load(WIDE)
     pieces = {piece.name: piece for piece in robot_mesh(robot)}
     body = pieces["body"]
-    normals, corners = corner_normals(body.vertices, body.faces), body.vertices[body.faces]
+    normals, corners = corner_normals(body.vertices, body.faces, np.deg2rad(40)), body.vertices[body.faces]
     nose = (corners[..., 0] > 8.5e-3 + 1e-6).all(axis=1)
     radial = corners[nose] - [8.5e-3, 0, 0]
     radial /= np.linalg.norm(radial, axis=-1, keepdims=True)
@@ -138,7 +138,7 @@ def test_normals_of_the_scene_are_those_of_the_smooth_surface() -> None:
     rear = (corners[..., 0] < -17.5e-3 + 1e-9).all(axis=1)
     np.testing.assert_allclose(normals[rear], np.broadcast_to([-1.0, 0, 0], (rear.sum(), 3, 3)), atol=1e-12)
     tail, line = pieces["tail"], tail_line(robot)
-    normals = corner_normals(tail.vertices, tail.faces)
+    normals = corner_normals(tail.vertices, tail.faces, np.deg2rad(40))
     ring = (tail.faces - 1) // 24
     inner = ((tail.faces > 24) & (tail.faces < len(tail.vertices) - 25)).all(axis=1)
     radial = (tail.vertices[tail.faces] - line.points[np.clip(ring, 0, len(line.points) - 1)])[inner]

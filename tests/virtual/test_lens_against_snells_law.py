@@ -37,11 +37,10 @@ def test_a_pixel_and_its_point_agree(case: Lens, points: np.ndarray) -> None:
 
 @pytest.mark.parametrize("case", CASES)
 def test_rays_bend_at_the_surface_by_snells_law(case: Lens, points: np.ndarray) -> None:
-    ray = np.empty(5)
     for point in points:
         u, v, _ = case.seen(point[None])[0]
-        sightline(u, v, case.numbers, case.turn, ray)
-        crossing = np.array([ray[0], ray[1], case.surface])
+        ray = sightline(u, v, case.camera, case.turn)
+        crossing = np.array([ray.x, ray.y, case.surface])
         above, below = np.array([0.0, 0.0, case.eye]) - crossing, point - crossing
         sin_air = np.hypot(*above[:2]) / np.linalg.norm(above)
         sin_oil = np.hypot(*below[:2]) / np.linalg.norm(below)
@@ -50,17 +49,17 @@ def test_rays_bend_at_the_surface_by_snells_law(case: Lens, points: np.ndarray) 
 
 
 def test_light_takes_the_shortest_optical_path(points: np.ndarray) -> None:
-    case, ray = lens(), np.empty(5)
+    case = lens()
     for point in points[:8]:
         u, v, _ = case.seen(point[None])[0]
-        sightline(u, v, case.numbers, case.turn, ray)
+        ray = sightline(u, v, case.camera, case.turn)
 
         def path(x: float, y: float, point: np.ndarray = point) -> float:
             at = np.array([x, y, case.surface])
             return float(np.linalg.norm([x, y, case.surface - case.eye]) + case.index * np.linalg.norm(point - at))
 
-        least = path(ray[0], ray[1])
-        assert all(path(ray[0] + a, ray[1] + b) > least for a, b in ((1e-4, 0), (-1e-4, 0), (0, 1e-4), (0, -1e-4)))
+        least = path(ray.x, ray.y)
+        assert all(path(ray.x + a, ray.y + b) > least for a, b in ((1e-4, 0), (-1e-4, 0), (0, 1e-4), (0, -1e-4)))
 
 
 def test_near_the_axis_oil_seems_shallower_by_its_index() -> None:

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from spirillum.exports.shading import corner_normals
 from spirillum.robot.mesh import RobotMesh
+from spirillum.robot.surface import corner_normals
 
 __all__ = ["glb_bytes"]
 
 _Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """glTF's y points up, where ours is z."""
+_CREASE = np.deg2rad(40.0)
+"""Angle between triangles above which an edge stays sharp, rad."""
 _METAL = {"shaft": 0.9, "coupling": 0.9, "stub": 0.9, "arm": 0.9, "tail": 0.9}
 
 
@@ -36,7 +38,7 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
     scene.graph.update(frame_from="robot", frame_to="body", matrix=np.eye(4))
     scene.graph.update(frame_from="robot", frame_to="rotor", matrix=turned)
     for piece in pieces:
-        normals = corner_normals(piece.vertices, piece.faces)
+        normals = corner_normals(piece.vertices, piece.faces, _CREASE)
         for index, region in enumerate(piece.regions):
             chosen = piece.region == index
             if not chosen.any():

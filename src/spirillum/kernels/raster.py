@@ -6,33 +6,89 @@ A pixel has its centre at whole numbers and reaches half a pixel to every side. 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.kernels.compiled import compiled
+from spirillum.kernels.sightlines import Backdrop, Camera
 
-__all__ = ["blend", "corner_normals", "develop", "draw", "project", "shade"]
+__all__ = ["Lamps", "Materials", "Shading", "Shadow", "blend", "develop", "draw", "project", "shade"]
+
+_EMPTY = -1e30
+"""Height of a sample that has met nothing."""
+
+
+class Lamps(NamedTuple):
+    """Lamps far away, in the camera's frame."""
+
+    towards: np.ndarray
+    """Unit vector towards each lamp, (k, 3)."""
+    strength: np.ndarray
+    """(k,)."""
+    halfway: np.ndarray
+    """Unit vector halfway between lamp and camera, (k, 3)."""
+
+
+class Materials(NamedTuple):
+    """Reflection of light by each material (Blinn-Phong), (kinds,) each."""
+
+    ambient: np.ndarray
+    diffuse: np.ndarray
+    specular: np.ndarray
+    exponent: np.ndarray
+    """Of the specular reflection."""
+
+
+class Shading(NamedTuple):
+    """Colours of triangles, and the light on their corners."""
+
+    colour: np.ndarray
+    """Linear colour of diffuse light, (m, 3)."""
+    gloss: np.ndarray
+    """Linear colour of specular light, (m, 3)."""
+    diffuse: np.ndarray
+    """Diffuse light of each corner, (m, 3)."""
+    specular: np.ndarray
+    """Specular light of each corner, (m, 3)."""
+
+
+class Shadow(NamedTuple):
+    """A soft shadow on the floor, a rounded bar; m."""
+
+    x: float
+    """Its centre."""
+    y: float
+    axis_x: float
+    """Unit vector along it."""
+    axis_y: float
+    half_length: float
+    """Without the rounded ends."""
+    radius: float
+    softness: float
+    """Width of its edge."""
+    darkness: float
+    """Relative loss of light."""
 
 
 @compiled
-def project(points: np.ndarray, camera: np.ndarray, turn: np.ndarray, seen: np.ndarray) -> None:
-    """Where a camera above a flat surface of oil sees points, by Snell's law.
+def project(points: np.ndarray, camera: Camera, turn: np.ndarray, seen: np.ndarray) -> None:
+    """Pixels at which a camera above a flat surface of oil sees points, by Snell's law.
 
     Args:
         points: x, y, z with z towards the camera, which stands at x = y = 0; those above the surface are seen
             straight, (n, 3).
-        camera: height of the lens, of the surface, refractive index below it, focal length with its sign, centre u
-            and v, coefficients k1 and k2 of radial distortion, (8,).
+        camera: above the surface.
         turn: rotation from the frame of the points to that of the tilted camera, (3, 3).
         seen: filled with pixel u, v and the height z, (n, 3).
     """
-    eye, surface, index = camera[0], camera[1], camera[2]
-    above = eye - surface
+    surface, index = camera.surface, camera.index
+    above = camera.eye - surface
     n2 = index * index
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         across = math.hypot(x, y)
-        down = eye - z
+        down = camera.eye - z
         if z < surface:
             deep = surface - z
             # r: where the ray crosses the surface; r + deep tan(angle in the oil) = across, a concave rising function.
@@ -51,79 +107,49 @@ def project(points: np.ndarray, camera: np.ndarray, turn: np.ndarray, seen: np.n
         away = -(turn[2, 0] * x + turn[2, 1] * y - turn[2, 2] * down)
         a, b = a / away, b / away
         r2 = a * a + b * b
-        stretch = camera[3] * (1.0 + r2 * (camera[6] + r2 * camera[7]))
-        seen[i, 0] = camera[4] + stretch * a
-        seen[i, 1] = camera[5] - stretch * b
+        stretch = camera.focal * (1.0 + r2 * (camera.k1 + r2 * camera.k2))
+        seen[i, 0] = camera.centre_u + stretch * a
+        seen[i, 1] = camera.centre_v - stretch * b
         seen[i, 2] = z
 
 
 @compiled
 def shade(
-    normals: np.ndarray, turn: np.ndarray, lamps: np.ndarray, matter: np.ndarray, kind: np.ndarray, light: np.ndarray
+    normals: np.ndarray, turn: np.ndarray, lamps: Lamps, materials: Materials, kind: np.ndarray, shading: Shading
 ) -> None:
     """Light that corners of triangles send to a camera far above them.
 
     Args:
         normals: unit normals in the frame of their solid, (m, 3, 3).
         turn: rotation of the solid, (3, 3).
-        lamps: unit vector towards each lamp, its strength, and the unit vector halfway to the camera, (k, 7).
-        matter: ambient, diffuse and mirrored share and its exponent, (kinds, 4).
-        kind: row of `matter` of each triangle, (m,).
-        light: filled with the diffuse and the mirrored light of each corner, (m, 3, 2).
+        lamps: that light it.
+        materials: of the robot.
+        kind: index of each triangle's material, (m,).
+        shading: its diffuse and specular light are filled.
     """
     for i in range(normals.shape[0]):
+        exponent = materials.exponent[kind[i]]
         for j in range(3):
             nx, ny, nz = normals[i, j, 0], normals[i, j, 1], normals[i, j, 2]
             x = turn[0, 0] * nx + turn[0, 1] * ny + turn[0, 2] * nz
             y = turn[1, 0] * nx + turn[1, 1] * ny + turn[1, 2] * nz
             z = turn[2, 0] * nx + turn[2, 1] * ny + turn[2, 2] * nz
-            diffuse, mirrored = matter[kind[i], 0], 0.0
-            for k in range(lamps.shape[0]):
-                facing = x * lamps[k, 0] + y * lamps[k, 1] + z * lamps[k, 2]
+            diffuse, specular = materials.ambient[kind[i]], 0.0
+            for k in range(lamps.strength.size):
+                facing = x * lamps.towards[k, 0] + y * lamps.towards[k, 1] + z * lamps.towards[k, 2]
                 if facing > 0.0:
-                    diffuse += matter[kind[i], 1] * lamps[k, 3] * facing
-                half = x * lamps[k, 4] + y * lamps[k, 5] + z * lamps[k, 6]
+                    diffuse += materials.diffuse[kind[i]] * lamps.strength[k] * facing
+                half = x * lamps.halfway[k, 0] + y * lamps.halfway[k, 1] + z * lamps.halfway[k, 2]
                 if half > 0.6:
-                    mirrored += matter[kind[i], 2] * lamps[k, 3] * half ** matter[kind[i], 3]
-            light[i, j, 0], light[i, j, 1] = diffuse, mirrored
-
-
-@compiled
-def corner_normals(
-    area: np.ndarray, faces: np.ndarray, owner: np.ndarray, start: np.ndarray, sharp: float
-) -> np.ndarray:
-    """Unit normals at the corners of triangles: the mean over those around a vertex that meet smoothly, (m, 3, 3).
-
-    Args:
-        area: normal of each triangle with twice its area as length, (m, 3).
-        faces: vertices of each triangle, (m, 3).
-        owner: triangles around the vertices, one vertex after the other, (3 m,).
-        start: where those of each vertex begin, (n + 1,).
-        sharp: cosine of the angle between triangles above which an edge is sharp.
-    """
-    found = np.zeros((faces.shape[0], 3, 3))
-    for i in range(faces.shape[0]):
-        own = math.sqrt(area[i, 0] ** 2 + area[i, 1] ** 2 + area[i, 2] ** 2)
-        for j in range(3):
-            x = y = z = 0.0
-            for place in range(start[faces[i, j]], start[faces[i, j] + 1]):
-                k = owner[place]
-                size = math.sqrt(area[k, 0] ** 2 + area[k, 1] ** 2 + area[k, 2] ** 2)
-                dot = area[k, 0] * area[i, 0] + area[k, 1] * area[i, 1] + area[k, 2] * area[i, 2]
-                if k == i or dot > sharp * size * own:
-                    x, y, z = x + area[k, 0], y + area[k, 1], z + area[k, 2]
-            size = math.sqrt(x * x + y * y + z * z)
-            if size > 0.0:
-                found[i, j, 0], found[i, j, 1], found[i, j, 2] = x / size, y / size, z / size
-    return found
+                    specular += materials.specular[kind[i]] * lamps.strength[k] * half**exponent
+            shading.diffuse[i, j], shading.specular[i, j] = diffuse, specular
 
 
 @compiled
 def draw(
     seen: np.ndarray,
     faces: np.ndarray,
-    colours: np.ndarray,
-    light: np.ndarray,
+    shading: Shading,
     spots: np.ndarray,
     which: np.ndarray,
     left: int,
@@ -136,8 +162,7 @@ def draw(
     Args:
         seen: pixel u, v and height z of each vertex, (n, 3).
         faces: vertices of each triangle, outward oriented, (m, 3).
-        colours: of each triangle and of its mirrored light, (m, 6).
-        light: of each corner, as `shade` fills it, (m, 3, 2).
+        shading: colours and light.
         spots: u and v of the drawn samples in a pixel, -0.5 to 0.5, for 4 x 4 neighbouring pixels, (16, 2, s).
         which: the numbers of the samples that are drawn, those of one moment, (s,).
         left: column of the picture's first pixel.
@@ -180,7 +205,7 @@ def draw(
                     sb = share_b + du * bu + dv * bv
                     sc = share_c + du * cu + dv * cv
                     inside = min(sb, sc, 1.0 - sb - sc)
-                    heights[k] = base + du * zu + dv * zv if inside >= 0.0 else -1e30
+                    heights[k] = base + du * zu + dv * zv if inside >= 0.0 else _EMPTY
                 red = green = blue = -1.0
                 for k in range(count):
                     at = which[k]
@@ -191,11 +216,11 @@ def draw(
                         du, dv = spots[variant, 0, k], spots[variant, 1, k]
                         sb, sc = share_b + du * bu + dv * bv, share_c + du * cu + dv * cv
                         sa = 1.0 - sb - sc
-                        diffuse = sa * light[i, 0, 0] + sb * light[i, 1, 0] + sc * light[i, 2, 0]
-                        shine = sa * light[i, 0, 1] + sb * light[i, 1, 1] + sc * light[i, 2, 1]
-                        red = colours[i, 0] * diffuse + colours[i, 3] * shine
-                        green = colours[i, 1] * diffuse + colours[i, 4] * shine
-                        blue = colours[i, 2] * diffuse + colours[i, 5] * shine
+                        diffuse = sa * shading.diffuse[i, 0] + sb * shading.diffuse[i, 1] + sc * shading.diffuse[i, 2]
+                        shine = sa * shading.specular[i, 0] + sb * shading.specular[i, 1] + sc * shading.specular[i, 2]
+                        red = shading.colour[i, 0] * diffuse + shading.gloss[i, 0] * shine
+                        green = shading.colour[i, 1] * diffuse + shading.gloss[i, 1] * shine
+                        blue = shading.colour[i, 2] * diffuse + shading.gloss[i, 2] * shine
                     picture[v - top, u - left, at, 0] = red
                     picture[v - top, u - left, at, 1] = green
                     picture[v - top, u - left, at, 2] = blue
@@ -207,48 +232,44 @@ def blend(
     samples: np.ndarray,
     left: int,
     top: int,
-    over: np.ndarray,
-    shine: np.ndarray,
-    floor: np.ndarray,
-    shadow: np.ndarray,
+    still: Backdrop,
+    shadow: Shadow,
     tint: np.ndarray,
     picture: np.ndarray,
 ) -> None:
-    """Put the samples of an exposure, and the shadow of the robot, before what stands still; clear the samples.
+    """Composite the samples of an exposure and the robot's shadow with the still parts, and clear the samples.
 
     Args:
-        depth: height of what each sample has met; below -1e29 where nothing, (rows, columns, k); cleared.
+        depth: height of what each sample has met, (rows, columns, k); cleared.
         samples: colours of the samples, (rows, columns, k, 3).
         left: column of the whole picture at which the samples begin.
         top: row at which they begin.
-        over: share of the robot's light that passes the glass above it, (whole rows, whole columns).
-        shine: light mirrored by that glass, (whole rows, whole columns).
-        floor: x, y of the floor behind each pixel, (whole rows, whole columns, 2).
-        shadow: its middle x, y, the axis's direction x, y, half its length without the rounding, its radius, how soft
-            and how dark it is, (8,).
-        tint: share of red, green and blue that the oil lets pass, (3,).
-        picture: what stands still; changed, (whole rows, whole columns, 3).
+        still: what stands still.
+        shadow: of the robot on the floor.
+        tint: transmission of red, green and blue by the oil, (3,).
+        picture: light of the still parts; changed, (whole rows, whole columns, 3).
     """
+    _, over, shine, floor = still
     rows, columns, count = depth.shape
     for v in range(rows):
         for u in range(columns):
             red = green = blue = 0.0
             hits = 0
             for k in range(count):
-                if depth[v, u, k] > -1e29:
+                if depth[v, u, k] > _EMPTY:
                     hits += 1
                     red += samples[v, u, k, 0]
                     green += samples[v, u, k, 1]
                     blue += samples[v, u, k, 2]
-                    depth[v, u, k] = -1e30
+                    depth[v, u, k] = _EMPTY
             i, j = top + v, left + u
             bare = 1.0 - hits / count
             if bare > 0.0:
-                x, y = floor[i, j, 0] - shadow[0], floor[i, j, 1] - shadow[1]
-                along = abs(x * shadow[2] + y * shadow[3])
-                across = y * shadow[2] - x * shadow[3]
-                far = math.hypot(max(along - shadow[4], 0.0), across) - shadow[5]
-                bare *= 1.0 - shadow[7] / (1.0 + math.exp(min(far / shadow[6], 50.0)))
+                x, y = floor[i, j, 0] - shadow.x, floor[i, j, 1] - shadow.y
+                along = abs(x * shadow.axis_x + y * shadow.axis_y)
+                across = y * shadow.axis_x - x * shadow.axis_y
+                far = math.hypot(max(along - shadow.half_length, 0.0), across) - shadow.radius
+                bare *= 1.0 - shadow.darkness / (1.0 + math.exp(min(far / shadow.softness, 50.0)))
             through, mirrored = over[i, j] / count, shine[i, j] * hits / count
             picture[i, j, 0] = bare * picture[i, j, 0] + through * tint[0] * red + mirrored
             picture[i, j, 1] = bare * picture[i, j, 1] + through * tint[1] * green + mirrored
@@ -266,16 +287,16 @@ def develop(
     sigma: float,
     image: np.ndarray,
 ) -> None:
-    """Bytes of a picture from its light: vignetting, lamp, the eye's scale of brightness, noise.
+    """Bytes of a picture from its light: vignetting, lamp, gamma curve, noise.
 
     Args:
         light: linear light, (rows, columns, 3).
-        lens: share of light that the lens lets pass, (rows, columns).
+        lens: transmission of the lens, (rows, columns).
         gain: brightness of the lamp, (3,).
         curve: bytes over linear light from 0 to 1 in equal steps, (n,).
-        grain: normal noise of unit size, (g,).
-        starts: where in it each row begins, (rows,).
-        sigma: size of the noise, bytes.
+        grain: a pool of standard normal noise, (g,).
+        starts: start of each row in it, (rows,).
+        sigma: standard deviation of the noise, bytes.
         image: filled, (rows, columns, 3).
     """
     last = curve.size - 1

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 else:
     _Integers = np.ndarray
 
-__all__ = ["Faces", "Profile", "Surface", "mass_properties", "profile_of", "revolved", "rod", "swept"]
+__all__ = ["Faces", "Profile", "Surface", "corner_normals", "mass_properties", "profile_of", "revolved", "rod", "swept"]
 
 Faces: TypeAlias = Int[_Integers, "..."]
 """Whole numbers, such as the three vertices of each triangle, counter-clockwise as seen from outside."""
@@ -226,3 +226,42 @@ def mass_properties(vertices: Samples, faces: Faces) -> tuple[float, Samples, fl
     volume = float(np.sum(six)) / 6.0
     centroid = np.sum(six[:, None] * (a + b + c), axis=0) / (24.0 * volume)
     return volume, centroid + middle, 0.5 * float(np.sum(np.linalg.norm(normal, axis=1)))
+
+
+def corner_normals(vertices: Samples, faces: Faces, crease: float) -> Samples:
+    """Unit normals for smooth shading at the corners of each triangle, (m, 3, 3); sharp edges stay sharp.
+
+    The mean over the triangles around a vertex, weighted by area, whose normals deviate from the corner's own by no
+    more than the crease angle.
+
+    Args:
+        vertices: (n, 3).
+        faces: outward oriented, (m, 3).
+        crease: the angle, rad.
+    """
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    area: Samples = np.cross(b - a, c - a)
+    unit = _unit_or_zero(area)
+    vertex = faces.ravel()
+    order = np.argsort(vertex, kind="stable")
+    owner = order // 3  # the triangles around each vertex, one vertex after the other
+    count = np.bincount(vertex, minlength=len(vertices))
+    first = np.concatenate([np.zeros(1, dtype=np.int64), np.cumsum(count)[:-1]])
+    around = count[vertex[order]]
+    corner = np.repeat(np.arange(order.size), around)
+    start = np.repeat(first[vertex[order]], around)
+    step = np.arange(corner.size) - np.repeat(np.cumsum(around) - around, around)
+    other = owner[start + step]
+    near = np.sum(unit[owner[corner]] * unit[other], axis=1) >= np.cos(crease)
+    total: Samples = np.stack(
+        [np.bincount(corner, np.where(near, area[other, axis], 0.0), order.size) for axis in range(3)], axis=-1
+    )
+    found: Samples = np.empty_like(total)
+    found[order] = _unit_or_zero(total)
+    return found.reshape(-1, 3, 3)
+
+
+def _unit_or_zero(vectors: Samples) -> Samples:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    unit: Samples = vectors / np.where(length > 0, length, 1.0)
+    return unit

@@ -1,4 +1,4 @@
-"""How the virtual camera sees: a lens above a flat surface of oil, exact refraction, tilt and radial distortion."""
+"""The optics of the virtual camera: a lens above a flat surface of oil, exact refraction, tilt, radial distortion."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.raster import project
-from spirillum.kernels.sightlines import sightline
+from spirillum.kernels.sightlines import Camera, sightline
 
 __all__ = ["Lens"]
 
 
 @dataclass(frozen=True)
 class Lens:
-    """The camera in its own frame: x along the channel towards the nose, z towards the camera, y = z x x; m and pixels.
+    """The lens of the camera, in its frame: x along the channel towards the nose, z towards the camera, y = z x x.
 
+    Lengths are in m, places in the picture in pixels.
     Heights z count from the reference plane (the tank's floor; for a view from the side its far wall). The lens stands
     at x = y = 0. Pixel centres are at whole numbers, u to the right, v downwards.
     """
@@ -32,7 +33,7 @@ class Lens:
     size: tuple[int, int]
     """Width and height of the picture, pixels."""
     leftwards: bool = False
-    """Whether the nose points to the left in the picture: the camera is turned by half a turn."""
+    """Whether the nose points to the left in the picture: the camera is rotated by half a turn about its axis."""
     tilt: tuple[float, float] = (0.0, 0.0)
     """Angle of the optical axis to the vertical about x, then about y, rad."""
     distortion: tuple[float, float] = (0.0, 0.0)
@@ -52,10 +53,10 @@ class Lens:
         return 0.5 * (self.size[0] - 1), 0.5 * (self.size[1] - 1)
 
     @property
-    def numbers(self) -> Samples:
-        """Heights of lens and surface, index, focal length with the sign of the view, centre, distortion: (8,)."""
+    def camera(self) -> Camera:
+        """Its numbers, as the kernels take them."""
         focal = -self.focal if self.leftwards else self.focal
-        return np.array([self.eye, self.surface, self.index, focal, *self.centre, *self.distortion])
+        return Camera(self.eye, self.surface, self.index, focal, *self.centre, *self.distortion)
 
     def seen(self, points: Samples) -> Samples:
         """Pixel u, v and height z of points.
@@ -68,11 +69,11 @@ class Lens:
         """
         points = np.ascontiguousarray(points, dtype=float)
         found = np.empty_like(points)
-        project(points, self.numbers, self.turn, found)
+        project(points, self.camera, self.turn, found)
         return found
 
     def points(self, pixels: Samples, height: float) -> Samples:
-        """What is seen at pixels, at a height below the surface.
+        """Points that are seen at pixels, at a height below the surface.
 
         Args:
             pixels: (n, 2).
@@ -81,9 +82,9 @@ class Lens:
         Returns:
             (n, 3), m.
         """
-        numbers, ray = self.numbers, np.empty(5)
         found = np.empty((len(pixels), 3))
         for place, (u, v) in enumerate(np.asarray(pixels, dtype=float)):
-            sightline(float(u), float(v), numbers, self.turn, ray)
-            found[place] = *(ray[:2] + ray[2:4] * (self.surface - height) / -ray[4]), height
+            ray = sightline(float(u), float(v), self.camera, self.turn)
+            depth = (self.surface - height) / -ray.dz
+            found[place] = ray.x + ray.dx * depth, ray.y + ray.dy * depth, height
         return found

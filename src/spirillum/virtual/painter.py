@@ -1,11 +1,11 @@
-"""Linear light of the whole picture: the robot at the moments of an exposure, before what stands still."""
+"""Linear light of a picture: the robot, sampled over the exposure, before the still scene."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.raster import blend, draw
+from spirillum.kernels.raster import Lamps, Shadow, blend, draw
 from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import Solid, solids_of
@@ -15,34 +15,34 @@ from spirillum.virtual.trajectory import Pose, Trajectory
 __all__ = ["Painter"]
 
 _STILL = 0.1
-"""Blur below which an exposure is drawn as one moment, pixels."""
+"""Motion blur below which an exposure is drawn at one time, pixels."""
 _STEP = 0.8
-"""Blur between two moments of an exposure, pixels."""
-_MOST_MOMENTS = 8
+"""Motion blur between two times of an exposure, pixels."""
+_MAX_TIMES = 8
 _LAMPS = {
     "top": ((0.25, 0.55, 0.85, 0.62), (-0.5, -0.45, 0.75, 0.38)),
     "side": ((0.2, 0.9, 0.5, 0.68), (0.0, 0.1, 1.0, 0.34)),
 }
 """Direction towards each lamp (right, up, towards the camera) in the picture, and its strength; assumed."""
 _SHADOW = 0.26
-"""Share of light that the robot's soft shadow takes from the floor; assumed."""
+"""Relative loss of light in the robot's shadow on the floor; assumed."""
 _MARGIN = 3
 _SIDE = 4
 """Samples of a pixel along u and along v."""
 _SAMPLES = _SIDE**2
 _FEW = 13
-"""One in so many vertices tells how far the picture blurs."""
+"""One in so many vertices serves to estimate the motion blur."""
 
 
 class Painter:
-    """Draws the robot before its tank. One painter serves one video: it keeps its samples between frames."""
+    """Draws the robot before its tank. One painter serves one video: it keeps its buffers between frames."""
 
     def __init__(self, robot: Robot, tank: Tank, lens: Lens) -> None:
         """Prepare.
 
         Args:
             robot: a checked robot.
-            tank: what stands still.
+            tank: the still parts.
             lens: the camera.
         """
         self.robot, self.tank, self.lens = robot, tank, lens
@@ -58,7 +58,7 @@ class Painter:
         """(rows, columns, 3) linear light of an exposure about a time.
 
         Args:
-            trajectory: where the robot is.
+            trajectory: of the robot.
             time: the middle of the exposure, s.
             exposure: its length, s.
         """
@@ -70,28 +70,27 @@ class Painter:
             return picture
         depth, samples = self._buffers(bottom - top, right - left)
         for solid, turn, moments in parts:
-            light = solid.light(turn, self._lamps)
+            shading = solid.shading(turn, self._lamps)
             for number, pixels in enumerate(moments):
-                which = np.arange(number, _SAMPLES, len(moments))  # each moment has a share of every pixel's samples
+                which = np.arange(number, _SAMPLES, len(moments))  # each time has a share of every pixel's samples
                 places = np.ascontiguousarray(self._spots[:, :, which])
-                draw(pixels, solid.faces, solid.colours, light, places, which, left, top, depth, samples)
-        still, shadow = self.still, self._shadow(middle)
-        blend(depth, samples, left, top, still.over, still.shine, still.floor, shadow, self._tint, picture)
+                draw(pixels, solid.faces, shading, places, which, left, top, depth, samples)
+        blend(depth, samples, left, top, self.still, self._shadow(middle), self._tint, picture)
         return picture
 
     def _parts(
         self, trajectory: Trajectory, middle: Pose, time: float, exposure: float
     ) -> list[tuple[Solid, Samples, list[Samples]]]:
-        """Body and rotor, how each is turned, and where its vertices are seen at the moments of an exposure."""
+        """Body and rotor, each with its rotation and the pixels of its vertices at times over the exposure."""
         found = []
         for solid, name in ((self.body, "body"), (self.rotor, "rotor")):
 
             def seen(share: float, every: int = 1, solid: Solid = solid, name: str = name) -> Samples:
-                moment = trajectory.at(time + share * exposure) if share else middle
-                return self.lens.seen(solid.vertices[::every] @ getattr(moment, name).T + moment.position)
+                pose = trajectory.at(time + share * exposure) if share else middle
+                return self.lens.seen(solid.vertices[::every] @ getattr(pose, name).T + pose.position)
 
             blur = float(np.abs(seen(0.5, _FEW) - seen(-0.5, _FEW))[:, :2].max()) if exposure > 0 else 0.0
-            count = 1 if blur < _STILL else int(np.clip(np.ceil(blur / _STEP), 2, _MOST_MOMENTS))
+            count = 1 if blur < _STILL else int(np.clip(np.ceil(blur / _STEP), 2, _MAX_TIMES))
             shares = (np.arange(count) + 0.5) / count - 0.5
             found.append((solid, getattr(middle, name), [seen(float(share)) for share in shares]))
         return found
@@ -114,20 +113,19 @@ class Painter:
         shape = (rows, columns, _SAMPLES)
         return self._depth[:need].reshape(shape), self._samples[: 3 * need].reshape(*shape, 3)
 
-    def _shadow(self, moment: Pose) -> Samples:
-        """The soft shadow, as `blend` takes it; the lamp stands a little to one side."""
+    def _shadow(self, pose: Pose) -> Shadow:
+        """The soft shadow; the lamp stands a little to one side."""
         half, radius = 0.5 * self.robot.body.length, 0.5 * self.robot.body.diameter
-        drop = (-0.1 if self.lens.leftwards else 0.1) * moment.position[2]
-        x, y = moment.position[0], moment.position[1] - drop
-        return np.array([x, y, *moment.body[:2, 0], half - 0.6 * radius, 0.95 * radius, 0.22 * radius, _SHADOW])
+        x, y, z = (float(value) for value in pose.position)
+        drop = (-0.1 if self.lens.leftwards else 0.1) * z
+        axis_x, axis_y = (float(value) for value in pose.body[:2, 0])
+        return Shadow(x, y - drop, axis_x, axis_y, half - 0.6 * radius, 0.95 * radius, 0.22 * radius, _SHADOW)
 
 
-def _lamps(view: str, side: float) -> Samples:
-    """Lamps as `shade` takes them: direction, strength, and the direction halfway to a camera far above."""
-    rows = []
-    for *trajectory, strength in _LAMPS[view]:
-        towards = np.array(trajectory) * np.array([side, side, 1.0])
-        towards /= np.linalg.norm(towards)
-        half = towards + np.array([0.0, 0.0, 1.0])
-        rows.append(np.concatenate([towards, [strength], half / np.linalg.norm(half)]))
-    return np.array(rows)
+def _lamps(view: str, side: float) -> Lamps:
+    """The lamps of a view; `side` is -1 where the camera is rotated by half a turn."""
+    towards = np.array([direction for *direction, _ in _LAMPS[view]]) * np.array([side, side, 1.0])
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    halfway = towards + np.array([0.0, 0.0, 1.0])
+    halfway /= np.linalg.norm(halfway, axis=1, keepdims=True)
+    return Lamps(towards, np.array([strength for *_, strength in _LAMPS[view]]), halfway)

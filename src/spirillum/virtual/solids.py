@@ -1,4 +1,4 @@
-"""The robot as triangles with colours and shading, short enough that refraction bends none of their edges visibly."""
+"""The robot as triangles with colours and normals, short enough that refraction bends no edge visibly."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.raster import corner_normals, shade
+from spirillum.kernels.raster import Lamps, Materials, Shading, shade
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
-from spirillum.robot.surface import Faces
+from spirillum.robot.surface import Faces, corner_normals
 
-__all__ = ["MATTER", "Solid", "linear", "solids_of"]
+__all__ = ["MATERIALS", "Solid", "linear", "solids_of"]
 
 _LONGEST = 5e-3
 """Longest edge of a triangle, m."""
-_SHARP = float(np.cos(np.radians(35.0)))
-"""Cosine of the angle between triangles above which an edge is drawn sharp."""
-MATTER: dict[str, tuple[float, float, float, float]] = {
+_CREASE = float(np.radians(35.0))
+"""Angle between triangles above which an edge is drawn sharp, rad."""
+MATERIALS: dict[str, tuple[float, float, float, float]] = {
     "body": (0.34, 0.70, 0.45, 60.0),
     "shaft": (0.25, 0.55, 0.70, 25.0),
     "coupling": (0.25, 0.55, 0.70, 25.0),
@@ -26,8 +26,8 @@ MATTER: dict[str, tuple[float, float, float, float]] = {
     "arm": (0.28, 0.60, 0.65, 18.0),
     "tail": (0.28, 0.60, 0.65, 18.0),
 }
-"""Ambient, diffuse and mirrored share of the light and the exponent of the mirrored one, by piece; assumed."""
-_KINDS = tuple(MATTER)
+"""Ambient, diffuse and specular reflectance, and exponent of the specular one, by piece; assumed."""
+_KINDS = tuple(MATERIALS)
 _METALS = frozenset(_KINDS) - {"body"}
 
 
@@ -46,22 +46,25 @@ class Solid:
     faces: Faces = field(repr=False)
     """Triangles, outward oriented, (m, 3)."""
     colours: Samples = field(repr=False)
-    """Linear colour of each triangle and of what it mirrors, (m, 6)."""
+    """Linear colour of each triangle, (m, 3)."""
+    gloss: Samples = field(repr=False)
+    """Linear colour of its specular light, (m, 3)."""
     normals: Samples = field(repr=False)
     """Unit normals at the corners of each triangle, (m, 3, 3)."""
     kind: Faces = field(repr=False)
-    """Row of `MATTER` of each triangle, (m,)."""
+    """Index of each triangle's material in `MATERIALS`, (m,)."""
 
-    def light(self, turn: Samples, lamps: Samples) -> Samples:
-        """Diffuse and mirrored light of each corner, (m, 3, 2).
+    def shading(self, turn: Samples, lamps: Lamps) -> Shading:
+        """Colours, and light on the corners.
 
         Args:
             turn: rotation of the solid, (3, 3).
-            lamps: as `spirillum.kernels.raster.shade` takes them, (k, 7).
+            lamps: that light it.
         """
-        found = np.empty((len(self.faces), 3, 2))
-        shade(self.normals, turn, lamps, np.array(list(MATTER.values())), self.kind, found)
-        return found
+        shading = Shading(self.colours, self.gloss, *(np.empty((len(self.faces), 3)) for _ in range(2)))
+        materials = Materials(*np.ascontiguousarray(np.transpose(list(MATERIALS.values()))))
+        shade(self.normals, turn, lamps, materials, self.kind, shading)
+        return shading
 
 
 def solids_of(robot: Robot, fineness: float = 1.0) -> tuple[Solid, Solid]:
@@ -78,21 +81,22 @@ def solids_of(robot: Robot, fineness: float = 1.0) -> tuple[Solid, Solid]:
 
 
 def _joined(pieces: list[RobotMesh]) -> Solid:
-    vertices, faces, colours, normals, kind, count = [], [], [], [], [], 0
+    vertices, faces, colours, gloss, normals, kind, count = [], [], [], [], [], [], 0
     for piece in pieces:
         points, triangles, origin = _shortened(np.asarray(piece.vertices), np.asarray(piece.faces))
         own = linear(piece.colours)[origin]
-        mirrored = own if piece.name in _METALS else np.ones_like(own)
         vertices.append(points)
         faces.append(triangles + count)
-        colours.append(np.concatenate([own, mirrored], axis=1))
-        normals.append(_normals(points, triangles))
+        colours.append(own)
+        gloss.append(own if piece.name in _METALS else np.ones_like(own))
+        normals.append(corner_normals(points, triangles, _CREASE))
         kind.append(np.full(len(triangles), _KINDS.index(piece.name)))
         count += len(points)
     return Solid(
         np.ascontiguousarray(np.concatenate(vertices)),
         np.ascontiguousarray(np.concatenate(faces), dtype=np.int64),
         np.concatenate(colours),
+        np.concatenate(gloss),
         np.concatenate(normals),
         np.concatenate(kind).astype(np.int64),
     )
@@ -122,7 +126,7 @@ def _shortened(points: Samples, faces: Faces) -> tuple[Samples, Faces, Faces]:
 
 
 def _split(faces: Faces, halves: Faces, number: int) -> list[Faces]:
-    """Triangles of which `number` edges are halved, as parts with the same sense of rotation."""
+    """Triangles of which `number` edges are halved, as parts oriented as before."""
     if number == 0:
         return [faces]
     if number == 3:
@@ -136,12 +140,3 @@ def _split(faces: Faces, halves: Faces, number: int) -> list[Faces]:
     if number == 1:
         return [np.stack([a, ab, c], axis=1), np.stack([ab, b, c], axis=1)]
     return [np.stack([ab, b, bc], axis=1), np.stack([a, ab, bc], axis=1), np.stack([a, bc, c], axis=1)]
-
-
-def _normals(points: Samples, faces: Faces) -> Samples:
-    """Unit normals at the corners, the mean over those triangles around a vertex that meet it smoothly."""
-    corners = points[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    order = np.argsort(faces.ravel(), kind="stable")
-    start = np.searchsorted(faces.ravel()[order], np.arange(len(points) + 1))
-    return np.asarray(corner_normals(area, np.ascontiguousarray(faces), order // 3, start, _SHARP))

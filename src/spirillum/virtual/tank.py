@@ -1,19 +1,19 @@
-"""What stands still before the virtual camera: floor, ruler, glass tube, oil. All of it assumed, but to scale."""
+"""The still scene before the virtual camera: floor, ruler, glass tube, oil. All of it assumed, but to scale."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.sightlines import still_picture
+from spirillum.kernels.sightlines import Backdrop, Ruler, Tube, Waves, still_picture
 from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import linear
 
-__all__ = ["Backdrop", "Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
+__all__ = ["Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
 
 _SPACING = 2e-3
 """From one line of the ruler to the next, m."""
@@ -21,11 +21,14 @@ _SIDE_AXIS = 30e-3
 """Height of the tube's axis above the far wall in the view from the side, m; assumed."""
 _GLASS = 2.0e-3
 """Thickness of the tube's wall, m; assumed."""
-_RULER_WIDTH, _RULER_LENGTH, _RULER_AWAY, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
+_LINE_WIDTH, _LINE_LENGTH, _RULER_DISTANCE, _PAPER = 0.5e-3, 8.0e-3, 5.0e-3, 1.0e-3
 _OIL = (0.72, 0.90, 1.98)
-"""Absorption of red, green and blue by the oil, 1/m: a faint tint, assumed."""
-_GLASS_DARKENS = 38.0
-"""Absorption of the glass, 1/m; assumed. Glass and oil refract nearly alike: lines of sight go straight through it."""
+"""Absorption coefficients of red, green and blue in the oil, 1/m: a faint tint, assumed."""
+_GLASS_ABSORPTION = 38.0
+"""Absorption coefficient of the glass, 1/m; assumed.
+
+Glass refracts nearly as oil does: lines of sight go straight through it.
+"""
 _MOTTLE = (9.0, 14.0, 23.0, 37.0, 61.0, 90.0)
 """Wavenumbers of the floor's fine structure, 1/m; assumed."""
 _FINE = 6
@@ -55,20 +58,6 @@ class Tank:
         return 0.0 if self.tube is None else self.tube + _GLASS
 
 
-@dataclass(frozen=True)
-class Backdrop:
-    """The still parts as the camera sees them; linear light, single precision."""
-
-    light: np.ndarray = field(repr=False)
-    """Without the robot, (rows, columns, 3)."""
-    over: np.ndarray = field(repr=False)
-    """Share of the robot's light that passes the glass over it, (rows, columns)."""
-    shine: np.ndarray = field(repr=False)
-    """Light mirrored by the glass, (rows, columns)."""
-    floor: np.ndarray = field(repr=False)
-    """x and y of the floor behind each pixel, m, (rows, columns, 2)."""
-
-
 def tank_of(robot: Robot, view: str) -> Tank:
     """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
 
@@ -79,7 +68,7 @@ def tank_of(robot: Robot, view: str) -> Tank:
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
-    return Tank(view, tube, tube_height(robot, view), length, _SPACING, _reach(robot) + _RULER_AWAY)
+    return Tank(view, tube, tube_height(robot, view), length, _SPACING, _reach(robot) + _RULER_DISTANCE)
 
 
 def tube_height(robot: Robot, view: str) -> float:
@@ -118,34 +107,31 @@ def spots(side: int) -> Samples:
 
 
 def tint(depth: float) -> Samples:
-    """(3,) share of light that passes a depth of oil."""
+    """(3,) transmission of red, green and blue by a depth of oil, m."""
     return np.asarray(np.exp(-depth * np.array(_OIL)))
 
 
 @lru_cache(maxsize=4)
 def backdrop(tank: Tank, lens: Lens) -> Backdrop:
-    """See the still parts through a lens; trials with the same tank and camera share what is seen.
+    """The still parts seen through a lens; cached, so that trials with one tank and camera share it.
 
     Args:
-        tank: what stands there.
+        tank: the still parts.
         lens: the camera.
     """
     width, height = lens.size
     light, over, shine, floor = (np.empty((height, width, *more), dtype=np.float32) for more in ((3,), (), (), (2,)))
+    still = Backdrop(light, over, shine, floor)
     ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)
-    colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))
-    end = tank.ruler + _RULER_LENGTH
-    width_of_line = min(_RULER_WIDTH, 0.25 * tank.spacing)
-    ruler = np.array([tank.ruler - _PAPER, tank.ruler, end, end + _PAPER, tank.spacing, width_of_line])
-    half = -1.0 if tank.tube is None else 0.5 * tank.tube_length
-    tube = np.array([tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half, _GLASS_DARKENS])
-    grains = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2))
-    waves = np.array(
-        [
-            (2 * np.pi * scale * np.cos(way), 2 * np.pi * scale * np.sin(way), phase, 0.012)
-            for scale, (way, phase) in zip(_MOTTLE, grains, strict=True)
-        ]
-    )
-    oil = np.array(_OIL)
-    still_picture(lens.numbers, lens.turn, spots(_FINE), colours, ruler, tube, waves, oil, light, over, shine, floor)
-    return Backdrop(light, over, shine, floor)
+    colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))  # ground, paper, ink
+    end = tank.ruler + _LINE_LENGTH
+    line_width = min(_LINE_WIDTH, 0.25 * tank.spacing)
+    ruler = Ruler(tank.ruler - _PAPER, tank.ruler, end, end + _PAPER, tank.spacing, line_width)
+    half_length = -1.0 if tank.tube is None else 0.5 * tank.tube_length
+    tube = Tube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
+    azimuth, phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2)).T
+    wavenumber = 2 * np.pi * np.array(_MOTTLE)
+    amplitude = np.full(len(_MOTTLE), 0.012)
+    waves = Waves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
+    still_picture(lens.camera, lens.turn, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), still)
+    return still
