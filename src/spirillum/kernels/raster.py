@@ -82,7 +82,7 @@ def project(points: np.ndarray, camera: Camera, turn: np.ndarray, seen: np.ndarr
         turn: rotation from the frame of the points to that of the tilted camera, (3, 3).
         seen: filled with pixel u, v and the height z, (n, 3).
     """
-    surface, index = camera.surface, camera.index
+    surface, index = camera.surface, camera.refractive_index
     above = camera.eye - surface
     n2 = index * index
     for i in range(points.shape[0]):

@@ -22,8 +22,8 @@ class Camera(NamedTuple):
     """Height of the lens."""
     surface: float
     """Height of the oil's surface."""
-    index: float
-    """Refractive index of the oil."""
+    refractive_index: float
+    """Of the oil."""
     focal: float
     """Focal length; negative for a camera that is turned by half a turn."""
     centre_u: float
@@ -130,7 +130,7 @@ def sightline(u: float, v: float, camera: Camera, turn: np.ndarray) -> Ray:
     size = math.sqrt(x * x + y * y + z * z)
     x, y, z = x / size, y / size, z / size
     down = (camera.eye - camera.surface) / -z
-    dx, dy = x / camera.index, y / camera.index  # Snell's law keeps n sin(angle)
+    dx, dy = x / camera.refractive_index, y / camera.refractive_index  # Snell's law keeps n sin(angle)
     return Ray(x * down, y * down, dx, dy, -math.sqrt(1.0 - dx * dx - dy * dy))
 
 
