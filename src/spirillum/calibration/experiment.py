@@ -150,7 +150,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         _check_direction(path, group)
     ratios = [_ratios(path, group, by_channel[group[0].tail[0]].hand) for group in items]
     _check_rates(path, observations, ratios)
-    comments, _ = observation_table(path)
+    comments = observation_table(path).comments
     return Experiment(
         robots=tuple(
             with_tail(by_channel[group[0].tail[0]], group[0].wavelength, group[0].amplitude) for group in items

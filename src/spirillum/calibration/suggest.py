@@ -27,9 +27,9 @@ from spirillum.calibration.experiment import channel_of, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, given_robots
 from spirillum.calibration.judgement import synthetic_warning
 from spirillum.errors import InputError
-from spirillum.files import csv_rows, read_text
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.formats.tables import check_present, read_table
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS
@@ -217,35 +217,20 @@ def _default(robots: Sequence[Robot]) -> list[Robot]:
 
 def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
     """Candidates of a file; comments and empty lines are skipped."""
-    table = csv_rows(read_text(path, _WHAT), path, _WHAT)
-    header = table[0][1] if table else []
-    missing = [name for name in _COLUMNS if name not in header]
-    if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing; allowed: a header line with {', '.join(_COLUMNS)}")
-    if not 2 <= len(table) <= _MOST + 1:
-        raise InputError(f"{path} holds {len(table) - 1} candidates; allowed: 1 to {_MOST}")
+    table = read_table(path, _WHAT)
+    check_present(table, _COLUMNS)
+    if not 1 <= len(table.below) <= _MOST:
+        raise InputError(f"{path} holds {len(table.below)} candidates; allowed: 1 to {_MOST}")
     by_channel = {round(robot.channel.diameter, 9): robot for robot in robots if robot.channel}
     found = []
-    for number, cells in table[1:]:
-        if len(cells) != len(header):
-            raise InputError(f"{path}, row {number}: {len(cells)} cells; allowed: {len(header)}, one for each column")
-        row = dict(zip(header, cells, strict=True))
-        channel, wavelength, amplitude = (_length(path, number, name, row[name]) for name in _COLUMNS)
+    for row in table.rows():
+        channel, wavelength, amplitude = (
+            1e-3 * row.number(name, name, low=1e-6, high=1e6, blank=(), allowed="a length of 1e-06 to 1e+06 mm")
+            for name in _COLUMNS
+        )
         robot = by_channel.get(round(channel, 9))
         if robot is None:
             allowed = ", ".join(f"{diameter * 1e3:g} mm" for diameter in sorted(by_channel))
-            raise InputError(
-                f"{path}, row {number}, column channel_diameter_mm: {row[_COLUMNS[0]]}; allowed: {allowed}"
-            )
+            raise InputError(f"{row.place}, column channel_diameter_mm: {row.text(_COLUMNS[0])}; allowed: {allowed}")
         found.append(with_tail(robot, wavelength, amplitude))
     return list({tail_words(robot): robot for robot in found}.values())  # a tail that stands twice is one candidate
-
-
-def _length(path: Path, number: int, name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 1e-6 <= value <= 1e6:
-        raise InputError(f"{path}, row {number}, column {name}: '{text[:40]}'; allowed: a length of 1e-06 to 1e+06 mm")
-    return 1e-3 * value

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from spirillum.errors import InputError
-from spirillum.files import csv_rows, read_text
+from spirillum.formats.tables import number_in, read_table
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["DUTY_COLUMNS", "Switch", "Window", "read_duty", "schedule", "windows_of"]
@@ -91,16 +90,15 @@ def read_duty(path: str | Path) -> list[Switch]:
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
-    path = Path(path)
-    rows = csv_rows(read_text(path, _WHAT, _LARGEST), path, _WHAT)
-    header = tuple(rows[0][1]) if rows else ()
-    if header != DUTY_COLUMNS:
-        shown = ", ".join(header)[:80]
+    table = read_table(path, _WHAT, largest=_LARGEST)
+    path = table.path
+    if table.header != DUTY_COLUMNS:
+        shown = ", ".join(table.header)[:80]
         raise InputError(f"{path} has the columns '{shown}'; allowed: {', '.join(DUTY_COLUMNS)}")
-    if len(rows) < 2:
+    if not table.below:
         raise InputError(f"{path} holds no rows; allowed: a header line and at least one row")
     switches: list[Switch] = []
-    for number, cells in rows[1:]:
+    for number, cells in table.below:
         switch = _row(path, number, cells)
         if switches and switch.time <= switches[-1].time:
             raise InputError(
@@ -116,10 +114,7 @@ def _row(path: Path, number: int, cells: Sequence[str]) -> Switch:
         raise InputError(f"{path}, row {number} has {len(cells)} cells; allowed: {len(DUTY_COLUMNS)}")
     values = []
     for name, cell, most in zip(DUTY_COLUMNS, cells, (1e9, 1.0), strict=True):
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
+        value = number_in(cell)
         if not 0.0 <= value <= most:
             raise InputError(
                 f"{path}, row {number}: {name} = {cell.strip()[:40]}; allowed: a number from 0 to {most:g}"

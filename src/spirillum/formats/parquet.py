@@ -41,7 +41,7 @@ def parquet_table(path: Path, what: str) -> list[tuple[int, list[str]]]:
         (number, [_cell(path, number, name, value) for name, value in zip(table.column_names, cells, strict=True)])
         for number, cells in enumerate(zip(*columns, strict=True), 2)
     ]
-    return [(1, list(table.column_names)), *rows]
+    return [(1, [name.strip() for name in table.column_names]), *rows]
 
 
 def _cell(path: Path, number: int, name: str, value: object) -> str:
@@ -49,5 +49,5 @@ def _cell(path: Path, number: int, name: str, value: object) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if isinstance(value, (str, int, float)) and not isinstance(value, bool):
-        return str(value)
+        return str(value).strip()
     raise InputError(f"{path}, row {number}, column {name}: a {type(value).__name__}; allowed: a number or text")

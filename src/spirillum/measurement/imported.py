@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
+from spirillum.formats.tables import Row, read_readings
 from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
-from spirillum.measurement.tables import Row, read_table
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.track import Track
@@ -75,7 +75,7 @@ def read_track(
     )  # fmt: skip
 
 
-def _check_inside(rows: tuple[Row, ...], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
+def _check_inside(rows: Sequence[Row], points: Samples, names: tuple[str, str], size: tuple[int, int]) -> None:
     """Refuse points from outside the picture.
 
     Raises:
@@ -90,7 +90,8 @@ _Points = tuple[Samples, Samples, Samples, Samples]
 
 
 def _trackpy(path: Path, size: tuple[int, int]) -> _Points:
-    table = read_table(path, _WHAT)
+    table = read_readings(path, _WHAT)
+    rows = table.rows()
     places = {name: table.column(name) for name in ("x", "y", "frame", "particle")}
     for name in ("x", "y", "frame"):
         if places[name] is None:
@@ -101,9 +102,9 @@ def _trackpy(path: Path, size: tuple[int, int]) -> _Points:
     def column(name: str) -> Samples:
         place = places[name]
         assert place is not None  # noqa: S101 - checked above
-        return np.array([row.number(place, name) for row in table.rows])
+        return np.array([row.number(place, name) for row in rows])
 
-    for row, number in zip(table.rows, column("frame"), strict=True):
+    for row, number in zip(rows, column("frame"), strict=True):
         if math.isnan(number) or number < 0:
             raise row.error("frame", f"{number:g}", "a whole number from 0")
     if places["particle"] is not None:
@@ -111,12 +112,13 @@ def _trackpy(path: Path, size: tuple[int, int]) -> _Points:
         if particles.size > 1:
             raise InputError(f"{path}, column particle: {particles.size} particles; allowed: the robot's alone")
     centre = np.stack([column("x"), column("y")], axis=1)
-    _check_inside(table.rows, centre, ("x", "y"), size)
+    _check_inside(rows, centre, ("x", "y"), size)
     return column("frame"), np.full_like(centre, np.nan), np.full_like(centre, np.nan), centre
 
 
 def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
-    table = read_table(path, _WHAT, headers=3)
+    table = read_readings(path, _WHAT, headers=3)
+    rows = table.rows()
     parts, coordinates = (tuple(cell.lower() for cell in head) for head in table.headers[1:3])
     if parts[0] == "individuals":
         raise InputError(f"{path} holds several individuals; allowed: a table of one")
@@ -124,7 +126,7 @@ def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
         raise InputError(
             f"{path}: header rows are '{parts[0][:20]}', '{coordinates[0][:20]}'; allowed: bodyparts, coords"
         )
-    frame = np.array([row.number(0, "frame") for row in table.rows])
+    frame = np.array([row.number(0, "frame") for row in rows])
 
     def point(names: tuple[str, ...]) -> Samples | None:
         name = next((name for name in names if name in parts), None)
@@ -133,11 +135,11 @@ def _deeplabcut(path: Path, size: tuple[int, int]) -> _Points:
         place = {c: i for i, (p, c) in enumerate(zip(parts, coordinates, strict=True)) if p == name}
         if not {"x", "y"} <= set(place):
             raise InputError(f"{path}: point '{name}' has no columns x and y; allowed: x, y, likelihood")
-        found = np.array([[row.number(place[c], f"{name} {c}") for c in ("x", "y")] for row in table.rows])
+        found = np.array([[row.number(place[c], f"{name} {c}") for c in ("x", "y")] for row in rows])
         if "likelihood" in place:
-            likely = np.array([row.number(place["likelihood"], f"{name} likelihood") for row in table.rows])
+            likely = np.array([row.number(place["likelihood"], f"{name} likelihood") for row in rows])
             found[~(likely >= _LIKELY)] = np.nan
-        _check_inside(table.rows, found, (f"{name} x", f"{name} y"), size)
+        _check_inside(rows, found, (f"{name} x", f"{name} y"), size)
         return found
 
     nose, rear, centre = point(_FRONTS), point(_REARS), point(_MIDDLES)

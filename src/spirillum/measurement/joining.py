@@ -39,10 +39,9 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     comments: list[str] = []
     for path in paths:
         read_observations(path)
-        found, table = observation_table(path)
-        comments += [line for line in found if line not in comments]
-        header = [name.strip() for name in table[0][1]]
-        rows += [dict(zip(header, cells, strict=False)) for _, cells in table[1:]]
+        table = observation_table(path)
+        comments += [line for line in table.comments if line not in comments]
+        rows += [dict(zip(row.header, row.cells, strict=True)) for row in table.rows()]
     used = [name for name in COLUMNS if any(row.get(name, "").strip() for row in rows)]
     text = io.StringIO()
     writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")

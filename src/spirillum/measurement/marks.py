@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError
+from spirillum.formats.tables import Row, Table, check_known, read_readings
 from spirillum.measurement.flags import BY_HAND
-from spirillum.measurement.tables import Row, Table, read_table
 from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
@@ -112,28 +112,20 @@ def read_marks(path: str | Path) -> dict[str, Marks]:
     Raises:
         InputError: if a column is unknown, one is missing, or a cell is wrong; the sentence names row and column.
     """
-    table = read_table(path, _WHAT)
+    table = read_readings(path, _WHAT)
     _check_columns(table)
     rows: dict[str, list[Row]] = {}
     place = table.column("video")
-    for row in table.rows:
+    for row in table.rows():
         rows.setdefault("" if place is None else row.text(place), []).append(row)
     return {video: _marks(table, chosen) for video, chosen in rows.items()}
 
 
 def _check_columns(table: Table) -> None:
-    header = table.headers[0]
-    for name in header:
-        if name not in MARK_COLUMNS:
-            raise InputError(
-                f"{table.path}: column '{name[:40]}' is unknown{did_you_mean(name, MARK_COLUMNS)}; allowed: "
-                f"{', '.join(MARK_COLUMNS)}"
-            )
-        if header.count(name) > 1:
-            raise InputError(f"{table.path}: column '{name}' stands twice; allowed: once")
-    if not {"frame", "time_s"} & set(header):
+    check_known(table, MARK_COLUMNS)
+    if not {"frame", "time_s"} & set(table.header):
         raise InputError(f"{table.path}: neither column 'frame' nor 'time_s' is there; allowed: at least one of them")
-    if not set(_READINGS) & set(header):
+    if not set(_READINGS) & set(table.header):
         raise InputError(f"{table.path} holds no readings; allowed: at least one column of {', '.join(_READINGS)}")
 
 

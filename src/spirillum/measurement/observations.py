@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from spirillum.errors import InputError, did_you_mean
-from spirillum.files import csv_rows, read_text
-from spirillum.formats.parquet import parquet_table
+from spirillum.errors import InputError
+from spirillum.formats.tables import Row, Table, check_known, check_present, number_in, read_table
 from spirillum.measurement.statistics import Mean, mean_with_interval
 from spirillum.units import Hz
 
@@ -38,7 +36,6 @@ _LARGEST = 64 << 20
 _CONTRADICTION = 0.2
 _LARGEST_NUMBER = 1e6
 _SMALLEST_RATE = 1e-6 * Hz
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -91,60 +88,43 @@ def read_observations(path: str | Path) -> list[Observation]:
     Raises:
         InputError: if the file or a cell is wrong; the sentence names file, row and column.
     """
-    path = Path(path)
-    _, numbered = observation_table(path)
-    header = [name.strip() for name in numbered[0][1]]
-    _check_header(path, header)
-    found = [_observation(path, number, header, cells) for number, cells in numbered[1:]]
-    _check_duplicates(path, found)
+    table = observation_table(path)
+    _check_header(table)
+    found = [_observation(row) for row in table.rows()]
+    _check_duplicates(table.path, found)
     return found
 
 
-def observation_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Comment lines of an observations file, and the cells of header and rows, each with its line number.
+def observation_table(path: str | Path) -> Table:
+    """Header, rows and comments of an observations file, not yet checked.
 
     Args:
         path: CSV, or Parquet, which has no comments.
 
     Raises:
-        InputError: if the file cannot be read as a table.
+        InputError: if the file cannot be read as a table, or has no rows.
     """
-    if path.suffix == ".parquet":
-        return [], parquet_table(path, _WHAT)
-    text = read_text(path, _WHAT, _LARGEST)
-    comments = [line.strip() for line in text.splitlines() if line.lstrip().startswith("#")]
-    rows = csv_rows(text, path, _WHAT)
-    if len(rows) < 2:
+    table = read_table(path, _WHAT, largest=_LARGEST, parquet=True)
+    if not table.below:
         raise InputError(f"{path} holds no observations; allowed: a header line and at least one row")
-    return comments, rows
+    return table
 
 
-def _check_header(path: Path, header: Sequence[str]) -> None:
-    for name in header:
-        if name not in COLUMNS and len(header) == 1 and any(mark in name for mark in ";\t"):
-            mark = "semicolons" if ";" in name else "tabs"
-            raise InputError(f"{path}: columns are separated by {mark}; allowed: commas, and points in numbers")
-        if name not in COLUMNS:
-            raise InputError(
-                f"{path}: column '{name[:40]}' is unknown{did_you_mean(name, COLUMNS)}; allowed: {', '.join(COLUMNS)}"
-            )
-    twice = [name for name in header if header.count(name) > 1]
-    if twice:
-        raise InputError(f"{path}: column '{twice[0]}' stands twice; allowed: once")
-    missing = [name for name in _NEEDED if name not in header]
-    if missing:
-        raise InputError(f"{path}: column '{missing[0]}' is missing; allowed: a header line with {', '.join(_NEEDED)}")
+def _check_header(table: Table) -> None:
+    path, header = table.path, table.header
+    if len(header) == 1 and any(mark in header[0] for mark in ";\t"):
+        mark = "semicolons" if ";" in header[0] else "tabs"
+        raise InputError(f"{path}: columns are separated by {mark}; allowed: commas, and points in numbers")
+    check_known(table, COLUMNS)
+    check_present(table, _NEEDED)
     if not set(header) & set(RATES):
         raise InputError(f"{path} has no measured column; allowed: at least one of {', '.join(RATES)}")
 
 
-def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence[str]) -> Observation:
-    if len(cells) != len(header):
-        raise InputError(f"{path}, row {number}: {len(cells)} cells; allowed: {len(header)}, one for each column")
-    row = dict(zip(header, (cell.strip() for cell in cells), strict=True))
-    place = f"{path}, row {number}"
-    channel_diameter, wavelength, amplitude = (_number(place, row, name, _MM, least=1e-6) for name in _KEYS)
-    rates = [_number(place, row, name, factor) for name, factor in RATES.items()]
+def _observation(row: Row) -> Observation:
+    place = row.place
+    channel_diameter, wavelength, amplitude = (_number(row, name, _MM, least=1e-6) for name in _KEYS)
+    rates = [_number(row, name, factor) for name, factor in RATES.items()]
     if all(math.isnan(value) for value in rates):
         raise InputError(f"{place}: nothing was measured; allowed: at least one of {', '.join(RATES)}")
     velocity, tail, body, motor = rates
@@ -153,18 +133,18 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
     for name, rate in (("tail_rate_Hz", tail), ("motor_rate_Hz", motor)):
         if abs(rate) < _SMALLEST_RATE:
             raise InputError(f"{place}, column {name}: {rate / Hz:g}; allowed: a rate other than 0, or empty")
-    _check_trial(place, row.get("trial", ""))
-    a, b, c, d = (_number(place, row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
-    trials = _trials(path, number, row)
-    widths = [name for name in _INTERVALS if row.get(name, "")]
+    _check_trial(row)
+    a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
+    trials = _trials(row)
+    widths = [name for name in _INTERVALS if row.text(name)]
     if widths and trials < 2:
         raise InputError(
             f"{place}, column {widths[0]}: an interval of one trial; allowed: a column trials with the number of "
             "trials (2 or more) that the mean is over, or empty"
         )
     return Observation(
-        row=number,
-        robot=row.get("robot", ""),
+        row=row.line,
+        robot=row.text("robot"),
         channel_diameter=channel_diameter,
         wavelength=wavelength,
         amplitude=amplitude,
@@ -174,15 +154,16 @@ def _observation(path: Path, number: int, header: Sequence[str], cells: Sequence
         motor_rate=motor,
         trials=trials,
         intervals=(a, b, c, d),
-        trial=row.get("trial", ""),
+        trial=row.text("trial"),
         motor_derived=motor_derived,
     )
 
 
-def _check_trial(place: str, text: str) -> None:
+def _check_trial(row: Row) -> None:
     """A trial has a name or a whole number: a fraction has slipped in from another column."""
-    if _NUMBER.fullmatch(text) and not float(text).is_integer():
-        raise InputError(f"{place}, column trial: '{text[:40]}'; allowed: a whole number, or a name")
+    number = number_in(row.text("trial"))
+    if not math.isnan(number) and not number.is_integer():
+        raise row.error("trial", row.text("trial"), "a whole number, or a name")
 
 
 def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
@@ -198,33 +179,27 @@ def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
     return motor
 
 
-def _number(place: str, row: dict[str, str], name: str, factor: float, least: float | None = None) -> float:
+def _number(row: Row, name: str, factor: float, least: float | None = None) -> float:
     """One cell in SI; NaN where it is empty and may be.
 
     Args:
-        place: file and row, for the sentence of an error.
-        row: the cells by column.
+        row: the row.
         name: the column.
         factor: its unit in SI.
         least: smallest value in the column's unit; a key column, which has a positive one, may not be empty.
     """
-    text = row.get(name, "")
-    if not text and not (least is not None and least > 0):
-        return math.nan
-    value = float(text) if _NUMBER.fullmatch(text) else math.nan
-    if not abs(value) <= _LARGEST_NUMBER or (least is not None and value < least):
-        wanted = f"a number up to {_LARGEST_NUMBER:g}"
-        wanted += ", or empty" if least is None else f" of at least {least:g}"
-        raise InputError(f"{place}, column {name}: '{text[:40]}'; allowed: {wanted}")
-    return value * factor
+    low = -_LARGEST_NUMBER if least is None else least
+    wanted = f"a number up to {_LARGEST_NUMBER:g}" + (", or empty" if least is None else f" of at least {least:g}")
+    blank = () if low > 0.0 else ("",)
+    return factor * row.number(name, name, low=low, high=_LARGEST_NUMBER, blank=blank, allowed=wanted)
 
 
-def _trials(path: Path, number: int, row: dict[str, str]) -> int:
-    text = row.get("trials", "")
+def _trials(row: Row) -> int:
+    text = row.text("trials")
     if not text:
         return 1
     if not text.isascii() or not text.isdigit() or not 1 <= int(text[:9]) <= 10**6:
-        raise InputError(f"{path}, row {number}, column trials: '{text[:40]}'; allowed: a whole number from 1")
+        raise row.error("trials", text, "a whole number from 1")
     return int(text)
 
 
