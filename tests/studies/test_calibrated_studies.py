@@ -65,9 +65,9 @@ def test_intervals_are_those_of_predict(fitted: Path, tmp_path: Path) -> None:
             getattr(answer.intervals, end)["forward_velocity"], rel=1e-12
         )
         assert np.isnan(float(found.sel(model="rft")))
-    from spirillum.view.figures.evidence import Shown
+    from spirillum.view.figures.study_view import StudyView
 
-    shown = Shown.of(dataset).part(channel=1)
+    shown = StudyView.of(dataset).part(channel=1)
     assert shown.with_intervals == ("sbt",)
     for end, limit in zip(("low", "high"), shown.band("forward_velocity", "sbt"), strict=True):
         stored = dataset[f"forward_velocity_interval_{end}"].sel(channel="narrow", model="sbt", friction="rotor")

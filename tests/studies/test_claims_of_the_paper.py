@@ -7,6 +7,7 @@ import pytest
 import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
 from spirillum.papers.biorob2012.evidence import Claim
+from spirillum.papers.registry import claims_of
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +94,7 @@ def test_a_few_tails_decide_nothing_about_all_of_them(tmp_path, columns: str, un
 
 
 def test_other_studies_make_no_claims(small: dict[str, object]) -> None:
-    assert evaluated(sp.study(small)) == []
+    assert claims_of(sp.study(small)) == []
 
 
 def test_paper_study_without_a_named_tail_leaves_its_claim_open(small: dict[str, object]) -> None:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Callable, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.files import output_folder, write_text
+from spirillum.files import write_text
 from spirillum.measurement.flags import BY_HAND
 from spirillum.measurement.shown import shown
 from spirillum.measurement.trials import MEASURED, Measured
-from spirillum.results.study_report import EmbeddedPicture
+from spirillum.results.page import EmbeddedPicture, data_uri, draw_pictures, page
+from spirillum.version import versions
 from spirillum.view.figures.measurement import measurement_figures
-from spirillum.view.figures.style import save
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.colours import pattern_period
 
@@ -46,29 +44,18 @@ def write_measurement_report(
         InputError: if the folder cannot be written to.
     """
     pictures = measurement_figures(measurement)
-    figures = output_folder(folder / "figures")
-    embedded, written = [], []
-    for done, (name, picture) in enumerate(pictures.items()):
-        tell("figures and report", done, len(pictures) + 1)
-        png, svg = save(picture.figure(), figures / name)
-        source = f"data:image/png;base64,{base64.b64encode(png.read_bytes()).decode('ascii')}"
-        embedded.append(EmbeddedPicture(name, picture.title, picture.caption, picture.alternative, source))
-        written += [f"figures/{png.name}", f"figures/{svg.name}"]
+    steps = len(pictures) + 1
+    embedded = draw_pictures(pictures, folder, lambda _name, done: tell("figures and report", done, steps))
     write_text(folder / "report.html", _page(measurement, embedded, thumbnails))
-    tell("figures and report", len(pictures) + 1, len(pictures) + 1)
-    return [*written, "report.html"]
+    tell("figures and report", steps, steps)
+    return [*(name for picture in embedded for name in picture.files), "report.html"]
 
 
 def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails: Mapping[str, bytes]) -> str:
-    from jinja2 import Environment, StrictUndefined
-
-    from spirillum.version import versions
-
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    template = (files("spirillum.results") / "measurement.html.jinja").read_text(encoding="utf-8")
     scale = max((trial.track.scale for trial in measurement.trials), key=lambda scale: scale.relative_uncertainty)
     sources = sorted(scale.sources.items(), key=lambda item: -item[1])
-    return environment.from_string(template).render(
+    return page(
+        "measurement.html.jinja",
         title=f"{measurement.robot.name}: measured from video",
         setup=Path(measurement.setup).name,
         trials=[_trial(trial, pictures, thumbnails) for trial in measurement.trials],
@@ -97,7 +84,7 @@ def _trial(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Mapping[st
         "size": f"{track.time.size} frames, {span:.4g} s",
         "rows": _rows(trial.quantities),
         "flags": trial.flags,
-        "thumbnail": f"data:image/jpeg;base64,{base64.b64encode(data).decode('ascii')}" if data else "",
+        "thumbnail": data_uri(data, "jpeg") if data else "",
         "pictures": [picture for picture in pictures if picture.name == f"series-{trial.name}"],
     }
 

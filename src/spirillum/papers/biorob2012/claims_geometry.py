@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
+from spirillum.papers.biorob2012.constants import FRAME_RATE, NARROWER, ROBOT_LENGTH
 from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict
 from spirillum.robot.load import load
 from spirillum.units import Hz
@@ -33,9 +34,9 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
     length = derived["robot_length"].value
     yield Claim(
         "The prototype is more than 10 centimetres long",
-        "> 100 mm",
+        f"> {1e3 * ROBOT_LENGTH:.0f} mm",
         f"{1e3 * length:.0f} mm (body, coupling and tail)",
-        _verdict(length > 0.1),
+        _verdict(length > ROBOT_LENGTH),
         "sum of Table I's lengths",
     )
     weight = derived["submerged_weight"].value
@@ -50,9 +51,9 @@ def robot_and_channel(evidence: Evidence) -> Iterator[Claim]:
         reduction = 1.0 - narrow.channel.diameter / robot.channel.diameter
         yield Claim(
             "The narrow channel's radius is 25 % smaller",
-            "25 %",
+            f"{100 * NARROWER:.0f} %",
             f"{100 * reduction:.0f} %",
-            _verdict(bool(np.isclose(reduction, 0.25))),
+            _verdict(bool(np.isclose(reduction, NARROWER))),
             "Table I",
         )
     if robot.motor is not None:
@@ -73,9 +74,9 @@ def method(evidence: Evidence) -> Iterator[Claim]:
     )
     yield Claim(
         "The camera's sampling rate resolves the rotation (Nyquist)",
-        "30 frames/s",
-        f"fastest tail at the friction-free bound {fastest:.1f} Hz; Nyquist limit 15 Hz",
-        _verdict(fastest < 15.0),
+        f"{FRAME_RATE:.0f} frames/s",
+        f"fastest tail at the friction-free bound {fastest:.1f} Hz; Nyquist limit {0.5 * FRAME_RATE:.0f} Hz",
+        _verdict(fastest < 0.5 * FRAME_RATE),
         "an upper bound of the tail's rate lies below half the frame rate",
     )
     difference = PRINTED_EPS_CONSTANT / EXACT_EPS_CONSTANT - 1.0

@@ -7,8 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from spirillum.arrays import Values
-from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict, fraction_between, in_hertz, label
+from spirillum.papers.biorob2012.constants import (
+    BODY_ROTATION_ERROR,
+    GLOBAL_DROP,
+    LARGEST_REYNOLDS,
+    LOW_REYNOLDS,
+    VELOCITY_DROPS,
+)
+from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict, fraction_between, in_hertz
 from spirillum.units import Hz
+from spirillum.view.figures.style import label_of_model as label
 
 __all__ = [
     "body_rotation",
@@ -26,7 +34,7 @@ _EQUAL_RATES = (
 )
 _FITTED = "consistency rather than prediction: Table III's factors were fitted to the same data"
 _NO_WALLS = "no model of this study knows the channel's walls"
-_RE_MAX = {"wide": (0.0058, 25.0, 2.5), "narrow": (0.0038, 20.0, 1.5)}
+_PAPER_DROP = f"{100 * GLOBAL_DROP:.1f} %"
 
 
 def _no_tail(claim: str, paper: str) -> Claim:
@@ -35,7 +43,7 @@ def _no_tail(claim: str, paper: str) -> Claim:
 
 def reynolds_numbers(evidence: Evidence) -> Iterator[Claim]:
     """Re_max of the captions of Figs 5 and 6, and the low-Reynolds statement."""
-    for channel, (reynolds, wavelength, amplitude) in _RE_MAX.items():
+    for channel, (reynolds, wavelength, amplitude, _) in LARGEST_REYNOLDS.items():
         claim = f"Largest Reynolds number, {channel} channel, at lambda = {wavelength:g} mm, B_o = {amplitude:g} mm"
         tail = evidence.tail(wavelength, amplitude)
         if tail is None:
@@ -62,15 +70,15 @@ def reynolds_numbers(evidence: Evidence) -> Iterator[Claim]:
     largest = max(float(np.nanmax(evidence.free("reynolds_number", model))) for model in evidence.models)
     yield Claim(
         "Low Reynolds number conditions",
-        "Re < 0.1",
+        f"Re < {LOW_REYNOLDS:g}",
         f"at most {largest:.3f} on the body's diameter, at the friction-free upper bound",
-        "agrees" if largest < 0.1 else "undecidable",
-        "holds for any rate up to the bound" if largest < 0.1 else NO_RATES,
+        "agrees" if largest < LOW_REYNOLDS else "undecidable",
+        "holds for any rate up to the bound" if largest < LOW_REYNOLDS else NO_RATES,
     )
 
 
 def _observed_reynolds(evidence: Evidence, claim: str, channel: str, tail: tuple[int, int]) -> Claim:
-    reynolds = _RE_MAX[channel][0]
+    reynolds = LARGEST_REYNOLDS[channel].value
     speeds = evidence.seen("forward_velocity", channel)
     found = speeds[tail] / evidence.speed_of(1.0)
     fastest = _place(speeds, int(np.nanargmax(speeds))) == tail
@@ -88,7 +96,7 @@ def _observed_reynolds(evidence: Evidence, claim: str, channel: str, tail: tuple
 
 def velocity_drops(evidence: Evidence) -> Iterator[Claim]:
     """Smallest and largest loss of speed from the wide to the narrow channel."""
-    for which, drop, wavelength, amplitude in (("lowest", 0.0653, 10.0, 3.5), ("largest", 0.648, 25.0, 2.5)):
+    for which, (drop, wavelength, amplitude) in VELOCITY_DROPS.items():
         claim = f"The {which} velocity decrease, wide to narrow, at lambda = {wavelength:g} mm, B_o = {amplitude:g} mm"
         paper = f"{drop:g} mm/s"
         tail = evidence.tail(wavelength, amplitude)
@@ -120,16 +128,16 @@ def velocity_drops(evidence: Evidence) -> Iterator[Claim]:
 
 
 def global_drop(evidence: Evidence) -> Iterator[Claim]:
-    """38.9 % lower global mean, which bounds hold for any rates."""
+    """Loss of the global mean velocity, bounded for any rates."""
     claim = "Decrease of the global average velocity of all body-tail assemblies, wide to narrow"
     if evidence.complete("forward_velocity"):
         wide, narrow = evidence.seen("forward_velocity")
         loss = 1.0 - narrow.sum() / wide.sum()
         yield Claim(
             claim,
-            "38.9 %",
+            _PAPER_DROP,
             f"observed {100 * loss:.1f} % over {wide.size} tails",
-            "agrees" if abs(loss - 0.389) < 0.005 else "disagrees",
+            "agrees" if abs(loss - GLOBAL_DROP) < 0.005 else "disagrees",
             "observed speeds, within 0.5 points",
         )
     for model in evidence.confined:
@@ -168,24 +176,24 @@ def _computed_drop(evidence: Evidence, model: str, claim: str) -> Claim:
     words = f"{fraction_between(losses)} for single tails, so any weighted mean of them"
     if model not in evidence.computed:
         verdict = _holds_for_any_weights(losses)
-        return Claim(claim, "38.9 %", words, verdict, f"{_EQUAL_RATES}; {_FITTED}")
+        return Claim(claim, _PAPER_DROP, words, verdict, f"{_EQUAL_RATES}; {_FITTED}")
     band = evidence.drops_of_the_band(model)
     words = f"{words} ({evidence.place})"
     nothing = "no factor is fitted: the walls are computed"
     if band is None:
         why = f"{nothing}, at one assumed place of many: the paper does not report gap and pitch"
-        return Claim(claim, "38.9 %", words, "undecidable", f"{_EQUAL_RATES}; {why}")
+        return Claim(claim, _PAPER_DROP, words, "undecidable", f"{_EQUAL_RATES}; {why}")
     words = f"{words}; over the band, at the same gap and pitch in both channels, {fraction_between(band)}"
     why = f"{nothing}, over a band, for the paper does not report gap and pitch"
-    return Claim(claim, "38.9 %", words, _holds_for_any_weights(band), f"{_EQUAL_RATES}; {why}")
+    return Claim(claim, _PAPER_DROP, words, _holds_for_any_weights(band), f"{_EQUAL_RATES}; {why}")
 
 
 def _holds_for_any_weights(losses: Values) -> Verdict:
-    """Whether 38.9 % is a weighted mean of these losses: never, or so nearly that the weights do not matter."""
+    """Whether the paper's loss is a weighted mean of these: never, or so nearly that the weights do not matter."""
     low, high = float(np.nanmin(losses)), float(np.nanmax(losses))
-    if not low <= 0.389 <= high:
+    if not low <= GLOBAL_DROP <= high:
         return "disagrees"
-    return "agrees" if max(0.389 - low, high - 0.389) < 0.02 else "undecidable"
+    return "agrees" if max(GLOBAL_DROP - low, high - GLOBAL_DROP) < 0.02 else "undecidable"
 
 
 def trends(evidence: Evidence) -> Iterator[Claim]:
@@ -243,7 +251,7 @@ def _always(steps: Values) -> Verdict:
 def body_rotation(evidence: Evidence) -> Iterator[Claim]:
     """Order of the body's rate, and how well the models predict it."""
     rates = []
-    for channel, (reynolds, wavelength, amplitude) in _RE_MAX.items():
+    for channel, (reynolds, wavelength, amplitude, _) in LARGEST_REYNOLDS.items():
         tail = evidence.tail(wavelength, amplitude)
         if tail is None:
             continue
@@ -280,7 +288,7 @@ def _rotation_errors(evidence: Evidence) -> Claim:
         found = _at_observed(evidence, "body_rotation_rate", model)
         worst[model] = float(np.nanmax(np.abs(found / seen - 1.0)))
     words = ", ".join(f"{label(model)} up to {100 * error:.0f} %" for model, error in worst.items())
-    verdict: Verdict = "agrees" if max(worst.values()) <= 0.5 else "disagrees"
+    verdict: Verdict = "agrees" if max(worst.values()) <= BODY_ROTATION_ERROR else "disagrees"
     return Claim(
         claim, paper, words, verdict, "models at the observed tail rates, friction reading 'rotor' or the first"
     )

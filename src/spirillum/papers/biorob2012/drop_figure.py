@@ -3,30 +3,31 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
+from spirillum.papers.biorob2012.constants import GLOBAL_DROP
 from spirillum.papers.biorob2012.evidence import Evidence
-from spirillum.view.figures.evidence import Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study import PANEL
+from spirillum.view.figures.study_view import StudyView, spread
 from spirillum.view.figures.style import Scale, label_of_model, look_of_model
 
 __all__ = ["drop_picture"]
 
-PAPER_DROP = 0.389
-"""Loss of the global mean velocity that the paper reports."""
 _TITLE = "Loss of speed from the wide to the narrow channel"
 _MOST_COLUMNS = 6
-_DASHED = (0, (4.0, 2.0))
+_STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0}
+"""Look of what the paper states."""
 
 
-def drop_picture(shown: Shown) -> Picture | None:
+def drop_picture(shown: StudyView) -> Picture | None:
     """The loss of every tail at equal motor rates; None for a study of other channels.
 
     Args:
@@ -39,7 +40,7 @@ def drop_picture(shown: Shown) -> Picture | None:
         return None
     notes = [
         "At equal motor rates a tail's relative loss follows without knowing the rate. The loss of the global mean, "
-        f"which the paper reports as {100 * PAPER_DROP:.1f} %, is a weighted mean of the losses of single tails."
+        f"which the paper reports as {100 * GLOBAL_DROP:.1f} %, is a weighted mean of the losses of single tails."
     ]
     if evidence.computed:
         names = ", ".join(label_of_model(name) for name in evidence.computed)
@@ -63,10 +64,10 @@ def drop_picture(shown: Shown) -> Picture | None:
     )
 
 
-def _draw(shown: Shown, evidence: Evidence, notes: list[str]) -> Figure:
+def _draw(shown: StudyView, evidence: Evidence, notes: list[str]) -> Figure:
     wavelengths = spread(shown.whole.sizes["wavelength"], _MOST_COLUMNS)
     legend = [*_entries(evidence), *band_handles(shown)]
-    legend.append(Line2D([], [], color="black", linestyle=_DASHED, linewidth=1.0, label="paper: global mean 38.9 %"))
+    legend.append(Line2D([], [], **_STATED, label=f"paper: global mean {100 * GLOBAL_DROP:.1f} %"))
     sheet = Sheet(
         _TITLE,
         shown.source_line,
@@ -86,7 +87,7 @@ def _draw(shown: Shown, evidence: Evidence, notes: list[str]) -> Figure:
             low, high = _range(evidence, model)
             draw_band(axes, scale(values), low[wavelength], high[wavelength], look, joined=True)
             draw_curve(axes, scale(values), 100 * evidence.drop_per_motor_turn(model)[wavelength], look)
-        axes.axhline(100 * PAPER_DROP, color="black", linestyle=_DASHED, linewidth=1.0)
+        axes.axhline(100 * GLOBAL_DROP, **_STATED)
         tail_axis(axes, scale(values))
         axes.set_xlabel(f"wave amplitude $B_o$ ({scale.unit})")
         head_column(axes, shown, wavelength)

@@ -23,7 +23,7 @@ from spirillum.units import Hz
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NO_RATES", "Claim", "Evidence", "Verdict", "fraction_between", "in_hertz", "label"]
+__all__ = ["NO_RATES", "Claim", "Evidence", "Verdict", "fraction_between", "in_hertz"]
 
 Verdict = Literal["agrees", "disagrees", "undecidable"]
 
@@ -117,7 +117,7 @@ class Evidence:
         return loss
 
     def drops_of_the_band(self, model: str) -> Values | None:
-        """The same at the reference place and, along the last axis, at the places of a band; None without a band."""
+        """Relative losses at equal motor rates, of the reference place and of a band (last axis)."""
         if model not in self.computed or "forward_velocity_at_place" not in self.dataset:
             return None
         return np.concatenate(
@@ -128,11 +128,6 @@ class Evidence:
     def place(self) -> str:
         """Where robots lie for the models that compute the walls, in words."""
         return reference_place(self._settings)
-
-
-def label(model: str) -> str:
-    """A model's name as it stands in text: abbreviations in capitals."""
-    return model.upper() if len(model) <= 3 else model
 
 
 def fraction_between(values: Values) -> str:

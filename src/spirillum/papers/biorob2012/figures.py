@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from spirillum.papers.biorob2012.constants import LARGEST_REYNOLDS
 from spirillum.papers.biorob2012.drop_figure import drop_picture
-from spirillum.view.figures.evidence import PaperFigure, Shown
 from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.study_view import PaperFigure, StudyView
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["PAPER_FIGURES", "more_figures"]
 
+_FILES = {"wide": "fig5-wide", "narrow": "fig6-narrow"}
 PAPER_FIGURES = {
-    "wide": PaperFigure("fig5-wide", "Fig. 5", 0.0058),
-    "narrow": PaperFigure("fig6-narrow", "Fig. 6", 0.0038),
+    channel: PaperFigure(_FILES[channel], stated.figure, stated.value) for channel, stated in LARGEST_REYNOLDS.items()
 }
 """Figures by channel, with Re_max of their captions."""
 
@@ -24,5 +25,5 @@ def more_figures(dataset: xr.Dataset) -> dict[str, Picture]:
     """Figures that only this paper asks for: `drop`, the loss of speed from the wide to the narrow channel."""
     if "channel" not in dataset.dims:
         return {}
-    drop = drop_picture(Shown.of(dataset, PAPER_FIGURES))
+    drop = drop_picture(StudyView.of(dataset, PAPER_FIGURES))
     return {} if drop is None else {"drop": drop}

@@ -12,9 +12,9 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.units import Hz
-from spirillum.view.figures.evidence import spread
 from spirillum.view.figures.posterior import posterior_figure, profile_figure
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.study_view import spread
 from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:

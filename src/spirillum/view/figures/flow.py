@@ -160,8 +160,8 @@ def _draw_solids(axes: Axes, flow: Flow, view: _View) -> None:
 
 def _inches(axes: Axes) -> tuple[float, float]:
     """Width and height of a panel, inches."""
-    place, dpi = axes.get_window_extent(), axes.get_figure(root=True).dpi
-    return place.width / dpi, place.height / dpi
+    place = axes.get_window_extent().transformed(axes.figure.dpi_scale_trans.inverted())
+    return float(place.width), float(place.height)
 
 
 def _draw_colours(axes: Axes, view: _View, values: Values, colours: str, norm: Normalize) -> AxesImage:
@@ -203,7 +203,7 @@ def _draw_pressure(axes: Axes, view: _View) -> None:
 
 def _add_bar(axes: Axes, image: AxesImage, label: str, ticks: Values, extend: str = "neither") -> None:
     slim = _inches(axes)[1] / 0.13
-    bar = axes.get_figure().colorbar(
+    bar = axes.figure.colorbar(
         image, ax=axes, label=label, ticks=ticks, extend=extend, format="{x:.3g}", pad=0.01, fraction=0.05, aspect=slim
     )
     bar.ax.yaxis.set_minor_locator(NullLocator())

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
-from spirillum.view.figures.evidence import Shown
+from spirillum.view.figures.study_view import StudyView
 from spirillum.view.figures.style import Scale, readable, styled
 
 __all__ = ["Picture", "head_column", "tail_axis"]
@@ -39,7 +39,7 @@ class Picture:
             return self.draw()
 
 
-def head_column(axes: Axes, shown: Shown, wavelength: int) -> None:
+def head_column(axes: Axes, shown: StudyView, wavelength: int) -> None:
     """Head a column of panels with its wavelength, by its place in the study."""
     values = np.asarray(shown.whole["wavelength"].values, dtype=float)
     scale = Scale.of(values, "m")

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from spirillum.arrays import Values
 from spirillum.units import Hz
-from spirillum.view.figures.evidence import Shown, spread
+from spirillum.view.figures.study_view import StudyView, spread
 from spirillum.view.figures.style import COLOURS, Look, Scale, label_of_model, look_of_model
 
 __all__ = [
@@ -39,7 +39,7 @@ _OBSERVED = COLOURS["black"]
 _SHADE = 0.25  # opacity of a band
 _OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
 """Look of the rotor's own friction: no model is drawn so."""
-Draw = Callable[[Axes, Shown, Values], None]
+Draw = Callable[[Axes, StudyView, Values], None]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Row:
     """What a reader has to know, a sentence for the note below the figure."""
 
 
-def grid_rows(shown: Shown) -> list[Row]:
+def grid_rows(shown: StudyView) -> list[Row]:
     """The three rows of the paper's Figs 5 and 6, as far as the study can draw them."""
     if shown.observed:
         return _observed_rows(shown)
@@ -68,7 +68,7 @@ def grid_rows(shown: Shown) -> list[Row]:
     return rows
 
 
-def robot_rows(shown: Shown) -> list[Row]:
+def robot_rows(shown: StudyView) -> list[Row]:
     """The rows for a list of robots."""
     if shown.observed:
         return _observed_rows(shown)
@@ -95,11 +95,11 @@ def draw_curve(
     )
 
 
-def _advance_row(shown: Shown) -> Row:
-    everything = Shown.of(shown.whole)
+def _advance_row(shown: StudyView) -> Row:
+    everything = StudyView.of(shown.whole)
     scale = Scale.of(np.stack([everything.advance_per_turn(model) for model in shown.models]), "m/turn")
 
-    def draw(axes: Axes, part: Shown, x: Values) -> None:
+    def draw(axes: Axes, part: StudyView, x: Values) -> None:
         for model in part.models:
             low, high = part.band("advance_per_radian", model)
             draw_band(axes, x, scale(low * Hz), scale(high * Hz), look_of_model(model), joined=part.grid)
@@ -118,7 +118,7 @@ def draw_band(axes: Axes, x: Values, low: Values, high: Values, look: Look, *, j
     axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=_SHADE, linewidth=4.0, zorder=2)
 
 
-def _own_drive(axes: Axes, part: Shown, x: Values, name: str, scale: Scale) -> None:
+def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: Scale) -> None:
     for model in part.models:
         low, high = part.band(name, model)
         draw_band(axes, x, scale(low), scale(high), look_of_model(model), joined=part.grid)
@@ -127,24 +127,24 @@ def _own_drive(axes: Axes, part: Shown, x: Values, name: str, scale: Scale) -> N
             draw_curve(axes, x, y, look_of_model(model), hollow=number > 0, joined=part.grid)
 
 
-def _own_rate_row(shown: Shown) -> Row:
+def _own_rate_row(shown: StudyView) -> Row:
     what = "motor rate, upper bound" if shown.upper_bound else "motor rate, own drive"
     hertz = Scale(Hz, "Hz")
 
-    def draw(axes: Axes, part: Shown, x: Values) -> None:
+    def draw(axes: Axes, part: StudyView, x: Values) -> None:
         _own_drive(axes, part, x, "motor_rotation_rate", hertz)
 
     tells = "Motor rates are upper bounds: no contact friction." if shown.upper_bound else ""
     return Row(f"{what}\n$\\omega_m$ (Hz)", draw, tells=tells)
 
 
-def bound_row(shown: Shown) -> Row:
+def bound_row(shown: StudyView) -> Row:
     """Forward velocity with what friction is known to be there: an upper bound for a motor's robot."""
     what = "forward velocity\nupper bound" if shown.upper_bound else "forward velocity\nown drive"
     labels = {"friction": list(shown.own_drive_readings)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
 
-    def draw(axes: Axes, part: Shown, x: Values) -> None:
+    def draw(axes: Axes, part: StudyView, x: Values) -> None:
         _own_drive(axes, part, x, "forward_velocity", scale)
         if part.observed:
             seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
@@ -154,7 +154,7 @@ def bound_row(shown: Shown) -> Row:
     return Row(f"{what} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
-def drawn_amplitudes(shown: Shown) -> list[int]:
+def drawn_amplitudes(shown: StudyView) -> list[int]:
     """Places of the amplitudes that have a curve of their own."""
     return spread(shown.whole.sizes["amplitude"], MOST_CURVES if len(shown.models) <= 2 else FEW_CURVES)
 
@@ -165,11 +165,11 @@ def _amplitude_look(number: int, count: int) -> tuple[str, str]:
     return mpl.colors.to_hex(colour), _AMPLITUDE_MARKERS[number % len(_AMPLITUDE_MARKERS)]
 
 
-def _assumed_friction_row(shown: Shown) -> Row:
+def _assumed_friction_row(shown: StudyView) -> Row:
     places = drawn_amplitudes(shown)
     name = "effective_friction_at_assumed_rate"
 
-    def draw(axes: Axes, part: Shown, _x: Values) -> None:
+    def draw(axes: Axes, part: StudyView, _x: Values) -> None:
         rates = np.asarray(part.dataset["assumed_motor_rate"].values, dtype=float)
         order = np.argsort(rates)
         for number, place in enumerate(places):
@@ -217,19 +217,19 @@ def _bars(axes: Axes, x: Values, y: Values, half: Values) -> None:
     )
 
 
-def _observed_rows(shown: Shown) -> list[Row]:
+def _observed_rows(shown: StudyView) -> list[Row]:
     reading = shown.at_rate_reading
     speed = shown.scale("m/s", "observed_forward_velocity", "forward_velocity_at_observed_rate", friction=[reading])
     inferring = [name for name in ("rotor", "paper") if name in shown.readings]
 
-    def velocity(axes: Axes, part: Shown, x: Values) -> None:
+    def velocity(axes: Axes, part: StudyView, x: Values) -> None:
         for model in part.models:
             y = part.values("forward_velocity_at_observed_rate", model=model, friction=reading)
             draw_curve(axes, x, speed(y), look_of_model(model), joined=part.grid)
         seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
         _bars(axes, x, speed(seen), speed(half))
 
-    def rate(axes: Axes, part: Shown, x: Values) -> None:
+    def rate(axes: Axes, part: StudyView, x: Values) -> None:
         seen, half = part.observed_motor_rate()
         for model in part.models:
             y = part.values("motor_rotation_rate_at_observed_rate", model=model, friction=reading)
@@ -252,11 +252,11 @@ def _observed_rows(shown: Shown) -> list[Row]:
     return rows
 
 
-def _inferred_friction_row(shown: Shown, inferring: Sequence[str]) -> Row:
+def _inferred_friction_row(shown: StudyView, inferring: Sequence[str]) -> Row:
     name = "effective_friction_at_observed_rate"
     scale = shown.scale("N m s/rad", name, friction=list(inferring))
 
-    def draw(axes: Axes, part: Shown, x: Values) -> None:
+    def draw(axes: Axes, part: StudyView, x: Values) -> None:
         for model in part.models:
             for number, reading in enumerate(inferring):
                 y = scale(part.values(name, model=model, friction=reading))
@@ -267,7 +267,7 @@ def _inferred_friction_row(shown: Shown, inferring: Sequence[str]) -> Row:
     return Row(f"effective friction\n$B_{{eff}}$ ({scale.unit})", draw, tells=tells)
 
 
-def model_handles(shown: Shown, *, own_drive: bool) -> list[Line2D]:
+def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
     """Legend entries for models, readings and observations.
 
     Args:
@@ -278,7 +278,7 @@ def model_handles(shown: Shown, *, own_drive: bool) -> list[Line2D]:
     return [*_model_entries(shown), *band_handles(shown), *readings, *_observed_entries(shown)]
 
 
-def band_handles(shown: Shown) -> list[Line2D]:
+def band_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the models that have a band."""
     return [
         Line2D(
@@ -288,14 +288,14 @@ def band_handles(shown: Shown) -> list[Line2D]:
     ]
 
 
-def _model_entries(shown: Shown) -> Iterator[Line2D]:
+def _model_entries(shown: StudyView) -> Iterator[Line2D]:
     for model in shown.models:
         look = look_of_model(model)
         line: Any = look.line if shown.grid else "none"
         yield Line2D([], [], color=look.colour, linestyle=line, marker=look.marker, label=label_of_model(model))
 
 
-def _reading_entries(shown: Shown) -> Iterator[Line2D]:
+def _reading_entries(shown: StudyView) -> Iterator[Line2D]:
     for number, reading in enumerate(shown.own_drive_readings):
         yield Line2D(
             [],
@@ -308,12 +308,12 @@ def _reading_entries(shown: Shown) -> Iterator[Line2D]:
         )
 
 
-def _observed_entries(shown: Shown) -> Iterator[Line2D]:
+def _observed_entries(shown: StudyView) -> Iterator[Line2D]:
     if shown.observed:
         yield Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="observed, 95 % interval")
 
 
-def amplitude_handles(shown: Shown) -> list[Line2D]:
+def amplitude_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the curves against the assumed motor rate: amplitudes, models by line, B_m."""
     places = drawn_amplitudes(shown)
     amplitudes = np.asarray(shown.whole["amplitude"].values, dtype=float)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import count, product
 from string import ascii_lowercase
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
@@ -73,14 +73,14 @@ class Sheet:
         rect = (_EDGE, 0.0, 1.0 - 2.0 * _EDGE, 1.0)
         self.figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.06, wspace=0.0, hspace=0.0, rect=rect)
         # One title and one legend find room in a figure; the next ones stand in figures within it.
-        outer = self.figure.subfigures()
+        outer = _within(self.figure)
         left: Any = {"x": 0.0, "ha": "left", "wrap": True}
         outer.suptitle(title, size=11, weight="bold", **left)
         if notes:
             outer.supxlabel("\n".join(notes), size=8, color="#333333", **left)
-        middle = outer.subfigures()
+        middle = _within(outer)
         middle.suptitle(subtitle, size=9, color="#333333", **left)
-        inner = middle.subfigures()
+        inner = _within(middle)
         _add_legend(inner, legend, "outside upper left")
         _add_legend(inner, legend_below, "outside lower left")
         ratios = {"height_ratios": heights}
@@ -108,7 +108,15 @@ class Sheet:
         return self.figure
 
 
-def _add_legend(figure: SubFigure, handles: Sequence[Line2D], place: str) -> None:
+def _within(figure: Figure | SubFigure) -> SubFigure:
+    """A figure within a figure: what its title, legend and notes leave of it."""
+    found: Any = figure.subfigures()
+    return cast("SubFigure", found)
+
+
+def _add_legend(
+    figure: SubFigure, handles: Sequence[Line2D], place: Literal["outside upper left", "outside lower left"]
+) -> None:
     """A legend in as few lines as the width allows."""
     for columns in range(len(handles), 0, -1):
         by_rows = [handle for column in range(columns) for handle in handles[column::columns]]

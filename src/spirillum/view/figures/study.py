@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from spirillum.view.figures.evidence import PaperFigure, Shown, spread
 from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
 from spirillum.view.figures.style import Scale, plain
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def study_figures(dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] 
         For channels of a paper its figures' names, for others `channel-<name>`, with `-part1`, `-part2` where
         wavelengths need several figures; `bound` with the speeds at the upper bound. For a list of robots `robots`.
     """
-    shown = Shown.of(dataset, paper_figures)
+    shown = StudyView.of(dataset, paper_figures)
     if not shown.grid:
         return {"robots": _robots_picture(shown)}
     found: dict[str, Picture] = {}
@@ -78,7 +78,7 @@ def _pages(count: int, most: int) -> list[list[int]]:
     return [list(map(int, page)) for page in np.array_split(places, pages)]
 
 
-def _file_name(shown: Shown, channel: int) -> str:
+def _file_name(shown: StudyView, channel: int) -> str:
     name = str(shown.whole["channel"].values[channel])
     if name in shown.paper_figures:
         return shown.paper_figures[name].file
@@ -93,7 +93,7 @@ def _free_name(name: str, taken: dict[str, Picture]) -> str:
     return free
 
 
-def _channel_title(shown: Shown, channel: int) -> str:
+def _channel_title(shown: StudyView, channel: int) -> str:
     name = plain(str(shown.whole["channel"].values[channel]), 40)
     diameter = np.asarray(shown.whole["channel_diameter"].values, dtype=float)[[channel]]
     if not np.isfinite(diameter[0]):
@@ -102,7 +102,7 @@ def _channel_title(shown: Shown, channel: int) -> str:
     return f"{name[:1].upper()}{name[1:]} channel, $D_{{ch}}$ = {diameter[0] / scale.factor:.4g} {scale.unit}"
 
 
-def _left_out(shown: Shown, wavelengths: int, channels: int) -> str:
+def _left_out(shown: StudyView, wavelengths: int, channels: int) -> str:
     """A sentence on what the figures leave out; empty if nothing."""
     sizes = shown.whole.sizes
     parts = []
@@ -112,10 +112,10 @@ def _left_out(shown: Shown, wavelengths: int, channels: int) -> str:
         parts.append(f"{MOST_TAILS} of {sizes['amplitude']} amplitudes")
     if channels < sizes["channel"]:
         parts.append(f"{channels} of {sizes['channel']} channels")
-    return f"Shown: {', '.join(parts)}; the dataset holds all." if parts else ""
+    return f"StudyView: {', '.join(parts)}; the dataset holds all." if parts else ""
 
 
-def _channel_picture(shown: Shown, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:
+def _channel_picture(shown: StudyView, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:
     name = str(shown.whole["channel"].values[channel])
     title = _channel_title(shown, channel)
     if name in shown.paper_figures:
@@ -137,7 +137,7 @@ def _channel_picture(shown: Shown, channel: int, wavelengths: list[int], page: s
 
 
 def _draw_channel(
-    shown: Shown,
+    shown: StudyView,
     channel: int,
     wavelengths: list[int],
     amplitudes: list[int],
@@ -201,7 +201,7 @@ def _finish_row(panels: Sequence[Axes], row: Row) -> None:
         panels[0].set_ylim(0.0, max(high, 1.08 * float(values.max()), low + 1e-300))
 
 
-def _bound_picture(shown: Shown) -> Picture:
+def _bound_picture(shown: StudyView) -> Picture:
     channels = spread(shown.whole.sizes["channel"], MOST_CHANNELS)
     wavelengths = spread(shown.whole.sizes["wavelength"], MOST_COLUMNS)
     bound = shown.upper_bound
@@ -233,7 +233,9 @@ def _bound_picture(shown: Shown) -> Picture:
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
 
 
-def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title: str, notes: Sequence[str]) -> Figure:
+def _draw_bound(
+    shown: StudyView, channels: list[int], wavelengths: list[int], title: str, notes: Sequence[str]
+) -> Figure:
     speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
     legend = [*model_handles(shown, own_drive=True), *_paper_entry(shown, channels, speed_scale)]
     sheet = Sheet(
@@ -270,7 +272,7 @@ def _draw_bound(shown: Shown, channels: list[int], wavelengths: list[int], title
     return sheet.finished()
 
 
-def _paper_entry(shown: Shown, channels: Sequence[int], scale: Scale) -> list[Line2D]:
+def _paper_entry(shown: StudyView, channels: Sequence[int], scale: Scale) -> list[Line2D]:
     """Legend entry of the speeds behind the paper's largest Reynolds numbers."""
     found = {channel: shown.paper_speed(channel) for channel in channels}
     words = [
@@ -284,7 +286,7 @@ def _paper_entry(shown: Shown, channels: Sequence[int], scale: Scale) -> list[Li
     return [Line2D([], [], color="black", linestyle=_DASHED, linewidth=1.0, label=label)]
 
 
-def _robots_picture(shown: Shown) -> Picture:
+def _robots_picture(shown: StudyView) -> Picture:
     count = shown.whole.sizes["robot"]
     places = spread(count, MOST_ROBOTS)
     rows = robot_rows(shown)
@@ -292,7 +294,7 @@ def _robots_picture(shown: Shown) -> Picture:
     notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
     notes.append(shown.unanswered())
     if len(places) < count:
-        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
+        notes.append(f"StudyView: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
     notes = [note for note in notes if note]
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
     alternative = f"{len(rows)} panels with a point for each of {len(places)} robots: {what}. {shown.source_line}"
@@ -300,7 +302,7 @@ def _robots_picture(shown: Shown) -> Picture:
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
 
 
-def _draw_robots(shown: Shown, places: list[int], title: str, rows: Sequence[Row], notes: Sequence[str]) -> Figure:
+def _draw_robots(shown: StudyView, places: list[int], title: str, rows: Sequence[Row], notes: Sequence[str]) -> Figure:
     names = [plain(str(name), 28) for name in shown.whole["robot"].values[places]]
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)

@@ -1,4 +1,4 @@
-"""What of a study's dataset goes into its figures, and what has to be said beside it."""
+"""A study as its figures read it: values and scales, readings, bands, and what a figure has to say about them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from spirillum.view.figures.style import Scale, plain
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NOTHING_MEASURED", "PaperFigure", "Shown", "spread"]
+__all__ = ["NOTHING_MEASURED", "PaperFigure", "StudyView", "spread"]
 
 NOTHING_MEASURED = "Computed only: nothing in this figure is measured."
 
@@ -44,8 +44,8 @@ def spread(count: int, most: int) -> list[int]:
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A study's dataset, or a part of it, as the figures read it."""
+class StudyView:
+    """A study's dataset, or a part of it, as figures read it."""
 
     dataset: xr.Dataset
     whole: xr.Dataset
@@ -54,11 +54,11 @@ class Shown:
     """Figures of a paper by channel, for a study that repeats it."""
 
     @classmethod
-    def of(cls, dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> Shown:
+    def of(cls, dataset: xr.Dataset, paper_figures: Mapping[str, PaperFigure] | None = None) -> StudyView:
         """All of a study; `paper_figures` by channel, if it repeats a paper's."""
         return cls(dataset, dataset, paper_figures or {})
 
-    def part(self, **places: int | Sequence[int]) -> Shown:
+    def part(self, **places: int | Sequence[int]) -> StudyView:
         """A part of the study, by places along dimensions."""
         return replace(self, dataset=self.dataset.isel(dict(places.items())))
 

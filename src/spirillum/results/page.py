@@ -1,0 +1,74 @@
+"""What reports have in common: figures drawn into a folder and embedded in a page from a template."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from spirillum.files import output_folder
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.style import save
+
+__all__ = ["EmbeddedPicture", "data_uri", "draw_pictures", "page"]
+
+
+@dataclass(frozen=True)
+class EmbeddedPicture:
+    """A figure as a page shows it."""
+
+    name: str
+    title: str
+    caption: str
+    alternative: str
+    source: str
+    """The picture itself as a data URI."""
+
+    @property
+    def files(self) -> tuple[str, str]:
+        """Names of its files, as seen from the folder of the report."""
+        return f"figures/{self.name}.png", f"figures/{self.name}.svg"
+
+
+def draw_pictures(
+    pictures: Mapping[str, Picture], folder: Path, tell: Callable[[str, int], None], *, largest_svg: int = 0
+) -> list[EmbeddedPicture]:
+    """Write `figures/` (PNG and SVG), each file whole or not at all.
+
+    Args:
+        pictures: figures by the names of their files.
+        folder: existing folder of the report.
+        tell: called with the name of the next figure and the number of figures drawn.
+        largest_svg: a vector picture up to this size is embedded as it is, bytes; others as pixels.
+
+    Raises:
+        InputError: if the folder cannot be written to.
+    """
+    figures = output_folder(folder / "figures")
+    found = []
+    for done, (name, picture) in enumerate(pictures.items()):
+        tell(name, done)
+        png, svg = save(picture.figure(), figures / name)
+        if svg.stat().st_size <= largest_svg:
+            source = data_uri(svg.read_bytes(), "svg+xml")
+        else:
+            source = data_uri(png.read_bytes(), "png")
+        found.append(EmbeddedPicture(name, picture.title, picture.caption, picture.alternative, source))
+    return found
+
+
+def data_uri(picture: bytes, kind: str) -> str:
+    """A picture as the source of an image in a page; `kind` as in `image/kind`."""
+    return f"data:image/{kind};base64,{base64.b64encode(picture).decode('ascii')}"
+
+
+def page(template: str, **names: Any) -> str:
+    """A page from a template of this package; text is escaped, and every name of the template has to be given."""
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    text = (files("spirillum.results") / template).read_text(encoding="utf-8")
+    return environment.from_string(text).render(**names)
