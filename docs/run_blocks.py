@@ -1,12 +1,13 @@
 """Run the commands and the interactive Python of README.md and docs/*.md, and compare with what stands there.
 
-    python docs/run_blocks.py [--write] [PAGE...]
+    python docs/run_blocks.py [--write] [--slow] [PAGE...]
 
 In a ```console block every line that starts with `$ ` is run: `spirillum ...`, or `echo $?` for the last exit code.
 Commands have to succeed unless `echo $?` follows. A line `...` stands for any lines. A block that shows no output at
 all is filled by --write, which also renews outputs without `...`. In a ```pycon block each `>>>` is run as a doctest.
 A ```toml or ```text block whose first line is `# NAME.toml` or `# NAME.csv` is a file that the commands of the page
-find. All blocks of a page share one temporary folder.
+find. All blocks of a page share one temporary folder. A block below a line `<!-- slow -->` runs only with --slow or
+--write; no later block of its page may depend on it.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parent.parent
 WIDTH = "100"
-_FENCE = re.compile(r"^```(console|pycon|toml|text)\n(.*?)^```$", re.M | re.S)
+_FENCE = re.compile(r"^(<!-- slow -->\n)?```(console|pycon|toml|text)\n(.*?)^```$", re.M | re.S)
 _FILE = re.compile(r"# ([\w-]+\.(?:toml|csv))\b")
 
 
@@ -107,21 +108,23 @@ def run_python(block: str, names: dict[str, Any], page: Path, problems: list[str
         problems.append(report.getvalue())
 
 
-def run_page(page: Path) -> tuple[list[str], str]:
-    """Problems of a page, and its text with outputs renewed."""
+def run_page(page: Path, *, slow: bool = False) -> tuple[list[str], str]:
+    """Problems of a page, and its text with outputs renewed; without its slow blocks unless they are asked for."""
     text = page.read_text(encoding="utf-8")
     problems: list[str] = []
     names: dict[str, Any] = {}
 
     def run(found: re.Match[str]) -> str:
-        kind, block = found.groups()
+        mark, kind, block = found.groups()
+        if mark and not slow:
+            return found[0]
         if kind == "console":
             block = run_console(block, problems)
         elif kind == "pycon":
             run_python(block, names, page, problems)
         elif named := _FILE.match(block):
             Path(named[1]).write_text(block, encoding="utf-8")
-        return f"```{kind}\n{block}```"
+        return f"{mark or ''}```{kind}\n{block}```"
 
     kept = {name: os.environ.get(name) for name in ("COLUMNS", "MPLBACKEND")}
     os.environ |= {"COLUMNS": WIDTH, "MPLBACKEND": "Agg"}
@@ -143,7 +146,7 @@ def main(arguments: list[str]) -> int:
     chosen = [Path(name).resolve() for name in arguments if not name.startswith("--")] or pages()
     wrong = 0
     for page in chosen:
-        problems, renewed = run_page(page)
+        problems, renewed = run_page(page, slow=write or "--slow" in arguments)
         wrong += bool(problems)
         for problem in problems:
             sys.stdout.write(f"{page.name}: {problem}\n")

@@ -1,4 +1,4 @@
-"""Array shapes in annotations are checked while tests run; robots that many tests share."""
+"""Settings of all tests, and robots that many of them share."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -8,25 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import Phase, settings
-from jaxtyping import install_import_hook
-
-HOOKED = [
-    "spirillum.exports",
-    "spirillum.dynamics",
-    "spirillum.fields",
-    "spirillum.fluid",
-    "spirillum.swimming",
-    "spirillum.robot.geometry",
-    "spirillum.robot.links",
-    "spirillum.robot.mesh",
-    "spirillum.robot.surface",
-]
-# Before anything imports these modules: the hook decorates their functions as they are read.
-install_import_hook(HOOKED, "beartype.beartype")
 
 # Without the phase that explains a failure: it can take a minute.
 phases = (Phase.explicit, Phase.generate, Phase.shrink)
-settings.register_profile("spirillum", deadline=None, derandomize=True, database=None, phases=phases)
+settings.register_profile("spirillum", deadline=None, derandomize=True, database=None, phases=phases, max_examples=50)
 settings.load_profile("spirillum")
 
 

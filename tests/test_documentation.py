@@ -3,7 +3,6 @@
 import importlib
 import importlib.util
 import re
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -36,6 +35,7 @@ def _loaded(path: Path) -> ModuleType:
 
 BLOCKS = _loaded(DOCS / "run_blocks.py")
 RUNNABLE = [page for page in BLOCKS.pages() if re.search(r"^```(console|pycon)$", page.read_text("utf-8"), re.M)]
+WITH_SLOW = [page for page in RUNNABLE if "<!-- slow -->" in page.read_text("utf-8")]
 WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
 
 
@@ -54,13 +54,21 @@ def _options(path: str) -> set[str]:
     return {name for parameter in COMMANDS[path].params for name in parameter.opts} | {"--help", "-h"}
 
 
+def _compare(page: Path, *, slow: bool) -> None:
+    problems, _ = BLOCKS.run_page(page, slow=slow)
+    said = f"\n\nIf the new output is meant: python docs/run_blocks.py --write {page.name}"
+    assert not problems, "\n\n".join(problems) + said
+
+
 @pytest.mark.parametrize("page", RUNNABLE, ids=lambda path: path.stem)
 def test_page_shows_what_its_commands_and_python_print(page: Path) -> None:
-    # In a process of its own: as users run it, without the checks of shapes that tests put into every function.
-    command = [sys.executable, "-W", "error", str(DOCS / "run_blocks.py"), str(page)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    said = f"{done.stdout}{done.stderr}\n\nIf the new output is meant: python docs/run_blocks.py --write {page.name}"
-    assert done.returncode == 0, said
+    _compare(page, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", WITH_SLOW, ids=lambda path: path.stem)
+def test_page_with_its_slow_blocks_shows_what_they_print(page: Path) -> None:
+    _compare(page, slow=True)
 
 
 def test_readme_opens_with_a_picture_and_the_two_commands() -> None:
@@ -109,11 +117,22 @@ def test_reference_lists_every_public_name() -> None:
 def test_reference_covers_every_module_of_the_layers_it_names() -> None:
     text = "\n".join(page.read_text("utf-8") for page in (DOCS / "api").glob("*.md"))
     documented = set(re.findall(r"automodule:: (\S+)", text))
-    layers = ("robot", "hydrodynamics", "motion", "measurement", "calibration", "studies")
+    layers = (
+        "robot",
+        "fluid",
+        "fitted",
+        "swimming",
+        "fields",
+        "dynamics",
+        "measurement",
+        "calibration",
+        "studies",
+    )
+    source = ROOT / "src"
     modules = {
-        f"spirillum.{layer}.{path.stem}"
+        ".".join(path.relative_to(source).with_suffix("").parts)
         for layer in layers
-        for path in (ROOT / "src" / "spirillum" / layer).glob("*.py")
+        for path in (source / "spirillum" / layer).rglob("*.py")
         if path.stem not in ("__init__", "fields")
     }
     assert modules - documented == set()

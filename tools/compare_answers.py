@@ -31,7 +31,7 @@ def commands(page: Path) -> Iterator[tuple[str, str]]:
     """The console commands of a page, and the files that it writes for them."""
     from run_blocks import _FENCE, _FILE, steps
 
-    for kind, block in _FENCE.findall(page.read_text(encoding="utf-8")):
+    for _, kind, block in _FENCE.findall(page.read_text(encoding="utf-8")):
         if kind == "console":
             for step in steps(block):
                 if step.command.startswith("spirillum "):

@@ -48,9 +48,9 @@ def test_a_wrong_model_says_by_how_much_it_misses(made: Callable[..., Path]) -> 
 def test_the_answer_takes_less_than_a_second(made: Callable[..., Path]) -> None:
     path = made()
     sp.calibrate(path, PRESETS, method="least-squares")
-    start = time.perf_counter()
+    start = time.process_time()  # other programs on the machine do not count
     sp.calibrate(path, PRESETS, method="least-squares")
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start < 1.0
 
 
 def test_a_direction_that_nothing_sees_is_named_and_keeps_the_width_of_its_prior(made: Callable[..., Path]) -> None:

@@ -118,6 +118,7 @@ def test_log_likelihood_is_that_of_a_multivariate_normal(made: Callable[..., Pat
     assert density.by_robot(z)[0, place] == pytest.approx(joint + scatter, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_ranks_of_the_truth_are_uniform_and_intervals_hold_it() -> None:
     """Simulation-based calibration, small: truths from the prior, data from the model, ranks in the posterior.
 
