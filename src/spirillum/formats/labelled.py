@@ -29,7 +29,7 @@ class Labelled(NamedTuple):
     attributes: Mapping[str, Any]
 
     def dataset(self) -> xr.Dataset:
-        """The same as xarray's."""
+        """As an `xarray.Dataset`."""
         import xarray as xr
 
         return xr.Dataset(self.data, coords=self.coordinates, attrs=self.attributes)

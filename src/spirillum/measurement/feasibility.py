@@ -32,9 +32,9 @@ _WAVE_ERROR = 0.1
 _STRIPE_ERROR = math.radians(0.2)
 """Usual size of errors that come back with every stripe, rad."""
 _TOGETHER = 4.0
-"""Frames whose errors hang together, of position and wire."""
+"""Frames over which errors of position and wire are correlated."""
 _EDGE_TOGETHER = 20.0
-"""The same of the stripes' edges."""
+"""Frames over which errors of the stripes' edges are correlated."""
 _NORMAL = 1.959964
 _FEWEST = 4
 """Fewest frames in view that give a rate."""

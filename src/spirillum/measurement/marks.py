@@ -65,7 +65,7 @@ class Ruled:
 
     @classmethod
     def plain(cls, scale: Scale, size: tuple[int, int], *, leftward: bool) -> Ruled:
-        """The same scale everywhere: no perspective, no refraction."""
+        """One scale for the whole picture: no perspective, no refraction."""
         sign = -1.0 if leftward else 1.0
 
         def points(pixels: Samples) -> Samples:
@@ -87,7 +87,7 @@ class Marks:
     pixels: Samples
     """Pixel of the body's mid-length, (k, 2)."""
     position: Samples
-    """The same in lengths, m, (k, 2)."""
+    """Position (x, y) of readings in lengths, m, (k, 2)."""
     body_angle: Samples
     """rad, (k,)."""
     tail_phase: Samples

@@ -20,9 +20,9 @@ from spirillum.measurement.marks import (
     read_marks,
     track_of_marks,
 )
-from spirillum.measurement.sight import Sighted, sighted
 from spirillum.measurement.summary import Summary, compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
+from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.vision.flag import Flag
@@ -189,13 +189,13 @@ def measured_trial(
     path, name, marks = asked.videos[number], asked.names[number], asked.readings[number]
     if asked.tracking and asked.track is None:
         track = follow(video, asked.setup, asked.robot, folder=asked.folder, progress=progress, on_frame=on_frame)
-        ruled = sighted(path, asked.setup, asked.folder).ruled if _in_pixels(marks) else None
+        ruled = untracked(path, asked.setup, asked.folder).ruled if _in_pixels(marks) else None
     else:
-        sight = sighted(path, asked.setup, asked.folder, needed=asked.track is not None or _in_pixels(marks))
-        ruled = sight.ruled
+        seen = untracked(path, asked.setup, asked.folder, needed=asked.track is not None or _in_pixels(marks))
+        ruled = seen.ruled
         if marks is not None and ruled is not None:
             check_pixels(marks, ruled.size)
-        track = replace(_of_tables(path, sight, marks, asked), words=sight.words)
+        track = replace(_of_tables(path, seen, marks, asked), words=seen.words)
         marks = marks if asked.track is not None else None
     read = None  # no frame was corrected
     if marks is not None:
@@ -205,16 +205,16 @@ def measured_trial(
     return trial_of(track, asked.robot, name, read)
 
 
-def _of_tables(path: Path, sight: Sighted, marks: Marks | None, asked: Asked) -> Track:
+def _of_tables(path: Path, seen: Untracked, marks: Marks | None, asked: Asked) -> Track:
     if asked.track is not None:
-        assert sight.ruled is not None  # noqa: S101 - asked for
-        assert sight.time_of is not None  # noqa: S101
-        return read_track(asked.track, asked.setup, path.name, sight.ruled, sight.time_of)
+        assert seen.ruled is not None  # noqa: S101 - asked for
+        assert seen.time_of is not None  # noqa: S101
+        return read_track(asked.track, asked.setup, path.name, seen.ruled, seen.time_of)
     if marks is None:
         raise InputError(f"{path} has no readings by hand; allowed: some, or tracking")
-    check_times(marks, sight.duration)
-    track = track_of_marks(marks, asked.setup, path.name, sight.ruled, sight.time_of)
-    if sight.seen:
+    check_times(marks, seen.duration)
+    track = track_of_marks(marks, asked.setup, path.name, seen.ruled, seen.time_of)
+    if seen.seen:
         return track
     unseen = Flag("no-video", f"{path.name} cannot be opened: the readings are taken as they are")
     return replace(track, flags=(*track.flags, unseen))

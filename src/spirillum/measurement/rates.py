@@ -1,4 +1,4 @@
-"""The rate of a noisy series over true times, with an interval that knows that its errors hang together.
+"""The rate of a noisy series over true times, with an interval that allows for autocorrelated errors.
 
 A straight line is fitted by generalised least squares. Its errors are three: white noise of each frame; a part with a
 memory (Ornstein and Uhlenbeck's, in discrete time an autoregression of first order) of unknown share and unknown time;
@@ -69,7 +69,7 @@ class Rate:
     steady: bool
     """Whether the rate is the same all along, as far as can be seen."""
     memory: float
-    """Time over which errors hang together, s: the likeliest one; 0 for white noise."""
+    """Correlation time of the errors, s: the likeliest one; 0 for white noise."""
     residual: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """The series less the fitted line, (n,); NaN where it was not measured or left out."""
 

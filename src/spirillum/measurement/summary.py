@@ -27,7 +27,7 @@ class Summary:
     quantities: Mapping[str, Measured]
     """By the names of `MEASURED`."""
     counts: Mapping[str, int]
-    """Trials that each of them rests on."""
+    """Number of trials of each mean."""
     trials: int
     """All trials."""
     scale_uncertainty: float
@@ -75,7 +75,7 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:
-    """The same trials; one that does not fit in with the others, or is a copy, carries a flag. None is dropped."""
+    """The trials, none dropped; an outlier among them, or a copy of another one, carries a flag."""
     found = [_told_apart(trial, trials[:place]) for place, trial in enumerate(trials)]
     for name in RATE_NAMES:
         worst = outlying_trial([trial.quantities[name].value for trial in trials])

@@ -57,13 +57,13 @@ _PHASE_ERROR = math.radians(1.0)
 _SLOW_PIXELS = 0.01
 """Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
 _SLOW_BARE = 0.1
-"""The same of a body without stripes, which its nose alone places along the channel; to 0.12 on rendered films."""
+"""Slow error of the place of a body without stripes, pixels: its nose alone places it; to 0.12 on rendered films."""
 _SLOW_ANGLE = math.radians(0.1)
-"""The same of an angle, rad; at least the standard error of a frame, of which glare makes a slow one."""
+"""Slow error of an angle, rad; at least the standard error of a frame, which glare makes slow."""
 _PLACE = 0.15
 """Standard error of a place itself, which does not matter to a speed, pixels: of outline, light and lens."""
 _HEADING = math.radians(0.2)
-"""The same of the heading, rad, for a body that is `_LONG` pixels long."""
+"""Systematic error of the heading, rad, of a body that is `_LONG` pixels long."""
 _LONG = 100.0
 _FEW_TURNS = 2.0
 _DEGREE = 5
@@ -127,7 +127,7 @@ class Trial:
         return self.track.video
 
     def flagged(self, flag: Flag) -> Trial:
-        """The same trial with one more flag."""
+        """A copy with one more flag."""
         return replace(self, flags=(*self.flags, flag))
 
     def to_dict(self) -> dict[str, Any]:
@@ -264,7 +264,7 @@ def _slow_angles(track: Track, name: str) -> list[float]:
     """Standard errors of a rotation rate from slow errors of the angles that it comes from, rad/s."""
     errors = {"body_rotation_rate": (track.body_angle_error,), "tail_rotation_rate": (track.tail_phase_error,)}
     both = (track.body_angle_error, track.tail_phase_error)
-    read = any(flag.name == BY_HAND for flag in track.flags)  # an eye's errors do not hang together
+    read = any(flag.name == BY_HAND for flag in track.flags)  # errors of readings by eye are independent
     return [_slow(track, _SLOW_ANGLE if read else _usual(error, _SLOW_ANGLE)) for error in errors.get(name, both)]
 
 

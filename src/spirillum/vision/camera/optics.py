@@ -62,7 +62,7 @@ class Optics:
     k1: float = 0.0
     """Radial distortion: distances r = tan(angle) from the line of sight become r (1 + k1 r^2 + k2 r^4)."""
     k2: float = 0.0
-    """The same, next order."""
+    """Radial distortion of the next order, see `k1`."""
     leftward: bool = False
     """Whether x points to the left in the picture."""
 
@@ -113,7 +113,7 @@ class Optics:
         return float(2.0 * step / np.linalg.norm(np.diff(self.pixels(ends), axis=0)))
 
     def moved(self, changes: Mapping[str, float]) -> Self:
-        """The same camera with other numbers."""
+        """A copy with other numbers."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
 

@@ -18,7 +18,7 @@ _FEWEST = 8
 _WINDOW = 1.5
 """Width (standard deviation) of the window in which a phase is found, over the lines' distance."""
 _ROWS = 2.0
-"""The same across, pixels."""
+"""Standard deviation of that window across the rows, pixels."""
 _COHERENT = 0.35
 """Least share of a place's contrast that is in the ruler's wave."""
 _STRONG = 0.6

@@ -1,4 +1,4 @@
-"""How large lengths are in the picture: the camera is fitted to the ruler, and what it rests on is propagated."""
+"""How large lengths are in the picture: the camera is fitted to the ruler, and its uncertainty is propagated."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from spirillum.vision.setup import Setup
 __all__ = ["Scale", "Sight", "fitted_camera", "given_camera", "with_source"]
 
 _EXPECTED_TILT = 0.1
-"""Standard deviation of the camera's tilts before anything was seen, rad."""
+"""Prior standard deviation of the camera's tilts, rad."""
 _EXPECTED_BEND = 0.1
-"""The same for the lens's k1, where no checkerboard tells."""
+"""Prior standard deviation of the lens's k1, where no checkerboard tells."""
 _LINE_ERROR = 0.1
 """Distance of lines from the fit beyond which they count less, pixels."""
 _TOGETHER = 12.0
@@ -218,7 +218,7 @@ class _Fit:
 
 
 def _uncertain(setup: Setup) -> dict[str, float]:
-    """Relative standard uncertainty of each number that the scale rests on; heights relative to the camera's."""
+    """Relative standard uncertainty of each number behind the scale; heights relative to the camera's."""
     markers, tank, camera = setup.markers, setup.tank, setup.camera
     found = {"camera.height": camera.height_uncertainty / camera.height}
     if markers.spacing is not None:

@@ -36,7 +36,7 @@ _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002
 _COUNTS = 13, 9, 5
 
 LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
-"""What rests on the scale."""
+"""Quantities that are proportional to the scale."""
 
 
 def clearness(found: Sequence[Sequence[Candidate]]) -> float:
@@ -78,7 +78,7 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
 
 
 def resized(body: BodyFinder, size: float) -> BodyFinder:
-    """The same body in front of a camera that shows everything larger; it has not learnt yet.
+    """A finder of this body in front of a camera that shows everything larger; it has not learnt yet.
 
     Args:
         body: the body.

@@ -1,8 +1,8 @@
-"""From angles within a period to angles that go on, and what no camera can tell.
+"""Phase unwrapping: from angles modulo a period to continuous angles, with a watch for aliasing.
 
-Frames taken at even times show a rate, or one that is greater by any number of periods a frame: nothing in them tells
-which. The smallest one is taken. What can betray a faster one is looked for: a step from frame to frame near half a
-period, steps without order, times that are not even, and a body that turns with its tail instead of against it.
+At a constant frame rate, rates that differ by whole periods a frame cannot be told apart (aliasing). The smallest is
+taken. Signs of a faster one are looked for: a step from frame to frame near half a period, steps without order, uneven
+times that contradict it, and a body that turns with its tail instead of against it.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def nyquist(setup: Setup, robot: Robot, frames_per_second: float) -> Resolvable:
 def unwrapped(
     time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body"
 ) -> tuple[Samples, tuple[Flag, ...]]:
-    """Angles that go on over many periods, NaN where they are unknown or stray, and flags.
+    """Continuous angles, NaN where they are unknown or outliers, and flags.
 
-    Every angle goes to the turn that is nearest to where the ones before lead, by their times, over gaps too.
+    Each angle is put into the turn nearest to its prediction from the ones before and their times, over gaps too.
 
     Args:
         time: time of each frame, s, (n,).
@@ -96,7 +96,7 @@ def unwrapped(
 
 
 def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples) -> Samples:
-    """How well the steps agree with each rate: mean cosine of what is left of them, 1 at best."""
+    """Mean cosine of the steps' residuals at each rate, 1 at best."""
     steps, spans = np.diff(a), np.diff(t)
     near = (spans > 0) & (spans < 3.5 * dt)
     turns = (steps[near] - rates[:, None] * spans[near]) / period
@@ -104,7 +104,7 @@ def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples)
 
 
 def _rate(t: Samples, a: Samples, period: float, dt: float) -> tuple[float, float]:
-    """The rate within half a period a frame by which most steps agree, and how well they do."""
+    """The rate within half a period a frame of the largest mean cosine, and that cosine."""
     rates = np.linspace(-0.5, 0.5, 241) * period / dt
     length = _resultant(t, a, period, dt, rates)
     best = rates[int(np.argmax(length))]
@@ -134,33 +134,33 @@ def _better_alias(t: Samples, a: Samples, period: float, dt: float, rate: float)
 def _followed(
     t: Samples, a: Samples, error: Samples, period: float, dt: float
 ) -> tuple[Samples, tuple[float, float] | None]:
-    """Each angle in the turn nearest to where the ones before lead; NaN for stray ones. Also the first lost gap."""
+    """Each angle in the turn nearest to its prediction (an alpha-beta filter), NaN for outliers; the first lost gap."""
     values = np.full(a.size, np.nan)
-    stray = 0
+    outliers = 0
     lost = None
     rate = _rate(t[: UNWRAPPING.start + 1], a[: UNWRAPPING.start + 1], period, dt)[0]
-    state, at = float(a[_first_good(t, a, period, rate)]), float(t[_first_good(t, a, period, rate)])
     begin = _first_good(t, a, period, rate)
+    state, at = float(a[begin]), float(t[begin])
     for k in range(begin, a.size):
         span = float(t[k]) - at
-        ahead = state + rate * span
-        value = float(a[k] + period * np.round((ahead - a[k]) / period))
+        expected = state + rate * span
+        value = float(a[k] + period * np.round((expected - a[k]) / period))
         if span > 10.0 * dt and abs(rate) * span * UNWRAPPING.drift > 0.5 * period and lost is None:
             lost = (at, float(t[k]))
-        if abs(value - ahead) > UNWRAPPING.outlier * period and k > begin:
-            stray += 1
-            if stray >= UNWRAPPING.lost:
+        if abs(value - expected) > UNWRAPPING.outlier * period and k > begin:
+            outliers += 1
+            if outliers >= UNWRAPPING.lost:
                 near = slice(max(0, k - UNWRAPPING.lost + 1), min(a.size, k + UNWRAPPING.start))
                 rate = _rate(t[near], a[near], period, dt)[0]
-                state, at, stray = value, float(t[k]), 0
+                state, at, outliers = value, float(t[k]), 0
                 values[k] = value
             continue
-        stray = 0
+        outliers = 0
         values[k] = value
         gain = UNWRAPPING.gain if np.isfinite(error[k]) and error[k] < 0.1 * period else 0.2
         if span > 0:
-            rate += UNWRAPPING.rate_gain * gain / UNWRAPPING.gain * (value - ahead) / max(span, dt)
-        state, at = ahead + gain * (value - ahead), float(t[k])
+            rate += UNWRAPPING.rate_gain * gain / UNWRAPPING.gain * (value - expected) / max(span, dt)
+        state, at = expected + gain * (value - expected), float(t[k])
     return values, lost
 
 

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 
 def ahead(items: Iterator[T], count: int) -> Iterator[T]:
-    """The same items, taken by a thread of its own before they are asked for.
+    """Items of an iterable, taken by a thread of its own before they are asked for.
 
     Args:
         items: where they come from; what it raises is raised where the items are asked for.

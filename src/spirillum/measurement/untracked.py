@@ -14,11 +14,11 @@ from spirillum.measurement.marks import Ruled
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Video, open_video
 
-__all__ = ["Sighted", "sighted"]
+__all__ = ["Untracked", "untracked"]
 
 
 @dataclass(frozen=True)
-class Sighted:
+class Untracked:
     """Scale and times of a video without tracking."""
 
     ruled: Ruled | None
@@ -33,7 +33,7 @@ class Sighted:
     """Whether there was a video to open."""
 
 
-def sighted(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Sighted:
+def untracked(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> Untracked:
     """Scale and times of a video.
 
     Args:
@@ -53,17 +53,17 @@ def sighted(path: Path, setup: Setup, folder: Path, *, needed: bool = True) -> S
     except InputError:
         if needed:
             raise
-        return Sighted(None, None if rate is None else _at(rate), seen=False)
+        return Untracked(None, None if rate is None else _at(rate), seen=False)
     times = _times(video, rate)
     if not needed:
-        return Sighted(None, times, video.words, video.duration)
+        return Untracked(None, times, video.words, video.duration)
     found, video = scale_of(video, setup, folder=folder)
     optics = found.optics
 
     def points(pixels: Samples) -> Samples:
         return np.asarray((optics.points(pixels, optics.axis_height) - optics.origin)[:, :2])
 
-    return Sighted(Ruled(found.scale, video.size, points), times, video.words, video.duration)
+    return Untracked(Ruled(found.scale, video.size, points), times, video.words, video.duration)
 
 
 def _at(rate: float) -> Callable[[Samples], Samples]:
