@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from spirillum.answer import envelope, quantity
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
@@ -17,7 +18,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 __all__ = ["FULL_MODELS", "joint_friction", "sidecar_of"]
 
 FULL_MODELS = ("rft", "slender")
-"""Models that know the whole 12x12 in unbounded fluid, for any motion of the robot."""
+"""Models that give the whole 12x12 matrix in unbounded fluid, for any motion of the robot."""
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
 _CONVENTION = (
@@ -33,6 +34,18 @@ _TURNING = (
 )
 
 
+class _Resistance(NamedTuple):
+    """The resistance of both links in unbounded fluid."""
+
+    matrix: Samples
+    """(12, 12)."""
+    error: Any
+    """Stated error of the model."""
+    references: list[str]
+    """Sources of the model."""
+    warnings: list[str]
+
+
 def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
     """Masses, joint, buoyancy and 12x12 resistance of a robot, SI.
 
@@ -44,26 +57,13 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
     Raises:
         InputError: for another model, or a robot outside the model's domain.
     """
-    if model not in FULL_MODELS:
-        find_swimmer_model(model)
-        raise InputError(
-            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
-            f"{', '.join(FULL_MODELS)}"
-        )
-    chosen, batch = find_swimmer_model(model), RobotBatch.of(robot)
-    outside = broken(chosen.domain(batch))
-    if outside:
-        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
-    matrix = chosen.resistance(batch, np.zeros(1))[0]
-    warnings = [limit.sentence() for limit in broken(chosen.cautions(batch))]
-    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
-        warnings.append(f"model '{model}' leaves the coupling out")
+    resistance = _resistance(robot, model)
     links = links_of(robot)
     content = {
         "robot": robot.name,
         "model": model,
-        "known_error": chosen.stated_error(robot.model),
-        "references": list(chosen.references),
+        "known_error": resistance.error,
+        "references": resistance.references,
         "viscosity": quantity(robot.fluid.viscosity, "Pa s"),
         "density": quantity(robot.fluid.density, "kg/m^3"),
         "gravity": quantity([0.0, 0.0, -STANDARD_GRAVITY], "m/s^2"),
@@ -75,11 +75,34 @@ def sidecar_of(robot: Robot, model: str, phase: float) -> dict[str, Any]:
             "friction": quantity(joint_friction(robot), "N m s/rad"),
         },
         "links": {"body": _link(links.body), "rotor": _link(links.rotor)},
-        "matrix": {**quantity(matrix, ""), "unit": _UNITS},
+        "matrix": {**quantity(resistance.matrix, ""), "unit": _UNITS},
         "convention": _CONVENTION,
         "turning": _TURNING,
     }
-    return envelope("links", content, warnings)
+    return envelope("links", content, resistance.warnings)
+
+
+def _resistance(robot: Robot, model: str) -> _Resistance:
+    """The resistance by a model that knows all of it.
+
+    Raises:
+        InputError: for another model, or a robot outside the model's domain.
+    """
+    chosen = find_swimmer_model(model)
+    if model not in FULL_MODELS:
+        raise InputError(
+            f"model = {model!r} does not give the whole resistance in unbounded fluid; allowed: "
+            f"{', '.join(FULL_MODELS)}"
+        )
+    batch = RobotBatch.of(robot)
+    outside = broken(chosen.domain(batch))
+    if outside:
+        raise InputError(f"{robot.name} with model '{model}': {outside[0].sentence()}")
+    matrix = chosen.resistance(batch, np.zeros(1))[0]
+    warnings = [limit.sentence() for limit in broken(chosen.cautions(batch))]
+    if robot.coupling.length > 0 and "coupling" not in chosen.parts:
+        warnings.append(f"model '{model}' leaves the coupling out")
+    return _Resistance(matrix, chosen.stated_error(robot.model), list(chosen.references), warnings)
 
 
 def _fixed(robot: Robot) -> bool:

@@ -1,17 +1,20 @@
-"""The robot written for other programs: printers, Blender, ParaView, MuJoCo and robot simulators."""
+"""Writing the robot for other programs: printers, Blender, ParaView, MuJoCo and robot simulators."""
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.errors import InputError
+from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check_masses, contents_of, printable_solid
+from spirillum.exports.mjcf import FLUID_WARNING
 from spirillum.exports.sidecar import sidecar_of
+from spirillum.exports.solid import is_watertight
 from spirillum.files import output_target
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
@@ -19,19 +22,9 @@ from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["KINDS_OF_FILES", "Export", "Written", "export"]
+__all__ = ["Export", "Written", "export"]
 
-KINDS_OF_FILES = {
-    ".stl": "one closed body for a 3D printer",
-    ".glb": "a coloured scene",
-    ".vtp": "a surface for ParaView",
-    ".urdf": "a robot description",
-    ".mjcf": "a MuJoCo model",
-    ".xml": "a MuJoCo model",
-}
-"""Endings of the files that can be written."""
 _DESCRIPTIONS = (".urdf", ".mjcf", ".xml")
-_UNITS = {"mm": 1e-3, "m": 1.0}
 
 
 @dataclass(frozen=True)
@@ -41,7 +34,7 @@ class Written:
     path: Path
     """Where it lies."""
     holds: str
-    """What it is, in words."""
+    """What it holds, in words."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +58,6 @@ class Export:
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum export --json`."""
-        from spirillum.exports.solid import is_watertight
-
         content: dict[str, Any] = {
             "robot": self.robot.name,
             "phase": quantity(self.phase, "rad"),
@@ -127,100 +118,35 @@ def export(
     """
     target = output_target(path, KINDS_OF_FILES, "robot.stl")
     described = target.suffix in _DESCRIPTIONS
-    if unit is not None and (unit not in _UNITS or target.suffix != ".stl"):
+    if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
         raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")
     wanted = described if sidecar is None else sidecar
     if model != "slender" and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
     ready, angle = load(robot), parse_option("phase", phase, KINDS["angle"])
     if described:
-        _check_masses(ready, target)
+        check_masses(ready, target)
     # Descriptions and scenes turn the rotor by its joint, so its own shape stays at phase 0.
     still = described or target.suffix == ".glb"
     pieces = robot_mesh(ready, phase=0.0 if still else angle, fineness=fineness)
     beside = sidecar_of(ready, model, angle if described else 0.0) if wanted else {}
-    contents, solid = _contents(ready, target, pieces, angle, unit or "mm")
+    solid = None
+    if target.suffix == ".stl":
+        printable, solid = printable_solid(ready, pieces, unit or "mm")
+        contents = {target.name: printable}
+    else:
+        contents = contents_of(ready, target, pieces, angle)
     if beside:
-        contents[f"{target.stem}.resistance.json"] = as_json(beside).encode(), "masses, joint and 12x12 resistance"
-    _commit(target, {name: data for name, (data, _) in contents.items()})
-    files = tuple(Written(target.parent / name, holds) for name, (_, holds) in contents.items())
+        holds = "masses, joint and 12x12 resistance"
+        contents[f"{target.stem}.resistance.json"] = Content(as_json(beside).encode(), holds)
+    _commit(target, {name: content.data for name, content in contents.items()})
+    files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
     warnings = [*ready.warnings, *beside.get("warnings", [])]
     if solid is not None and not (solid["watertight"] and solid["bodies"] == 1):
         warnings.append(f"{target.name} is not one watertight body; a printer may refuse it")
     if target.suffix in (".mjcf", ".xml"):
-        from spirillum.exports.mjcf import FLUID_WARNING
-
         warnings.append(FLUID_WARNING)
     return Export(ready, angle, files, pieces, links_of(ready), solid, tuple(warnings))
-
-
-def _check_masses(robot: Robot, target: Path) -> None:
-    """A description needs masses.
-
-    Raises:
-        InputError: if one is not known, or too small for the program that reads the file.
-    """
-    for table, name in (("body", "mass"), ("tail", "density")):
-        if getattr(getattr(robot, table), name) is None:
-            raise InputError(
-                f"{robot.name}: {table}.{name} is missing; allowed: body.mass and tail.density, from which "
-                f"{target.suffix} takes masses and inertias"
-            )
-    if target.suffix != ".urdf":
-        from spirillum.exports.mjcf import check_inertia
-
-        check_inertia(robot)
-
-
-_Contents = dict[str, tuple[bytes, str]]
-
-
-def _contents(
-    robot: Robot, target: Path, pieces: Sequence[RobotMesh], phase: float, unit: str
-) -> tuple[_Contents, dict[str, Any] | None]:
-    """Files by name, each with what it holds, the asked one first; and the numbers of an STL file's solid."""
-    holds = KINDS_OF_FILES[target.suffix]
-    if target.suffix == ".stl":
-        data, solid = _printable(robot, pieces, unit)
-        return {target.name: (data, f"{holds}, in {unit}")}, solid
-    if target.suffix == ".glb":
-        from spirillum.exports.glb import glb_bytes
-
-        return {target.name: (glb_bytes(robot.name, pieces, phase), f"{holds}, in m")}, None
-    if target.suffix == ".vtp":
-        from spirillum.exports.polydata import vtp_bytes
-
-        words = {"robot": robot.name, "phase": phase}
-        return {target.name: (vtp_bytes(pieces, words), f"{holds}, in m")}, None
-    from spirillum.exports.parts import mesh_files
-
-    folder, meshes = f"{target.stem}-meshes", mesh_files(pieces)
-    if target.suffix == ".urdf":
-        from spirillum.exports.urdf import urdf_text as text
-    else:
-        from spirillum.exports.mjcf import mjcf_text as text
-    found: _Contents = {target.name: (text(robot, meshes, folder, phase).encode(), f"{holds}, in m")}
-    for mesh in meshes:
-        kind = "closed body of the whole part" if mesh.colour is None else "surface to look at"
-        found[f"{folder}/{mesh.name}.stl"] = mesh.data, f"{mesh.part}: {kind}, in mm"
-    return found, None
-
-
-def _printable(robot: Robot, pieces: Sequence[RobotMesh], unit: str) -> tuple[bytes, dict[str, Any]]:
-    """An STL file of the whole robot, and its numbers."""
-    from spirillum.exports.solid import is_watertight, stl_bytes, united
-
-    body = united(pieces)
-    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
-    found = {
-        "unit": unit,
-        "triangles": len(body.faces),
-        "bodies": body.bodies,
-        "watertight": is_watertight(body.vertices / _UNITS[unit], body.faces),
-        "volume": quantity(body.volume, "m^3"),
-        "size": quantity(high - low, "m"),
-    }
-    return stl_bytes(body.vertices / _UNITS[unit], body.faces, f"{robot.name}, unit {unit}"), found
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:

@@ -1,4 +1,4 @@
-"""Frames into H.264 in an MP4 file, by PyAV: each at its time, with colours as every player shows them."""
+"""Frames encoded as H.264 in an MP4 file by PyAV, with time stamps and declared colours (BT.709)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from spirillum.extras import required
 __all__ = ["ENCODERS", "H264Writer", "h264_writer"]
 
 ENCODERS = ("libx264", "libopenh264", "h264")
-"""Encoders of H.264, the best first: which of them are there depends on how PyAV was built."""
+"""Encoders of H.264, best first; which are available depends on the build of PyAV."""
 _BT709 = 1
 _LIMITED_RANGE = 1
 
@@ -45,7 +45,7 @@ class H264Writer:
         self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> None:
-        """Write what is still in the encoder."""
+        """Flush the encoder."""
         self._container.mux(self._stream.encode(None))
 
 
@@ -54,7 +54,7 @@ def h264_writer(
     path: Path,
     size: tuple[int, int],
     rate: Fraction,
-    words: Mapping[str, str],
+    tags: Mapping[str, str],
     *,
     quality: Mapping[str, str],
     instead: str,
@@ -69,12 +69,12 @@ def h264_writer(
         path: the file.
         size: width and height, even numbers.
         rate: frames a second.
-        words: tags of the file, such as title and comment.
+        tags: metadata of the file, such as title and comment.
         quality: options of libx264; other encoders have their own defaults.
         instead: what can be had without an encoder, for the sentence of an error.
         extra: the extra that installs PyAV, for the sentence of an error.
-        tick: what times are whole multiples of, s; None: the time of a frame.
-        threads: of the encoder, whose number changes the bytes of the file; 0: as many as it likes.
+        tick: time base of the stamps, s; None: the duration of a frame.
+        threads: of the encoder; their number changes the bytes of the file. 0: the encoder's choice.
         encoders: those that will do, the best first.
 
     Raises:
@@ -87,7 +87,7 @@ def h264_writer(
         missing = " or ".join(encoders)
         raise InputError(f"{path.name} cannot be encoded: PyAV has no {missing} for H.264 here; allowed: {instead}")
     with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-        container.metadata.update(words)
+        container.metadata.update(tags)
         stream = container.add_stream(name, rate=rate, options=dict(quality) if name == "libx264" else {})
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"

@@ -48,7 +48,7 @@ def write_vti(dataset: xr.Dataset, path: Path) -> None:
 
 
 def add_comment(path: Path, text: str) -> None:
-    """Put a JSON text behind the XML declaration; the data are addressed from a mark of their own and do not mind."""
+    """Insert a JSON text as a comment behind the XML declaration; offsets of the appended data stay valid."""
     declaration, rest = path.read_bytes().split(b"\n", 1)
     safe = text.replace("--", "-\\u002d")  # a comment must not hold two hyphens; JSON may spell one of them
     path.write_bytes(b"\n".join([declaration, f"<!-- {safe} -->".encode(), rest]))

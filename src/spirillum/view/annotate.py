@@ -1,4 +1,4 @@
-"""What was tracked, drawn over the frames: outline of the body, axis, stripe pointer, fitted wire, numbers."""
+"""Tracking results drawn over the frames: outline of the body, axis, stripe pointer, fitted wire, numbers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _WAITING = 8
 
 
 class Seen(Protocol):
-    """What the tracker tells of a frame."""
+    """The tracker's result for a frame."""
 
     @property
     def time(self) -> float:
@@ -42,7 +42,7 @@ class Seen(Protocol):
 
     @property
     def pose(self) -> BodyPose | None:
-        """Where the body is; None where it was not seen."""
+        """Pose of the body; None where it was not seen."""
 
     @property
     def body_angle(self) -> float:
@@ -58,7 +58,7 @@ class Seen(Protocol):
 
 
 class Annotator:
-    """Draws what was tracked over frames of one robot."""
+    """Draws tracking results over frames of one robot."""
 
     def __init__(self, robot: Robot) -> None:
         """Prepare the outline and the wire.
@@ -77,11 +77,11 @@ class Annotator:
         self._first: float | None = None
 
     def draw(self, image: np.ndarray, seen: Seen, words: tuple[str, ...] = ()) -> np.ndarray:
-        """A copy of a frame with what was tracked on it.
+        """A copy of a frame with the tracking result drawn on it.
 
         Args:
             image: RGB bytes, (h, w, 3).
-            seen: what was tracked.
+            seen: the tracking result.
             words: lines of text instead of those about this frame.
         """
         picture = np.ascontiguousarray(image).copy()
@@ -250,7 +250,7 @@ class _Writer:
         self._thread.join()
 
     def check(self) -> None:
-        """Hand on what went wrong.
+        """Raise the error of the encoding thread.
 
         Raises:
             InputError: if there is no encoder, or the film could not be written.

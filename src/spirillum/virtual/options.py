@@ -82,7 +82,8 @@ def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
     """A check of numbers from `low` to `high`; `unit` is for the sentence of an error."""
 
     def check(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, Real) or not low <= float(value) <= high:
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (number and low <= value <= high):
             raise _refusal(f"= {value!r}; allowed: {low:g} to {high:g}{unit}")
         return float(value)
 

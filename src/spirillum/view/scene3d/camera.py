@@ -1,4 +1,4 @@
-"""Where the camera stands, and where on the picture a point of the lab is seen."""
+"""The camera of a three-dimensional scene, and its projection of points of the lab to pixels."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _LINE_OF_SIGHT: dict[str, tuple[tuple[float, float, float], tuple[float, float, 
     "front": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
     "rear": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
-_OPENING = np.radians(22.0)
-_ROUNDS = 60
+_FIELD_OF_VIEW = np.radians(22.0)
+_MAX_ITERATIONS = 60
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Camera:
 
     @property
     def position(self) -> Samples:
-        """Where the camera stands."""
+        """Position of the camera, m."""
         return np.asarray(self.focal - self.distance * self.sight)
 
     def pixels(self, points: Samples, size: tuple[int, int]) -> Samples:
-        """Where points are seen.
+        """Pixels at which points are seen.
 
         Args:
             points: (n, 3) in the lab, m.
@@ -89,7 +89,7 @@ class Camera:
         return np.asarray(start + ray * (((point - start) @ normal) / (ray @ normal)))
 
     def moved(self, shift: Samples) -> Camera:
-        """The same camera elsewhere."""
+        """The camera translated by a vector, m."""
         return replace(self, focal=self.focal + shift)
 
 
@@ -120,16 +120,16 @@ def fitted(view: View, points: Samples, size: tuple[int, int], margins: Margins 
     up = up / np.linalg.norm(up)
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     reach = float(np.linalg.norm(np.ptp(points, axis=0)))
-    camera = Camera(middle, sight, up, reach / np.tan(0.5 * _OPENING), reach, view != "perspective")
+    camera = Camera(middle, sight, up, reach / np.tan(0.5 * _FIELD_OF_VIEW), reach, view != "perspective")
     return _framed(camera, lambda c: c.pixels(points, size), size, margins or Margins())
 
 
 def _framed(camera: Camera, seen: Callable[[Camera], Samples], size: tuple[int, int], margins: Margins) -> Camera:
-    """Shift and approach until what is seen touches the margins; a fixed point, reached at once without perspective."""
+    """Shift and approach until the margins are touched: a fixed-point iteration, one step without perspective."""
     width, height = size
     left, right = margins.side * width, (1.0 - margins.side) * width
     top, bottom = margins.top * height, (1.0 - margins.bottom) * height
-    for _ in range(_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         low, high = seen(camera).min(axis=0), seen(camera).max(axis=0)
         unit = 2.0 * camera.half_height / height
         wanted = np.array([0.5 * (left + right), 0.5 * (top + bottom)])

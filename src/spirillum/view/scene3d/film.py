@@ -1,4 +1,4 @@
-"""A film of a run: the robot moves as the run's dataset says, seen by a camera that stands still or goes along."""
+"""A film of a run in three dimensions, by a camera that stands still or follows the robot."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 __all__ = ["CAMERAS", "Film", "film"]
 
 CAMERAS = ("auto", "fixed", "follow")
-"""What the camera does; `auto`: it goes along where the robot swims further than half of its length."""
+"""Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
 _LARGEST_TURN = 0.25
-"""Largest part of a turn of the tail between two frames at which its sense can still be seen."""
+"""Largest part of a turn of the tail between two frames at which its sense can still be seen (aliasing)."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Film:
     speed: float
     """Time of the run over time of the film."""
     follows: bool
-    """Whether the camera goes along with the robot."""
+    """Whether the camera follows the robot."""
     turn_per_frame: float
     """Largest part of a turn of the tail between two frames."""
     warnings: tuple[str, ...]
@@ -98,7 +98,7 @@ def film(
         fps: frames a second, 1 to 120 (a GIF: to 50).
         speed: time of the run over time of the film: 0.5 is slow motion. None: 1, or as slow as it takes to see how
             the tail turns.
-        camera: `fixed`, `follow`, or `auto`: it goes along where the robot swims further than half of its length.
+        camera: `fixed`, `follow`, or `auto`: it follows a robot that swims further than half of its length.
         progress: told what is done, how many frames are done, and how many there are.
 
     Returns:
@@ -152,7 +152,7 @@ class _Shots:
         self._solids, self._poses, self._view, self._size, self._follows = solids, poses, view, size, follows
         in_glass = solids.robot.channel is not None
         self._free = np.array([1.0, 0.0, 0.0]) if in_glass else np.ones(3)
-        """Directions in which the camera goes along: in a channel along its axis."""
+        """Directions in which the camera follows: in a channel along its axis."""
         x, beyond = poses.position[:, 0], 1.5 * solids.length if follows else 0.0
         self._glass = glass_around(solids, float(x.min()) - beyond, float(x.max()) + beyond, middle)
         self._camera, self._rows = self._framed()

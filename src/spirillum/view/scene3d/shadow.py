@@ -1,4 +1,4 @@
-"""The soft shade of a robot on the floor of its channel, which shows how near it lies."""
+"""The soft shadow of a robot on the floor of its channel, which shows how near it lies."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.outline import Outline, body_outline, solid_outlines
+from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 
 __all__ = ["add_shade", "shade"]
@@ -16,13 +16,7 @@ _ALONG, _ACROSS = 160, 49
 _HALF_ANGLE = 0.9
 _DARKEST = 0.5
 _REACH = 0.30
-"""Distance from the floor over which the shade fades, in radii of the channel."""
-
-
-def _solids(robot: Robot) -> dict[str, Outline]:
-    b, c = robot.body, robot.coupling
-    body = body_outline(b.shape, b.diameter, b.length, b.fillet or 0.0, b.front_end, b.rear_end)
-    return solid_outlines(body, b.length, c.diameter, c.length, c.clearance)
+"""Distance from the floor over which the shadow fades, in radii of the channel."""
 
 
 def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples) -> Samples:
@@ -36,13 +30,13 @@ def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples
         angle: (m,) angles from the lowest line of the tube, rad.
 
     Returns:
-        (n, m) a fade with the distance straight up to body and coupling: a picture's help, no computation of light.
+        (n, m) a decay with the vertical distance to body and coupling; no computation of light.
     """
     from scipy.ndimage import gaussian_filter
 
     y, floor = radius * np.sin(angle), -radius * np.cos(angle)
     dark = np.zeros((x.size, angle.size))
-    for outline in _solids(robot).values():
+    for outline in outlines_of(robot).values():
         around = np.nan_to_num(np.fmax.reduce([piece.radius(x) for piece in outline.pieces]), nan=0.0)
         below = np.sqrt(np.maximum(around[:, None] ** 2 - y**2, 0.0))
         distance = height - below - floor
@@ -54,7 +48,7 @@ def shade(robot: Robot, radius: float, height: float, x: Samples, angle: Samples
 
 
 def add_shade(plotter: Any, pyvista: Any, robot: Robot, unit: float, height: float) -> Any:
-    """Add the shade of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it.
+    """Add the shadow of a robot whose body's mid-length is at x = 0; the actor moves along the tube with it.
 
     Args:
         plotter: the scene's plotter.
