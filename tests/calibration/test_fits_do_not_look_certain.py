@@ -95,7 +95,7 @@ def test_a_trial_that_swims_against_the_others_is_refused(made: Callable[..., Pa
 @pytest.mark.parametrize("method", ["least-squares", "paper"])
 def test_an_outlying_trial_is_named_by_its_row(made: Callable[..., Path], tmp_path: Path, method: str) -> None:
     path = made(**FOUR, seed=5)
-    assert not sp.calibrate(path, WIDE, method=method).experiment.strays
+    assert not sp.calibrate(path, WIDE, method=method).experiment.outliers
     wrong = scaled(path, tmp_path / "o.csv", "forward_velocity_mm_s", 10.0, slice(6, 7))
     found = sp.calibrate(wrong, WIDE, method=method)
     assert any(w.startswith("row 9, column forward_velocity_mm_s: ") and "an outlier" in w for w in found.warnings)
@@ -123,7 +123,7 @@ def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None
 
 @pytest.mark.parametrize(("share", "words"), [(0.0372, "3.7 %"), (1.0, "100 %"), (0.123, "12 %"), (-0.5, "-50 %")])
 def test_shares_are_written_without_powers_of_ten(share: float, words: str) -> None:
-    from spirillum.calibration.judgement import percent
+    from spirillum.calibration.fit_warnings import percent
 
     assert percent(share) == words
 

@@ -1,11 +1,13 @@
 """The posterior: uniform ranks of the truth, discrepancy of a wrong model, and diagnostics that fail loudly."""
 
+import runpy
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
@@ -122,13 +124,12 @@ def test_log_likelihood_is_that_of_a_multivariate_normal(made: Callable[..., Pat
 def test_ranks_of_the_truth_are_uniform_and_intervals_hold_it() -> None:
     """Simulation-based calibration, small: truths from the prior, data from the model, ranks in the posterior.
 
-    The full one, with more experiments, is `benchmarks/simulation_based_calibration.py`.
+    With more experiments it is a benchmark, whose code this runs.
     """
-    from scipy.stats import kstest
-
-    from spirillum.calibration.simulation_based import simulated_ranks
-
-    found = simulated_ranks(experiments=16, tails=((10.0, 1.5), (15.0, 2.5), (20.0, 3.5), (25.0, 2.0)), seed=11)
+    benchmark = Path(__file__).parents[2] / "benchmarks" / "simulation_based_calibration.py"
+    found = runpy.run_path(str(benchmark))["simulated_ranks"](
+        experiments=16, tails=((10.0, 1.5), (15.0, 2.5), (20.0, 3.5), (25.0, 2.0)), seed=11
+    )
     for name, ranks in found.ranks.items():
         assert kstest(ranks, "uniform").pvalue > 0.01 / len(found.ranks), name
     every = np.concatenate(list(found.inside.values()))

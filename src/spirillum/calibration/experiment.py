@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.calibration.outliers import stray_trials
+from spirillum.calibration.outliers import outlying_trials
 from spirillum.errors import InputError
 from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
 from spirillum.measurement.statistics import student_t_quantile
@@ -88,7 +88,7 @@ class Experiment:
     """Hash of the file."""
     synthetic: bool
     """Whether the file says that its numbers were made by a program."""
-    strays: tuple[str, ...] = ()
+    outliers: tuple[str, ...] = ()
     """Trials that are far off the others of their tail, a sentence each."""
 
     @property
@@ -113,7 +113,7 @@ def tail_words(robot: Robot) -> str:
 
 
 def with_tail(robot: Robot, wavelength: float, amplitude: float) -> Robot:
-    """The same robot with another tail, m."""
+    """A robot with another tail, m."""
     tail = robot.tail.model_copy(update={"wavelength": wavelength, "amplitude": amplitude})
     return robot.model_copy(update={"tail": tail})
 
@@ -167,7 +167,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         source=path.name,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         synthetic="synthetic" in " ".join(comments).lower(),
-        strays=stray_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
+        outliers=outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
 
 

@@ -12,16 +12,16 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL, Estimate
 from spirillum.calibration.experiment import Experiment, Quantity, read_experiment
-from spirillum.calibration.identifiability import Identifiability, identified
-from spirillum.calibration.judgement import (
-    check_believable,
+from spirillum.calibration.fit_warnings import (
+    check_plausible,
     common_warnings,
-    far_warnings,
+    factor_misfit_warnings,
     friction_warnings,
     misfit_warnings,
-    plain_misfit_warnings,
-    stray_warnings,
+    outlier_warnings,
+    prior_warnings,
 )
+from spirillum.calibration.identifiability import Identifiability, identified
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.paper_method import paper_fit
 from spirillum.calibration.parameters import free_names
@@ -90,7 +90,7 @@ def fit_model(
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)
-    check_believable(problem, fit.z)
+    check_plausible(problem, fit.z)
     report = identified(problem, fit)
     if method == "least-squares":
         return _by_least_squares(problem, fit, report, friction)
@@ -106,7 +106,7 @@ def _has_motor(experiment: Experiment) -> bool:
 def _by_paper(problem: Problem, reading: str) -> Calibrated:
     fit = paper_fit(problem)
     z = problem.coordinate_of({name: np.array(value) for name, value in fit.values.items()})
-    check_believable(problem, z)
+    check_plausible(problem, z)
     nan = float("nan")
     friction: tuple[Estimate, ...] = ()
     if "friction" in problem.free:
@@ -128,9 +128,9 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         identifiability=None,
         warnings=(
             "method 'paper' gives no uncertainty",
-            *stray_warnings(problem, z),
-            *far_warnings(problem, z),
-            *plain_misfit_warnings(problem, z),
+            *outlier_warnings(problem, z),
+            *prior_warnings(problem, z),
+            *factor_misfit_warnings(problem, z),
             *friction_warnings(problem, z, reading),
             *common_warnings(problem, friction),
         ),
@@ -214,9 +214,9 @@ def _by_posterior(
 
 def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, reading: str) -> list[str]:
     return [
-        *stray_warnings(problem, fit.z),
+        *outlier_warnings(problem, fit.z),
         *report.warnings,
-        *far_warnings(problem, fit.z),
+        *prior_warnings(problem, fit.z),
         *friction_warnings(problem, fit.z, reading),
     ]
 

@@ -57,7 +57,7 @@ class Identifiability:
 
 
 def identified(problem: Problem, fit: LeastSquares) -> Identifiability:
-    """Judge a fit's directions at its optimum.
+    """Find the directions in which a fit is not determined, at its optimum.
 
     Args:
         problem: the fit.
@@ -100,7 +100,7 @@ def _words(problem: Problem, z: Samples, singular: float, direction: Samples) ->
     labels = [problem.coordinates[place].label for place in named]
     known = "less than the prior" if singular < _UNKNOWN else "little more than the prior"
     if len(named) == 1:
-        if abs(z[named[0]]) > FAR:  # `far_warnings` says so
+        if abs(z[named[0]]) > FAR:  # `prior_warnings` says so
             return ""
         return (
             f"{labels[0]} is hardly identifiable: the observations say {known} about it, for they hardly change "

@@ -1,4 +1,4 @@
-"""Trials that are far off the others of their tail."""
+"""Outliers among the trials of a tail."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ from spirillum.arrays import Samples
 from spirillum.measurement.observations import Observation
 from spirillum.robust import mad_scale
 
-__all__ = ["stray_trials"]
+__all__ = ["outlying_trials"]
 
 _LIMIT = 8.0
-"""Robust standard deviations, of all trials together, beyond which a trial is named."""
+"""Robust standard deviations, pooled over all trials, beyond which a trial is an outlier."""
 _LEAST = 0.15
-"""Relative deviation below which none is."""
+"""Relative deviation below which no trial is an outlier."""
 _FEWEST = 3
 _COLUMNS = ("forward_velocity_mm_s", "body_rate_Hz")
 
 
-def stray_trials(groups: Sequence[Sequence[Observation]], ratios: Sequence[tuple[Samples, Samples]]) -> tuple[str, ...]:
-    """Name the rows whose advance or turning is far off the median of their tail's trials.
+def outlying_trials(
+    groups: Sequence[Sequence[Observation]], ratios: Sequence[tuple[Samples, Samples]]
+) -> tuple[str, ...]:
+    """A sentence for each row whose advance or turning is an outlier among the trials of its tail.
 
     Args:
         groups: rows of each robot.

@@ -115,7 +115,7 @@ def sampled(
         warm_up = 0
         total += steps
         steps = total
-        found = _judged(density, [np.concatenate(chain) for chain in chains], samplers, how.kept)
+        found = _thinned(density, [np.concatenate(chain) for chain in chains], samplers, how.kept)
         if found.converged or doubling == how.doublings:
             break
     tell("sampling", 1, 1)
@@ -181,8 +181,8 @@ class _Ensemble:
         return found
 
 
-def _judged(density: Density, chains: list[Samples], samplers: list[_Ensemble], kept: int) -> Posterior:
-    """Thin the draws and judge them; each walker of each ensemble is a chain."""
+def _thinned(density: Density, chains: list[Samples], samplers: list[_Ensemble], kept: int) -> Posterior:
+    """Thin the draws and compute their diagnostics; each walker of each ensemble is a chain."""
     whole = np.concatenate([np.moveaxis(chain, 1, 0) for chain in chains])
     thinned = whole[:, :: max(1, whole.shape[1] // kept)]
     rhat, effective = _diagnosed(density, chains, whole)

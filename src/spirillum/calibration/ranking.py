@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL
 from spirillum.calibration.fit import RobotSource, fit_model
-from spirillum.calibration.judgement import synthetic_warning
+from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree

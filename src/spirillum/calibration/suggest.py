@@ -25,7 +25,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import channel_of, tail_words, with_tail
 from spirillum.calibration.fit import RobotSource, given_robots
-from spirillum.calibration.judgement import synthetic_warning
+from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model

@@ -236,7 +236,7 @@ def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
 
 
 def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:
-    """The same of a file that was read before."""
+    """Where a calibration places a robot in its channel; None where it says nothing of that channel."""
     diameter = robot.channel.diameter if robot.channel else float("inf")
     own = [place.placement for place in file.placement if _alike(diameter, place.channel_diameter)]
     return own[0] if own else None

@@ -135,7 +135,7 @@ class Fitted:
         ]
 
     def tails_warnings(self, robots: Sequence[Robot]) -> list[str]:
-        """The same for many robots, in one sentence."""
+        """How many robots have a B_eff that was not fitted, or came out negative."""
         found = [friction_of_tails(robot, self.friction) for robot in robots]
         unknown = sum(1 for own, others in found if own is None and others)
         zero = sum(1 for own, _ in found if own is not None and own <= 0)

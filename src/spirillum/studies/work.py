@@ -230,7 +230,7 @@ def _stacked(results: Sequence[Swimming], name: str) -> Values:
 
 
 def _at_assumed_rates(task: Task, rates: Sequence[float], readings: Sequence[str]) -> Part:
-    """The same quantities along a curve of assumed motor rates, turned the way that each motor drives."""
+    """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
     electrics = task.batch.electrics
     assert electrics is not None  # noqa: S101 - the caller has asked
     polarity = np.broadcast_to(electrics.polarity, (task.batch.size,))

@@ -162,7 +162,7 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float) -> float
 
 
 def at_place(batch: RobotBatch, place: Placement) -> RobotBatch:
-    """The same robots at a place of the band, to be resolved as finely as a band needs."""
+    """Robots at a place of the band, with the resolution of a band."""
     own: ModelOptions = batch.options
     tube = own.tube.model_copy(update={"tolerance": TOLERANCE})
     return replace(batch, placement=place, options=own.model_copy(update={"tube": tube}))

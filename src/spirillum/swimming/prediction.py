@@ -69,7 +69,7 @@ class Prediction:
     intervals: Intervals | None = field(default=None, repr=False)
     """Intervals of a posterior; None without one."""
     band: Band | None = field(default=None, repr=False)
-    """The same over the places that the placement leaves open; None where there are none, or none were asked for."""
+    """Band over the places that the placement leaves open; None where there are none, or none was asked for."""
     motion: Motion = "held"
     """Lateral motion and tilt held, or released."""
 

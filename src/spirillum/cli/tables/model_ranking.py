@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.calibration.judgement import CALLED
+from spirillum.calibration.fit_warnings import CALLED
 from spirillum.cli.tables.parts import Answer, counted, grid
 
 __all__ = ["table"]

@@ -1,4 +1,4 @@
-"""What a fit is worth, in words: misfit, outliers, numbers far from their prior, and what may not be believed."""
+"""Warnings of a fit: misfit, outliers, values far from their prior; and the refusal of an implausible one."""
 
 from __future__ import annotations
 
@@ -18,65 +18,65 @@ from spirillum.robust import mad_scale
 
 __all__ = [
     "CALLED",
-    "check_believable",
+    "check_plausible",
     "common_warnings",
-    "far_warnings",
+    "factor_misfit_warnings",
     "friction_warnings",
     "misfit_warnings",
+    "outlier_warnings",
     "percent",
-    "plain_misfit_warnings",
-    "stray_warnings",
+    "prior_warnings",
     "synthetic_warning",
 ]
 
 CALLED: dict[Quantity, str] = {"advance": "speed", "turning": "body rate", "motor_rate": "motor rate"}
-"""What each quantity that is compared is called."""
+"""Name of each compared quantity in a sentence."""
 _LARGE_MISFIT = 0.03
-"""Relative misfit from which on it is said by how much a model misses."""
+"""Relative misfit from which on a warning states it."""
 _BEYOND_TRIALS = 2.0 * ERROR_SCALE
-"""Discrepancy that no error of a single trial explains."""
-_SENSELESS = 10.0
-"""Factor of a typical misfit beyond which observations and model differ in robot or units."""
+"""Discrepancy larger than any plausible relative error of a trial."""
+_IMPLAUSIBLE_FACTOR = 10.0
+"""Median misfit, as a factor, beyond which observations and model must differ in robot or units."""
 _PRINTED = 0.1
-"""Relative difference of the body's rates beyond which a reading of the friction does not fit the observations."""
-_SENSELESSLY_FAR = 5.0
-"""Standard deviations of a wide prior that no robot is away from its middle."""
+"""Relative difference of the body's rates beyond which a friction reading contradicts the observations."""
+_IMPLAUSIBLE_DISTANCE = 5.0
+"""Standard deviations from the median of a wide prior beyond which a fit is refused."""
 _WIDE = 0.5
-"""Spread of a prior so wide that nothing true lies many times as far away."""
-_STRAY, _LEAST_STRAY = 6.0, 0.2
+"""Smallest logarithmic standard deviation of a prior that is called wide."""
+_OUTLYING, _LEAST_OUTLYING = 6.0, 0.2
 """Robust standard deviations, and relative deviation, beyond which a robot is named as an outlier."""
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with two digits and no power of ten where it is a plain number."""
+    """A share in per cent, with two significant digits and no exponent up to 1e5."""
     value = 100.0 * share
     return f"{value:.0f} %" if 10 <= abs(value) < 1e5 else f"{value:.2g} %"
 
 
-def check_believable(problem: Problem, z: Samples) -> None:
-    """Refuse a fit that no reading of the observations explains: most often they are in other units.
+def check_plausible(problem: Problem, z: Samples) -> None:
+    """Refuse an implausible fit: most often the observations are in other units.
 
     Args:
         problem: the fit.
         z: coordinates of the best fit.
 
     Raises:
-        InputError: if a prediction typically misses by more than what was observed, or is missed by it, or a factor
-            lies where no prior knowledge allows it.
+        InputError: if the median misfit exceeds a factor of ten, or a parameter with a wide prior lies more than five
+            standard deviations from its middle.
     """
     source, model = problem.experiment.source, problem.model.name
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         with np.errstate(divide="ignore", invalid="ignore"):
             off = np.abs(np.log(np.abs(ratio.mean / values)))[ratio.seen]
-        if float(np.median(off)) > np.log(_SENSELESS):
+        if float(np.median(off)) > np.log(_IMPLAUSIBLE_FACTOR):
             factor = float(np.exp(np.median(np.log(np.abs(ratio.mean / values))[ratio.seen])))
             raise InputError(
                 f"{source}: the observed {CALLED[name]} is typically {factor:.3g} times what model '{model}' can "
                 "explain; allowed: within a factor of ten (are the columns in mm, mm/s and Hz?)"
             )
     for item, place in zip(problem.coordinates, z, strict=True):
-        if abs(place) > _SENSELESSLY_FAR and getattr(item.prior, "spread", 0.0) >= _WIDE:
+        if abs(place) > _IMPLAUSIBLE_DISTANCE and getattr(item.prior, "spread", 0.0) >= _WIDE:
             value = problem.values_at(z)[item.label]
             raise InputError(
                 f"{source}: {item.label} comes out as {value:.3g}; allowed: observations that a number nearer to its "
@@ -84,8 +84,8 @@ def check_believable(problem: Problem, z: Samples) -> None:
             )
 
 
-def far_warnings(problem: Problem, z: Samples) -> list[str]:
-    """Numbers that lie where their prior hardly allows them."""
+def prior_warnings(problem: Problem, z: Samples) -> list[str]:
+    """Fitted values far out in their prior."""
     values = problem.values_at(z)
     return [
         f"{item.label} = {values[item.label]:.3g} lies {abs(place):.1f} standard deviations from the middle "
@@ -95,17 +95,17 @@ def far_warnings(problem: Problem, z: Samples) -> list[str]:
     ]
 
 
-def stray_warnings(problem: Problem, z: Samples) -> list[str]:
-    """Rows whose trial, or whose robot, is far off all others."""
+def outlier_warnings(problem: Problem, z: Samples) -> list[str]:
+    """Outliers: rows whose trial, or whose robot, deviates from all others."""
     experiment = problem.experiment
-    found = list(experiment.strays)
+    found = list(experiment.outliers)
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
         relative = np.where(ratio.seen, ratio.mean / values - 1.0, np.nan)
         if np.count_nonzero(ratio.seen) < 5:
             continue
         off = np.abs(relative - np.nanmedian(relative))
-        limit = max(_STRAY * float(mad_scale(off)), _LEAST_STRAY)
+        limit = max(_OUTLYING * float(mad_scale(off)), _LEAST_OUTLYING)
         for place in np.flatnonzero(np.nan_to_num(off) > limit).tolist():
             rows = ", ".join(str(row) for row in experiment.rows[place])
             found.append(
@@ -118,7 +118,7 @@ def stray_warnings(problem: Problem, z: Samples) -> list[str]:
 def misfit_warnings(
     problem: Problem, discrepancy: Mapping[Quantity, Estimate], left: Mapping[Quantity, float] | None = None
 ) -> list[str]:
-    """A wrong model must not look certain: say by how much it misses.
+    """State the model's discrepancy, so that a wrong model does not look certain.
 
     Args:
         problem: the fit.
@@ -154,8 +154,8 @@ def misfit_warnings(
     return found
 
 
-def plain_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
-    """By how much a fit without statistics misses the means."""
+def factor_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
+    """Root mean square misfit of a fit without an error model."""
     found = []
     for name, values in problem.predicted_at(z).items():
         ratio = problem.ratio(name)
@@ -169,7 +169,7 @@ def plain_misfit_warnings(problem: Problem, z: Samples) -> list[str]:
 
 
 def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
-    """What a fit takes for granted of the friction.
+    """Assumptions of a fit about the friction.
 
     Args:
         problem: the fit.
@@ -198,12 +198,12 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
 
 
 def synthetic_warning(source: str) -> str:
-    """What has to be said of every answer that rests on observations which a program has made."""
+    """The warning of every answer from synthetic observations."""
     return f"{source} says that its numbers are synthetic: nothing here is measured"
 
 
 def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]:
-    """What has to be said of any method's answer."""
+    """Warnings common to all methods."""
     experiment = problem.experiment
     found = []
     if experiment.synthetic:
