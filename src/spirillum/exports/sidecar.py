@@ -1,4 +1,4 @@
-"""What other programs need to move the robot in its fluid: masses, joint, buoyancy and the resistance of both links."""
+"""The numbers a simulator needs to move the robot in its fluid: masses, joint, buoyancy, resistance of both links."""
 
 from __future__ import annotations
 

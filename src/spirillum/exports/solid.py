@@ -14,8 +14,8 @@ from spirillum.robot.surface import Faces, mass_properties
 __all__ = ["UnitedBody", "is_watertight", "stl_bytes", "united"]
 
 _MERGED = (1e-6, 1e-5, 1e-4)
-"""Edges shorter than this share of the robot's length are taken out: single precision would not tell their ends. The
-first that leaves a watertight body is taken."""
+"""Edges shorter than this fraction of the robot's length are collapsed, since single precision merges their ends. The
+first value that leaves a watertight body is used."""
 
 
 class UnitedBody(NamedTuple):
@@ -26,7 +26,7 @@ class UnitedBody(NamedTuple):
     faces: Faces
     """Outward oriented, (m, 3)."""
     bodies: int
-    """Number of separate bodies; 1 where all pieces hang together."""
+    """Number of separate bodies; 1 where all pieces are connected."""
 
     @property
     def volume(self) -> float:

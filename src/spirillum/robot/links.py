@@ -28,7 +28,7 @@ __all__ = ["Link", "Links", "Solid", "links_of", "outlines_of", "revolution_soli
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _PANELS_PER_TURN = 4
 _ROOT_LENGTHS = 60.0
-"""The amplitude of a tapered wire has risen to within rounding after so many lengths L_t/c."""
+"""Number of lengths L_t/c after which the amplitude of a tapered wire is complete to rounding."""
 
 
 class Solid(NamedTuple):
@@ -69,8 +69,8 @@ class Links(NamedTuple):
 def links_of(robot: RobotTables) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
-    `body.mass` is that of body and coupling together; it is assumed to be spread evenly over their volumes. The wire
-    has `tail.density`.
+    `body.mass` is that of body and coupling together, assumed to be of uniform density. The wire has
+    `tail.density`.
 
     Args:
         robot: a checked robot.
@@ -119,7 +119,7 @@ def revolution_solid(outline: Outline) -> Solid:
     """A solid of revolution about the motor axis: pi int rho^2 dx and its moments, to rounding.
 
     Args:
-        outline: from the pole in front to the pole behind.
+        outline: from its front pole to its rear pole.
     """
     t, weight = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
     x, square, dx = (np.concatenate(part) for part in zip(*(_run(p, t, weight) for p in outline.pieces), strict=True))
@@ -170,7 +170,7 @@ def wire_solid(
     xi = np.concatenate([[0.0], (panels[:-1] + half)[:, None] + half[:, None] * _NODES, [length]], axis=None)
     numbers = {"wavelength": wavelength, "amplitude": amplitude, "length": length, "taper": taper, "hand": hand}
     columns = {name: np.full(1, value) for name, value in numbers.items()}
-    # From the root on, in its phase, so that a short tail far behind the origin loses no digits.
+    # Relative to the root, so that a short tail far behind the origin loses no digits.
     phase = np.full(1, -hand * 2.0 * np.pi * root / wavelength)
     line = centreline(xi, root=np.zeros(1), phase=phase, **columns)
     p, t = line.position, line.tangent

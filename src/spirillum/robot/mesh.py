@@ -1,8 +1,8 @@
 """The robot as closed surfaces of triangles: one geometry for pictures, exports and hydrodynamics.
 
 Body and coupling are the solids of revolution that the resolved models take, the tail is a round wire along eq. (10).
-What the models leave out is there too, so that nothing hangs in mid-air: the motor's shaft into the coupling, a stub
-of wire from the coupling to the tail's root, and an arm where the root does not lie on the axis.
+Parts that the models leave out join the pieces: the motor's shaft into the coupling, a stub of wire from the coupling
+to the tail's root, and an arm where the root does not lie on the axis.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ _AROUND_BODY, _AROUND_WIRE, _PER_TURN = 96, 24, 48
 """Sides of a body and of a wire, and points along a turn of the tail, at fineness 1."""
 _FINENESS = (0.1, 20.0)
 _ROOT = 0.2
-"""Share of the tail's length within which a sharp bend is the root's."""
+"""Fraction of the tail's length within which a sharp bend belongs to the root."""
 _SHARPEST = 0.9
-"""Largest curvature of a wire that is swept, over the inverse of its radius."""
+"""Largest curvature of a swept wire, times its radius."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class RobotMesh:
     regions: tuple[str, ...]
     """Regions of the surface: the piece's name; on the body also `seal`, `stripe 1`, `stripe 2`, ..."""
     region: Faces = field(repr=False)
-    """Which of the regions each triangle belongs to, (m,)."""
+    """Index of each triangle's region, (m,)."""
 
     @property
     def volume(self) -> float:
@@ -108,7 +108,7 @@ class TailLine:
 def robot_mesh(robot: Robot, *, phase: float = 0.0, fineness: float = 1.0) -> tuple[RobotMesh, ...]:
     """The robot's pieces, each one closed surface by itself; neighbours overlap where they are joined.
 
-    Vertices lie on the true surfaces, so volumes fall short of the true ones with the inverse square of `fineness`.
+    Vertices lie on the true surfaces, so that volumes converge from below with the inverse square of `fineness`.
     The seal's first stripe is centred on +z; the next ones follow in the positive sense about +x, from +z towards -y.
 
     Args:
@@ -206,7 +206,7 @@ def _rotor(
     """Surfaces of the rotor at phase 0, by name."""
     rear, radius = -0.5 * robot.body.length, 0.5 * robot.tail.wire_diameter
     root = np.array([rear - robot.coupling.length, 0.0, 0.0])
-    # Each thinner than the next by a little more than its flat sides: surfaces that nearly coincide cannot be joined.
+    # Each is thinner than the next by a little more than its facets: nearly coincident surfaces cannot be united.
     arm = 0.99 * np.cos(np.pi / sides) * radius
     stub = 0.99 * np.cos(np.pi / sides) * arm
     found: list[tuple[str, Surface]] = []

@@ -14,7 +14,7 @@ __all__ = ["Arc", "Line", "Outline", "body_outline", "cylinder_outline", "solid_
 
 @dataclass(frozen=True)
 class Line:
-    """A straight piece from (x, rho) to (x, rho), m."""
+    """A straight segment from (x, rho) to (x, rho), m."""
 
     start: tuple[float, float]
     end: tuple[float, float]
@@ -56,7 +56,7 @@ class Arc:
 
     @property
     def length(self) -> float:
-        """Length, m, to the accuracy that splitting it needs."""
+        """Length, m, by 64 chords; its accuracy suffices for subdividing the arc."""
         x, rho = self.points(np.linspace(0.0, 1.0, 65))
         return float(np.sum(np.hypot(np.diff(x), np.diff(rho))))
 
@@ -71,14 +71,14 @@ class Arc:
 
 @dataclass(frozen=True)
 class Outline:
-    """A closed solid of revolution: pieces from the pole in front to the pole behind."""
+    """A closed solid of revolution: pieces from its front pole to its rear pole."""
 
     pieces: tuple[Line | Arc, ...]
     corners: tuple[bool, ...]
     """Whether there is a sharp edge between each piece and the next."""
 
     def contains(self, x: Samples, rho: Samples) -> np.ndarray:
-        """Where points lie inside."""
+        """Whether points lie inside."""
         radius = np.fmax.reduce([piece.radius(x) for piece in self.pieces])
         tips = [float(piece.points(np.full(1, t))[0][0]) for piece in self.pieces for t in (0.0, 1.0)]
         with np.errstate(invalid="ignore"):

@@ -25,35 +25,35 @@ _LEAST_AROUND = 3
 
 
 class Surface(NamedTuple):
-    """A closed surface of triangles, outward oriented, made of bands one behind the other."""
+    """A closed surface of triangles, outward oriented, made of consecutive bands."""
 
     vertices: Samples
     """(n, 3), m."""
     faces: Faces
     """(m, 3)."""
     band: Faces
-    """Which band each triangle lies in, from the first pole to the last, (m,)."""
+    """Index of each triangle's band, from the first pole to the last, (m,)."""
     sector: Faces
-    """Which sector around each triangle lies in, (m,)."""
+    """Index of each triangle's sector around the axis, (m,)."""
 
 
 class Profile(NamedTuple):
-    """Points of an outline from its pole in front to its pole behind."""
+    """Points of an outline from its front pole to its rear pole."""
 
     x: Samples
     """m, (k,)."""
     rho: Samples
     """Distance from the axis, m; zero at both poles, (k,)."""
     flat: tuple[bool, ...]
-    """Whether each band, from a point to the next, lies in a plane across the axis."""
+    """Whether each band, from a point to the next, lies in a plane perpendicular to the axis."""
 
 
 def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Profile:
-    """Points along an outline: as many on each arc as its share of `around` on a full circle, ends only on lines.
+    """Points along an outline: on an arc in proportion to its angle, on a line only its ends.
 
     Args:
         outline: of the solid.
-        around: number of sides that approximate a circle.
+        around: number of points on a full circle.
         cuts: places x where there has to be a point, m; those off the outline are left out.
     """
     x: list[Samples] = []
@@ -78,7 +78,7 @@ def profile_of(outline: Outline, around: int, cuts: Sequence[float] = ()) -> Pro
 
 
 def _parameter(piece: Line | Arc, x: float) -> float:
-    """Where on the piece (0 to 1) it passes x; NaN where it does not."""
+    """Parameter (0 to 1) at which the piece passes x; NaN where it does not."""
     if isinstance(piece, Line):
         run = piece.end[0] - piece.start[0]
         return (x - piece.start[0]) / run if run != 0 else float("nan")
@@ -89,7 +89,7 @@ def _parameter(piece: Line | Arc, x: float) -> float:
 
 
 def _with_cut(t: Samples, cut: float) -> Samples:
-    """The parameters with one more; an inner one that is close to it gives way, so that no band is a sliver."""
+    """The parameters with one more; it replaces an inner one nearby, so that no band is a sliver."""
     if not 1e-9 < cut < 1.0 - 1e-9:
         return t
     inner = t[1:-1]
@@ -152,7 +152,7 @@ def rod(start: Samples, end: Samples, radius: float, around: int, *, round_start
 def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Surface:
     """The surface of a round wire along a curve, its ends cut square.
 
-    Its cross-sections do not turn about the curve: from each to the next they are carried by two reflections
+    The cross-sections follow a rotation-minimizing frame, computed by double reflection
     (Wang, Juettler, Zheng and Liu, ACM Trans. Graph. 27:2, 2008).
 
     Args:
@@ -163,7 +163,7 @@ def swept(points: Samples, tangents: Samples, radius: float, around: int) -> Sur
     """
     around = max(around, _LEAST_AROUND)
     least = np.argmin(np.abs(tangents), axis=1)
-    some = _unit(np.cross(tangents, np.eye(3)[least]))  # any vector across the curve will do
+    some = _unit(np.cross(tangents, np.eye(3)[least]))  # any vector perpendicular to the curve will do
     chord, own = np.diff(points, axis=0), some[:-1]
     carried, turned = _reflected(own, chord), _reflected(tangents[:-1], chord)
     carried = _reflected(carried, tangents[1:] - turned)

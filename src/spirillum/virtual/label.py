@@ -1,4 +1,4 @@
-"""The word `synthetic` in the corner of every picture of the virtual camera."""
+"""The label `synthetic` in the corner of every picture of the virtual camera."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ _LETTERS = {  # 3 x 5 pixels, rows from the top
     "c": "000 011 100 100 011",
 }
 _LARGE = 480
-"""Width of a picture from which on the letters are twice as large, pixels."""
+"""Width of a picture above which the letters are twice as large, pixels."""
 
 
 def stamp(image: np.ndarray) -> None:
-    """Write the word into the lower right corner of a picture.
+    """Write the label into the lower right corner of a picture.
 
     Args:
         image: (height, width, 3) bytes; changed.

@@ -14,7 +14,7 @@ __all__ = ["is_preset", "robot_text"]
 
 
 def is_preset(robot: Robot) -> bool:
-    """Whether a robot is a preset as it stands."""
+    """Whether a robot is an unchanged preset."""
     return robot.name in preset_names() and load(robot.name) == robot
 
 

@@ -1,4 +1,4 @@
-"""What lies beside a virtual trial: its setup, as an experimenter would know it, and the truth."""
+"""Files beside a virtual trial: its setup, as an experimenter would know it, and the truth."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def truth_dataset(
 
 
 def names_beside(path: Path, setup: Path | None = None) -> dict[str, Path]:
-    """Files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`.
+    """Paths of the files beside a video or a folder of frames: `setup`, `json`, `nc`, `robot`.
 
     Args:
         path: the video or the folder.
