@@ -83,7 +83,7 @@ def _check_inside(rows: Sequence[Row], points: Samples, names: tuple[str, str], 
     """
     for name, values, pixels in zip(names, points.T, size, strict=True):
         for place in np.flatnonzero((values < -EDGE) | (values > pixels - 1 + EDGE)):
-            raise rows[place].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")
+            raise rows[int(place)].error(name, f"{values[place]:g}", f"0 to {pixels - 1}, inside the picture")
 
 
 _Points = tuple[Samples, Samples, Samples, Samples]

@@ -114,17 +114,12 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
 def _places(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> list[list[Candidate]]:
     """The likeliest places on some frames."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
-        return list(pool.map(lambda image: close_places(image, still, body.contour, body.optics, body.bounds), images))
+        return list(pool.map(lambda image: close_places(image, still, body), images))
 
 
 def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
-    found = [
-        refined(
-            frame.image, still, Candidate(on_the_way(known, frame.time), 0.0), body.contour, body.optics, body.bounds
-        )
-        for frame in frames
-    ]
+    found = [refined(frame.image, still, body, Candidate(on_the_way(known, frame.time), 0.0)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
     clear = [
         (frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > FIRST_LOOK.faint * usual

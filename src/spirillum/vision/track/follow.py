@@ -148,8 +148,8 @@ def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start
 
 def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
     """The body anywhere in a picture."""
-    for candidate in candidates(image, still, body.contour, body.optics, body.bounds)[:2]:
-        better = refined(image, still, candidate, body.contour, body.optics, body.bounds)
+    for candidate in candidates(image, still, body)[:2]:
+        better = refined(image, still, body, candidate)
         if start.as_clear(better.score):
             found = body.place(image, better.pose)
             if found.known:

@@ -11,8 +11,9 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
 from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SEARCH
-from spirillum.vision.track.contour import GROUPS, Contour
+from spirillum.vision.track.contour import GROUPS
 
 __all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined"]
 
@@ -25,25 +26,16 @@ class Candidate(NamedTuple):
     """How clear its edges are there, over the picture's usual gradient."""
 
 
-def candidates(
-    image: np.ndarray,
-    still: Samples,
-    contour: Contour,
-    optics: Optics,
-    bounds: tuple[int, int, int, int],
-    *,
-    turn: float = 0.0,
-) -> list[Candidate]:
+def candidates(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
     """The likeliest places of a body in a picture, best first, at least a body's width apart.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
         still: what stands still in the video, (h, w, 3).
-        contour: the body's apparent edges.
-        optics: the camera.
-        bounds: part of the picture to look at.
+        body: the robot's body in front of the camera.
         turn: added to all headings that are tried, rad.
     """
+    contour, optics, bounds = body.contour, body.optics, body.bounds
     left, top, _, bottom = bounds
     middle = contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
     width = float(np.ptp(middle[:, 1]))
@@ -84,48 +76,30 @@ def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) ->
     return kept
 
 
-def close_places(
-    image: np.ndarray,
-    still: Samples,
-    contour: Contour,
-    optics: Optics,
-    bounds: tuple[int, int, int, int],
-    *,
-    turn: float = 0.0,
-) -> list[Candidate]:
+def close_places(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
     """The three likeliest places, looked at closely, best first.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
         still: what stands still in the video, (h, w, 3).
-        contour: the body's apparent edges.
-        optics: the camera.
-        bounds: part of the picture to look at.
+        body: the robot's body in front of the camera.
         turn: angle by which the body is turned round, rad.
     """
-    rough = candidates(image, still, contour, optics, bounds, turn=turn)[:3]
-    close = [refined(image, still, one, contour, optics, bounds) for one in rough]
+    rough = candidates(image, still, body, turn=turn)[:3]
+    close = [refined(image, still, body, one) for one in rough]
     return sorted(close, key=lambda one: -one.score)
 
 
-def refined(
-    image: np.ndarray,
-    still: Samples,
-    start: Candidate,
-    contour: Contour,
-    optics: Optics,
-    bounds: tuple[int, int, int, int],
-) -> Candidate:
+def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidate) -> Candidate:
     """A candidate moved to where its edges are clearest in the full picture, to a pixel; scored in grey per pixel.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
         still: what stands still in the video, (h, w, 3).
+        body: the robot's body in front of the camera.
         start: the candidate.
-        contour: the body's apparent edges.
-        optics: the camera.
-        bounds: part of the picture to look at.
     """
+    contour, optics, bounds = body.contour, body.optics, body.bounds
     first = contour.places(start.pose, optics)[0]
     if not np.isfinite(first).all():
         return Candidate(start.pose, 0.0)

@@ -68,7 +68,7 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
 
     def at(size: float) -> list[list[Candidate]]:
         other = resized(body, float(size))
-        return [close_places(image, still, other.contour, other.optics, other.bounds) for image in few]
+        return [close_places(image, still, other) for image in few]
 
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
         tried = list(pool.map(at, _SIZES))

@@ -86,7 +86,7 @@ def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: S
     """How much better a body the other way round fits, usually; of each frame its score as stated is given."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
         backs = pool.map(
-            lambda image: close_places(image, still, body.contour, body.optics, body.bounds, turn=np.pi),
+            lambda image: close_places(image, still, body, turn=np.pi),
             [image for image, _ in seen],
         )
         ratios = [
