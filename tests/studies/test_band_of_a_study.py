@@ -11,8 +11,7 @@ import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.registry import figures_of
-from spirillum.studies import places
-from spirillum.studies.places import AT_PLACES
+from spirillum.studies.band import AT_PLACES, BandTask
 from spirillum.view.figures.style import look_of_model
 
 MODELS = ["sbt", "walled"]
@@ -81,7 +80,7 @@ def test_interrupted_band_resumes_where_it_stopped(
     monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
     whole = sp.study(question, band=True)
     done: list[int] = []
-    original = places.PlaceTask.answer
+    original = BandTask.answer
 
     def counted(task: Any, readings: Any) -> Any:
         if len(done) == 3:
@@ -89,12 +88,12 @@ def test_interrupted_band_resumes_where_it_stopped(
         done.append(task.number)
         return original(task, readings)
 
-    monkeypatch.setattr(places.PlaceTask, "answer", counted)
+    monkeypatch.setattr(BandTask, "answer", counted)
     with pytest.raises(KeyboardInterrupt):
         sp.study(question, band=True, output=tmp_path / "out")
     (parts,) = (tmp_path / "out").glob("parts-*")
     assert len(list(parts.glob("*.npz"))) == 4 + 3
-    monkeypatch.setattr(places.PlaceTask, "answer", original)
+    monkeypatch.setattr(BandTask, "answer", original)
     assert sp.study(question, band=True, output=tmp_path / "out").identical(whole)
 
 

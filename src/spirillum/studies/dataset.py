@@ -12,8 +12,8 @@ import numpy as np
 from spirillum.arrays import Values
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.quantities import QUANTITIES, attributes
+from spirillum.studies.band import BandTask, placed_at, with_band
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.places import PlaceTask, placed_at, with_band
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import REASONS, Part, Task
 from spirillum.version import versions
@@ -40,7 +40,7 @@ _BAND = {
 def assembled(
     loaded: LoadedStudy,
     answers: Iterable[tuple[Task, Part]],
-    band: Sequence[tuple[PlaceTask, Part]],
+    band: Sequence[tuple[BandTask, Part]],
     observed: ObservedArrays | None,
     fingerprint: str,
     warnings: Sequence[str],
@@ -91,7 +91,7 @@ def _gathered(loaded: LoadedStudy, answers: Iterable[tuple[Task, Part]], count: 
         for name, values in part.items():
             if name not in flat:
                 flat[name] = np.full((len(models), count, *values.shape[1:]), np.nan)
-            flat[name][models.index(task.model), task.places] = values
+            flat[name][models.index(task.model), task.indices] = values
     return flat
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.places import PlaceTask, left_out, place_tasks
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
 from spirillum.swimming.comparison import uneven_models
@@ -45,10 +45,10 @@ def computed_study(
         parts: folder where finished parts are kept and found again; None: nowhere.
         tell: called with what is being done, steps done and steps in all.
     """
-    todo: list[Task | PlaceTask] = list(tasks(loaded))
-    todo += place_tasks(loaded, len(todo))
+    todo: list[Task | BandTask] = list(tasks(loaded))
+    todo += band_tasks(loaded, len(todo))
     answers: list[tuple[Task, Part]] = []
-    band: list[tuple[PlaceTask, Part]] = []
+    band: list[tuple[BandTask, Part]] = []
     found: list[Caution] = []
     warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
@@ -62,7 +62,7 @@ def computed_study(
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
     warnings += loaded.fitted.model_warnings(loaded.study.models, loaded.study.friction)
     if loaded.friction:
-        warnings += loaded.fitted.tails_warnings([loaded.robot_at(place) for place in range(loaded.count)])
+        warnings += loaded.fitted.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     warnings += uneven_models(loaded.robots, models, factors)
@@ -72,7 +72,7 @@ def computed_study(
         if part is None:
             part = _answered(task, loaded, observed)
             keep(task, part, parts)
-        if isinstance(task, PlaceTask):
+        if isinstance(task, BandTask):
             band.append((task, part))
         else:
             answers.append((task, part))
@@ -86,7 +86,7 @@ def computed_study(
     return assembled(loaded, answers, band, observed, fingerprint, list(dict.fromkeys(warnings)))
 
 
-def _answered(task: Task | PlaceTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
-    if isinstance(task, PlaceTask):
+def _answered(task: Task | BandTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
+    if isinstance(task, BandTask):
         return task.answer(loaded.study.friction)
     return answer(task, loaded, observed)

@@ -163,12 +163,12 @@ class LoadedStudy:
         grid = self.study.grid
         return len(self.robots) * (1 if grid is None else len(grid.wavelengths) * len(grid.amplitudes))
 
-    def robot_at(self, place: int) -> Robot:
-        """The robot at a place in the flat order of the study."""
+    def robot_at(self, index: int) -> Robot:
+        """The robot at an index in the flat order of the study."""
         grid = self.study.grid
         if grid is None:
-            return self.robots[place]
-        robot, tail = divmod(place, len(grid.wavelengths) * len(grid.amplitudes))
+            return self.robots[index]
+        robot, tail = divmod(index, len(grid.wavelengths) * len(grid.amplitudes))
         wavelength, amplitude = divmod(tail, len(grid.amplitudes))
         own = self.robots[robot]
         changed = {"wavelength": grid.wavelengths[wavelength], "amplitude": grid.amplitudes[amplitude]}

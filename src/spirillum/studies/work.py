@@ -88,13 +88,13 @@ REASONS = (
     "gap-too-thin",
     "other",
 )
-"""Why a robot of a study has no answer; the place in this list is the value in the dataset."""
+"""Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 
 _BLOCK = 100_000
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
 _PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
 
-Places = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 Part = dict[str, Values]
 """Arrays of one task: (robots, friction readings) or (robots, friction readings, rates)."""
@@ -106,8 +106,8 @@ class Task:
 
     number: int
     model: str
-    places: Places
-    """Places of the robots in the flat order of the study."""
+    indices: Indices
+    """Indices of the robots in the flat order of the study."""
     batch: RobotBatch
 
     @property
@@ -140,10 +140,10 @@ class Task:
 def tasks(loaded: LoadedStudy) -> Iterator[Task]:
     """All tasks of a study, always in the same order."""
     number = 0
-    for places, batch in groups(loaded):
+    for indices, batch in groups(loaded):
         for model in loaded.study.models:
             for cut, block in batch.blocks(_block_size(find_swimmer_model(model))):
-                yield Task(number, model, places[cut], block)
+                yield Task(number, model, indices[cut], block)
                 number += 1
 
 
@@ -153,8 +153,8 @@ def _block_size(model: SwimmerModel) -> int:
     return _PLACED_BLOCK if model.placed else _SMALL_BLOCK
 
 
-def groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
-    """Batches of robots with their places: one a channel of the grid, or one a kind of listed robots."""
+def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:
+    """Batches of robots with their indices in the study: one a channel of the grid, or one a kind of listed robots."""
     grid = loaded.study.grid
     if grid is None:
         for indices, batch in batches(loaded.robots, loaded.study.placement):
@@ -164,17 +164,17 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Places, RobotBatch]]:
     for index, robot in enumerate(loaded.robots):
         tails = {"tail.wavelength": wavelength, "tail.amplitude": amplitude}
         if loaded.friction:
-            places = range(index * wavelength.size, (index + 1) * wavelength.size)
-            tails["friction.effective"] = np.array([_friction_at(loaded, place) for place in places])
+            every = range(index * wavelength.size, (index + 1) * wavelength.size)
+            tails["friction.effective"] = np.array([_friction_at(loaded, tail) for tail in every])
         yield (
             index * wavelength.size + np.arange(wavelength.size),
             RobotBatch.of(robot, loaded.study.placement).with_values(tails),
         )
 
 
-def _friction_at(loaded: LoadedStudy, place: int) -> float:
+def _friction_at(loaded: LoadedStudy, index: int) -> float:
     """B_eff of a robot: that which was fitted to its tail, else its own; NaN where unset."""
-    robot = loaded.robot_at(place)
+    robot = loaded.robot_at(index)
     own = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction)).friction.effective
     return float("nan") if own is None else own
 
@@ -196,7 +196,7 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     if loaded.posterior is not None and task.model == loaded.posterior.model:
         part |= _intervals(task, loaded, loaded.posterior)
     if observed is not None:
-        tail, motor = observed.tail_rate[task.places], observed.motor_rate[task.places]
+        tail, motor = observed.tail_rate[task.indices], observed.motor_rate[task.indices]
         found = [swim(task.batch, task.model, tail_rate=tail, motor_rate=motor, friction=r) for r in readings]
         part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
     if study.assumed_motor_rates and task.batch.electrics is not None:
@@ -212,10 +212,10 @@ def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Par
         f"{name}_interval_{end}": np.full(shape, np.nan) for name in WITH_INTERVALS for end in ("low", "high")
     }
     inside = _reasons(task.batch, task.model) == 0
-    for number, place in enumerate(task.places.tolist()):
+    for number, index in enumerate(task.indices.tolist()):
         if not inside[number]:
             continue
-        robot = loaded.robot_at(place)
+        robot = loaded.robot_at(index)
         robot = calibrated_robot(robot, CalibrationFile.model_construct(friction=loaded.friction))
         for column, reading in enumerate(readings):
             found = intervals_of(robot, model, posterior, tail_rate=None, friction=reading)
@@ -244,7 +244,7 @@ def _at_assumed_rates(task: Task, rates: Sequence[float], readings: Sequence[str
 
 
 def _reasons(batch: RobotBatch, model: str) -> PerRobot:
-    """For each robot the first requirement that it breaks, as its place in `REASONS`."""
+    """For each robot the first requirement that it breaks, as its index in `REASONS`."""
     reason = np.zeros(batch.size)
     for limit in requirements(batch, find_swimmer_model(model)):
         code = REASONS.index(limit.flag) if limit.flag in REASONS else REASONS.index("other")

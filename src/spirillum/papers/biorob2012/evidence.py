@@ -17,7 +17,7 @@ from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
-from spirillum.studies.places import reference_place
+from spirillum.studies.band import reference_place
 from spirillum.units import Hz
 
 if TYPE_CHECKING:

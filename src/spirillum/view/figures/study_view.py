@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.studies.places import reference_place
+from spirillum.studies.band import reference_place
 from spirillum.units import Hz
 from spirillum.view.figures.style import Scale, plain
 

@@ -19,12 +19,12 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.seat import GAP_SHARE
 from spirillum.studies.spec import LoadedStudy
-from spirillum.studies.work import Part, Places, groups
+from spirillum.studies.work import Indices, Part, groups
 from spirillum.swimming.band import at_place, band_places, joined
 from spirillum.swimming.steady import requirements, swim
 from spirillum.units import show
 
-__all__ = ["AT_PLACES", "PlaceTask", "left_out", "place_tasks", "placed_at", "reference_place", "with_band"]
+__all__ = ["AT_PLACES", "BandTask", "band_tasks", "left_out", "placed_at", "reference_place", "with_band"]
 
 AT_PLACES = (
     "forward_velocity",
@@ -40,15 +40,15 @@ AT_PLACES = (
 
 
 @dataclass(frozen=True)
-class PlaceTask:
+class BandTask:
     """One model for the robots of one channel that share a place of their bands."""
 
     number: int
     model: str
-    places: Places
-    """Places of the robots in the flat order of the study."""
-    spot: int
-    """Number of the place in the band, the same for all robots of the study."""
+    indices: Indices
+    """Indices of the robots in the flat order of the study."""
+    place: int
+    """Number of the place in the band of each robot."""
     robots: tuple[RobotBatch, ...]
     """The robots at that place, one by one."""
 
@@ -80,7 +80,7 @@ class PlaceTask:
 
     @property
     def allowed(self) -> set[str]:
-        """The same."""
+        """Names of the arrays that an answer may have."""
         return self.needed
 
     def answer(self, readings: Iterable[str]) -> Part:
@@ -89,35 +89,35 @@ class PlaceTask:
         return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
 
 
-def place_tasks(loaded: LoadedStudy, first: int) -> Iterator[PlaceTask]:
+def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
     """The tasks of the band, always in the same order, numbered from `first`; none where none is asked for."""
     if not loaded.study.band:
         return
     number = first
-    for places, batch in groups(loaded):
-        singles = [block for _, block in batch.blocks(1)]
+    for indices, batch in groups(loaded):
+        robots = [block for _, block in batch.blocks(1)]
         for name in loaded.study.models:
             model = find_swimmer_model(name)
-            for spot, robots in _shared_places(singles, model):
-                there = tuple(robots.values())
-                yield PlaceTask(number, name, places[list(robots)], spot, there)
+            for place, sharing in _shared_places(robots, model):
+                there = tuple(sharing.values())
+                yield BandTask(number, name, indices[list(sharing)], place, there)
                 number += 1
 
 
-def _shared_places(singles: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
+def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
     """Number of a place of the band, and those of the robots that share it, by their number, at that place."""
     bands = {}
-    for index, single in enumerate(singles):
+    for index, single in enumerate(robots):
         if bool(np.all(single.known & all_hold([*assembly_limits(single), *model.domain(single)]))):
             bands[index] = band_places(single, model)
-    spots = max((len(band) for band in bands.values()), default=0)
-    for spot in range(spots):
+    places = max((len(band) for band in bands.values()), default=0)
+    for place in range(places):
         sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
         for index, band in bands.items():
-            key = (band[spot].gap, band[spot].pitch)
-            sharing.setdefault(key, {})[index] = at_place(singles[index], band[spot])
-        for robots in sharing.values():
-            yield spot, robots
+            key = (band[place].gap, band[place].pitch)
+            sharing.setdefault(key, {})[index] = at_place(robots[index], band[place])
+        for there in sharing.values():
+            yield place, there
 
 
 def reference_place(settings: Mapping[str, Any]) -> str:
@@ -136,7 +136,7 @@ def reference_place(settings: Mapping[str, Any]) -> str:
     return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference place'}, {tilt}"
 
 
-def left_out(answers: Iterable[tuple[PlaceTask, Part]]) -> list[str]:
+def left_out(answers: Iterable[tuple[BandTask, Part]]) -> list[str]:
     """A sentence for each place at which robots have no answer, though they have one at the reference place."""
     found = []
     for task, part in answers:
@@ -149,20 +149,20 @@ def left_out(answers: Iterable[tuple[PlaceTask, Part]]) -> list[str]:
     return found
 
 
-def placed_at(answers: Iterable[tuple[PlaceTask, Part]], count: int) -> dict[str, Values]:
+def placed_at(answers: Iterable[tuple[BandTask, Part]], count: int) -> dict[str, Values]:
     """`gap_at_place` and `pitch_at_place` of every robot, (robots, places), m and rad; NaN where it has no band."""
     tasks = [task for task, _ in answers]
-    spots = max(task.spot for task in tasks) + 1
+    places = max(task.place for task in tasks) + 1
     names = ("gap_at_place", "pitch_at_place")
-    found: dict[str, Values] = {name: np.full((count, spots), np.nan) for name in names}
+    found: dict[str, Values] = {name: np.full((count, places), np.nan) for name in names}
     for task in tasks:
-        found["gap_at_place"][task.places, task.spot] = task.robots[0].placement.gap
-        found["pitch_at_place"][task.places, task.spot] = task.robots[0].placement.pitch
+        found["gap_at_place"][task.indices, task.place] = task.robots[0].placement.gap
+        found["pitch_at_place"][task.indices, task.place] = task.robots[0].placement.pitch
     return found
 
 
 def with_band(
-    flat: dict[str, Values], answers: Iterable[tuple[PlaceTask, Part]], models: tuple[str, ...]
+    flat: dict[str, Values], answers: Iterable[tuple[BandTask, Part]], models: tuple[str, ...]
 ) -> dict[str, Values]:
     """Quantities at all places, and the least and largest of all places and the reference place.
 
@@ -176,13 +176,13 @@ def with_band(
         (models, robots, friction readings); NaN for models without a band.
     """
     pairs = list(answers)
-    spots = max(task.spot for task, _ in pairs) + 1
+    places = max(task.place for task, _ in pairs) + 1
     banded = {models.index(task.model) for task, _ in pairs}
     found: dict[str, Values] = {}
     for name in AT_PLACES:
-        there = np.full((*flat[name].shape, spots), np.nan)
+        there = np.full((*flat[name].shape, places), np.nan)
         for task, part in pairs:
-            there[models.index(task.model), task.places, :, task.spot] = part[name]
+            there[models.index(task.model), task.indices, :, task.place] = part[name]
         everywhere = np.concatenate([there, flat[name][..., None]], axis=-1)
         everywhere[[number for number in range(len(models)) if number not in banded]] = np.nan
         found[f"{name}_at_place"] = there
