@@ -35,9 +35,9 @@ def main() -> None:
     from scipy.integrate import solve_ivp
 
     robot = sp.load("biorob2012-wide", **{"friction.effective": "1.1e-5 N m s/rad"})
-    run = sp.simulate(robot, turns=TURNS)
+    run = sp.simulate(robot, timing={"turns": TURNS})
     simulated = float(run["time"][-1])
-    whole = best(lambda: sp.simulate(robot, turns=TURNS), 10)
+    whole = best(lambda: sp.simulate(robot, timing={"turns": TURNS}), 10)
     links = two_links(
         robot,
         sp.RobotBatch.of(robot),

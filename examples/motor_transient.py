@@ -9,7 +9,7 @@ import numpy as np
 import spirillum as sp
 
 steady = sp.predict("biorob2012-wide")
-run = sp.simulate("biorob2012-wide", motion="held", model="sbt", duration="2 s")
+run = sp.simulate("biorob2012-wide", motion="held", model="sbt", timing={"duration": "2 s"})
 end = run.isel(time=-1)
 
 for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"):

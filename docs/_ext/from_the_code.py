@@ -287,7 +287,7 @@ class SimulationVariables(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         from spirillum import simulate
 
-        dataset = simulate("biorob2012-wide", duration="0.1 s", motion=self.arguments[0])
+        dataset = simulate("biorob2012-wide", timing={"duration": "0.1 s"}, motion=self.arguments[0])
         names = [str(name) for name in (*dataset.coords, *dataset.data_vars)]
         return [table(_VARIABLE, _variable_rows(dataset, names), _VARIABLE_WIDTHS)]
 

@@ -20,7 +20,9 @@ def events(run: Any) -> dict[str, float]:
 @pytest.mark.parametrize("reading", ["none", "rotor", "body", "paper"])
 def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
     robot = sp.load("biorob2012-narrow", **{"drive.duty": 0.7})
-    run = sp.simulate(robot, friction=reading, turns=12.0, on=[(0.0, 0.5), (0.7, 5.0)], placement={"pitch": "1 deg"})
+    run = sp.simulate(
+        robot, friction=reading, placement={"pitch": "1 deg"}, timing={"turns": 12.0, "on": [(0.0, 0.5), (0.7, 5.0)]}
+    )
     chemical = run["resistive_energy"] + run["magnetic_energy"] + run["conversion_energy"] + run["drive_energy"]
     scale = float(run["electrical_energy"][-1])
     np.testing.assert_allclose(run["electrical_energy"] / scale, chemical / scale, atol=1e-8)
@@ -33,7 +35,7 @@ def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
 def test_lying_robot_swims_between_held_and_free() -> None:
     """The floor holds lateral motion in part: a hundredth of the speed lies between held and free."""
     robot = sp.load("biorob2012-wide", **QUIET)
-    run = sp.simulate(robot, turns=10.0)
+    run = sp.simulate(robot, timing={"turns": 10.0})
     held, free = (sp.predict(robot, model="rft", motion=motion) for motion in ("held", "free"))
     assert free.forward_velocity < float(run["mean_forward_velocity"]) < held.forward_velocity
     assert float(run["mean_tail_rotation_rate"]) == pytest.approx(held.tail_rotation_rate, rel=5e-3)
@@ -44,7 +46,7 @@ def test_lying_robot_swims_between_held_and_free() -> None:
 def test_series_are_named_as_in_a_prediction() -> None:
     """Over the last turn torque and powers are those of the held robot, up to what lateral freedom changes."""
     robot = sp.load("biorob2012-wide", **QUIET)
-    run, held = sp.simulate(robot, turns=4.0), sp.predict(robot, model="rft")
+    run, held = sp.simulate(robot, timing={"turns": 4.0}), sp.predict(robot, model="rft")
     for name in ("drive_torque", "shaft_power", "friction_power", "electrical_power", "motor_current"):
         assert float(run[name][-100:].mean()) == pytest.approx(getattr(held, name), rel=1e-2), name
 
@@ -71,7 +73,7 @@ def test_sphere_sinks_at_its_weight_over_its_drag() -> None:
         },
         channel={"diameter": "1 m", "length": "1 m"},
     )
-    run = sp.simulate(robot, duration="0.01 s", placement={"eccentricity": 0.0}, calibrated=False)
+    run = sp.simulate(robot, placement={"eccentricity": 0.0}, calibrated=False, timing={"duration": "0.01 s"})
     from spirillum.robot.robot import STANDARD_GRAVITY
 
     weight = (4e-3 - 985 * np.pi / 6 * 0.018**3) * STANDARD_GRAVITY
@@ -111,7 +113,10 @@ def test_capsule_drains_as_a_line_does() -> None:
         body={"rear": "hemisphere"},
     )
     run = sp.simulate(
-        robot, duration="30 s", placement={"gap": "0.02 mm"}, roughness="1 nm", samples_per_turn=10_000, turns=1.0
+        robot,
+        placement={"gap": "0.02 mm"},
+        roughness="1 nm",
+        timing={"duration": "30 s", "samples_per_turn": 10_000, "turns": 1.0},
     )
     gap = run["wall_gap"].values
     assert gap[-1] < 0.5 * gap[0]
@@ -125,12 +130,12 @@ def test_capsule_drains_as_a_line_does() -> None:
 
 
 def test_start_is_where_the_placement_says() -> None:
-    run = sp.simulate("biorob2012-wide", turns=0.1, placement={"gap": "1.3 mm"})
+    run = sp.simulate("biorob2012-wide", placement={"gap": "1.3 mm"}, timing={"turns": 0.1})
     assert float(run["wall_gap"][0]) == pytest.approx(1.3e-3, rel=1e-9)
-    run = sp.simulate("biorob2012-wide", turns=0.1, placement={"gap": "1.3 mm", "pitch": "2 deg"})
+    run = sp.simulate("biorob2012-wide", placement={"gap": "1.3 mm", "pitch": "2 deg"}, timing={"turns": 0.1})
     assert float(run["pitch"][0]) == pytest.approx(np.radians(2.0), rel=1e-9)
     assert float(run["wall_gap"][0]) == pytest.approx(1.3e-3, rel=2e-2)  # a ring's farthest point, to the tilt squared
-    run = sp.simulate("biorob2012-wide", turns=0.1, placement={"eccentricity": 0.0})
+    run = sp.simulate("biorob2012-wide", placement={"eccentricity": 0.0}, timing={"turns": 0.1})
     assert float(run["wall_gap"][0]) == pytest.approx(0.011, rel=1e-9)
 
 
@@ -143,7 +148,7 @@ def test_pressed_robot_stays_off_the_wall_and_its_energy_balanced(channel: str, 
         "magnetic-helix",
         **{"channel": {"diameter": channel}, "magnetic.moment_angle": angle, "magnetic.field": field},
     )
-    run = sp.simulate(robot, turns=4.0)
+    run = sp.simulate(robot, timing={"turns": 4.0})
     assert "film as thin as the roughness" in events(run)
     assert float(run["wall_gap"].min()) > 1e-4 * 1.5e-3  # the roughness
     spent = run["dissipated_energy"] + run["potential_energy"] - run["potential_energy"][0]
@@ -193,13 +198,13 @@ def test_start_at_the_wall_names_what_puts_it_there(placement: Any, roughness: A
 
 
 def test_battery_spent_before_the_first_sample_is_found() -> None:
-    run = sp.simulate(sp.load("biorob2012-wide", **{"battery.capacity": "1e-9 C"}), turns=1.0)
+    run = sp.simulate(sp.load("biorob2012-wide", **{"battery.capacity": "1e-9 C"}), timing={"turns": 1.0})
     assert 0 < events(run)["battery empty"] < 1e-3
 
 
 def test_run_ends_where_the_tube_ends() -> None:
     robot = sp.load("biorob2012-wide", **{"channel.length": "120 mm"})
-    run = sp.simulate(robot, duration="60 s")
+    run = sp.simulate(robot, timing={"duration": "60 s"})
     along = np.cos(float(run["pitch"][-1])) * np.cos(float(run["yaw"][-1]))
     nose = float(run["position"][-1, 0]) + 0.0175 * along
     assert nose - run.attrs["channel_middle"] == pytest.approx(0.06, abs=1e-9)
@@ -208,7 +213,7 @@ def test_run_ends_where_the_tube_ends() -> None:
 
 def test_spent_battery_drives_no_longer() -> None:
     robot = sp.load("biorob2012-wide", **{"battery.capacity": "0.2 mA h"})
-    run = sp.simulate(robot, duration="4 s")
+    run = sp.simulate(robot, timing={"duration": "4 s"})
     when = events(run)["battery empty"]
     after = run.sel(time=slice(when + 0.1, None))
     assert float(run["battery_charge_used"][-1]) == pytest.approx(0.72, rel=1e-6)
@@ -220,8 +225,8 @@ def test_duty_file_and_windows_are_one_thing(tmp_path: Path) -> None:
     table = tmp_path / "duty.csv"
     table.write_text("# the remote\ntime_s, duty\n0.1,1\n0.3,0\n", "utf-8")
     for motion in ("free", "held"):
-        by_file = sp.simulate("biorob2012-wide", duration="0.5 s", duty=table, motion=motion)
-        by_window = sp.simulate("biorob2012-wide", duration="0.5 s", on=[(0.1, 0.3)], motion=motion)
+        by_file = sp.simulate("biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "duty": table})
+        by_window = sp.simulate("biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "on": [(0.1, 0.3)]})
         assert by_file.equals(by_window)
 
 
@@ -242,7 +247,7 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
     table = tmp_path / "duty.csv"
     table.write_text(text, "utf-8")
     with pytest.raises(sp.InputError, match="allowed") as caught:
-        sp.simulate("biorob2012-wide", duty=table)
+        sp.simulate("biorob2012-wide", timing={"duty": table})
     assert words in str(caught.value)
 
 
@@ -258,10 +263,10 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
         ({"roughness": "-1 um"}, "roughness"),
         ({"motion": "held", "weight": False}, "weight"),
         ({"motion": "held", "placement": {"gap": "1 mm"}}, "placement"),
-        ({"on": [(0.0, 1.0)], "duty": "duty.csv"}, "together"),
-        ({"turns": 5e-324}, "turns = 5e-324"),
-        ({"duration": 1e-12}, "duration = 1e-12"),
-        ({"turns": float("nan")}, "turns = nan"),
+        ({"timing": {"on": [(0.0, 1.0)], "duty": "duty.csv"}}, "together"),
+        ({"timing": {"turns": 5e-324}}, "turns = 5e-324"),
+        ({"timing": {"duration": 1e-12}}, "duration = 1e-12"),
+        ({"timing": {"turns": float("nan")}}, "turns = nan"),
     ],
 )
 def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
@@ -273,10 +278,13 @@ def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"on": "0s:1s"}, "on = 0s:1s"),
-        ({"on": [1]}, "on = [1]"),
-        ({"duty": 0.5}, "duty = 0.5"),
-        ({"samples_per_turn": "x"}, "samples-per-turn = x"),
+        ({"timing": {"turn": 3.0}}, "timing.turn is not a known field (did you mean turns?)"),
+        ({"timing": 3.0}, "timing = '3.0'"),
+        ({"timing": {"turns": "many"}}, "turns = many"),
+        ({"timing": {"on": "0s:1s"}}, "on = 0s:1s"),
+        ({"timing": {"on": [1]}}, "on = [1]"),
+        ({"timing": {"duty": 0.5}}, "duty = 0.5"),
+        ({"timing": {"samples_per_turn": "x"}}, "samples-per-turn = x"),
     ],
 )
 def test_wrong_types_get_a_sentence_too(options: dict[str, Any], words: str) -> None:

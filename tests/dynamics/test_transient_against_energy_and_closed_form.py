@@ -31,7 +31,7 @@ ENERGIES = (
 @pytest.mark.parametrize("model", ["sbt", "rft"])
 def test_energy_is_balanced_at_every_sample(reading: str, hand: str, model: str) -> None:
     robot = sp.load("biorob2012-narrow", **{"tail.handedness": hand, "drive.duty": 0.7})
-    run = held(robot, model=model, friction=reading, on=[(0.0, 0.1), (0.15, 1.0)])
+    run = held(robot, model=model, friction=reading, timing={"on": [(0.0, 0.1), (0.15, 1.0)]})
     spent = sum(run[name] for name in ENERGIES)
     scale = float(run["electrical_energy"][-1])
     assert scale > 0
@@ -39,7 +39,7 @@ def test_energy_is_balanced_at_every_sample(reading: str, hand: str, model: str)
 
 
 def test_energies_are_the_integrals_of_their_powers() -> None:
-    run = held("biorob2012-wide", model="rft", duration="0.05 s", samples_per_turn=10_000)
+    run = held("biorob2012-wide", model="rft", timing={"duration": "0.05 s", "samples_per_turn": 10_000})
     for name in ("electrical", "friction", "dissipated"):
         power, time = run[f"{name}_power"].values, run["time"].values
         integral = np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(time))
@@ -49,7 +49,7 @@ def test_energies_are_the_integrals_of_their_powers() -> None:
 def test_linear_circuit_rises_exponentially() -> None:
     """With constant R, L dI/dt = V - (R + r + K_b K_m dw/dtau) I has a closed form."""
     robot = sp.load("biorob2012-wide", **LINEAR_CIRCUIT)
-    run = held(robot, model="rft", duration="0.05 s", samples_per_turn=1000)
+    run = held(robot, model="rft", timing={"duration": "0.05 s", "samples_per_turn": 1000})
     steady = sp.predict(robot, model="rft")
     rate_per_current = steady.motor_rotation_rate / steady.motor_current
     resistance = 10.0 + 0.8 + 0.004 * rate_per_current
@@ -69,15 +69,15 @@ def test_average_over_the_last_two_of_three_turns_is_the_steady_state(model: str
 
 
 def test_left_handed_robot_is_the_mirror_image() -> None:
-    right = held("biorob2012-wide", duration="0.1 s")
-    left = held(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), duration="0.1 s")
+    right = held("biorob2012-wide", timing={"duration": "0.1 s"})
+    left = held(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), timing={"duration": "0.1 s"})
     np.testing.assert_allclose(left["position"], right["position"], rtol=1e-12)
     for name in ("tail_angle", "body_angle", "motor_current", "motor_torque"):
         np.testing.assert_allclose(left[name], -right[name], rtol=1e-12)
 
 
 def test_switching_off_stops_the_robot() -> None:
-    run = held("biorob2012-wide", duration="1 s", on=[(0.0, 0.4)])
+    run = held("biorob2012-wide", timing={"duration": "1 s", "on": [(0.0, 0.4)]})
     late = run.sel(time=slice(0.6, None))
     assert float(abs(late["motor_current"]).max()) < 1e-9
     assert float(late["position"][-1] - late["position"][0]) == pytest.approx(0.0, abs=1e-12)
@@ -85,7 +85,7 @@ def test_switching_off_stops_the_robot() -> None:
 
 
 def test_battery_gives_duty_times_the_motor_current() -> None:
-    half = held(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), duration="0.5 s")
+    half = held(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), timing={"duration": "0.5 s"})
     charge = np.trapezoid(0.5 * half["motor_current"].values, half["time"].values)
     assert float(half["battery_charge_used"][-1]) == pytest.approx(charge, rel=1e-3)
 
@@ -93,16 +93,16 @@ def test_battery_gives_duty_times_the_motor_current() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"turns": 0.0}, "turns = 0.0"),
-        ({"turns": float("nan")}, "turns = nan"),
-        ({"duration": "2 m"}, "duration"),
-        ({"duration": "0 s"}, "duration = 0"),
-        ({"on": [(1.0, 0.5)]}, "on = 1 s to 0.5 s"),
-        ({"on": [(0.0, 1.0), (0.5, 2.0)]}, "on = 0.5 s to 2 s"),
-        ({"on": [(float("nan"), 1.0)]}, 'on = "nan s"'),
-        ({"samples_per_turn": 0}, "samples-per-turn"),
-        ({"turns": 1e5, "samples_per_turn": 10_000}, "samples-per-turn"),
-        ({"duration": "1e5 s", "samples_per_turn": 1}, "1e+05 s"),
+        ({"timing": {"turns": 0.0}}, "turns = 0.0"),
+        ({"timing": {"turns": float("nan")}}, "turns = nan"),
+        ({"timing": {"duration": "2 m"}}, "duration"),
+        ({"timing": {"duration": "0 s"}}, "duration = 0"),
+        ({"timing": {"on": [(1.0, 0.5)]}}, "on = 1 s to 0.5 s"),
+        ({"timing": {"on": [(0.0, 1.0), (0.5, 2.0)]}}, "on = 0.5 s to 2 s"),
+        ({"timing": {"on": [(float("nan"), 1.0)]}}, 'on = "nan s"'),
+        ({"timing": {"samples_per_turn": 0}}, "samples-per-turn"),
+        ({"timing": {"turns": 1e5, "samples_per_turn": 10_000}}, "samples-per-turn"),
+        ({"timing": {"duration": "1e5 s", "samples_per_turn": 1}}, "1e+05 s"),
     ],
 )
 def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:
@@ -112,8 +112,8 @@ def test_wrong_runs_are_refused(options: dict[str, object], words: str) -> None:
 
 
 def test_switching_times_are_quantities_too() -> None:
-    in_words = held("biorob2012-wide", duration="0.2 s", on=[("0 s", "100 ms")])
-    in_seconds = held("biorob2012-wide", duration=0.2, on=[(0.0, 0.1)])
+    in_words = held("biorob2012-wide", timing={"duration": "0.2 s", "on": [("0 s", "100 ms")]})
+    in_seconds = held("biorob2012-wide", timing={"duration": 0.2, "on": [(0.0, 0.1)]})
     assert in_words.identical(in_seconds)
     assert in_words.attrs["switches"] == "duty 1 from 0 s, duty 0 from 0.1 s"
 
@@ -125,7 +125,7 @@ def test_only_a_motor_has_a_transient() -> None:
 
 
 def test_accuracy_reaches_the_model_and_its_error_the_dataset() -> None:
-    settings = {"model": "slender", "duration": "1 s"}
+    settings = {"model": "slender", "timing": {"duration": "1 s"}}
     standard, high = (
         held("biorob2012-wide", resolution={"accuracy": accuracy}, **settings) for accuracy in ("standard", "high")
     )

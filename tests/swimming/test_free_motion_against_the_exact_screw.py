@@ -36,7 +36,9 @@ def links_of(built: sp.Robot, model: str = "rft") -> TwoLinks:
 @pytest.mark.parametrize("model", ["rft", "slender"])
 def test_hundred_turns_end_where_the_screw_ends(model: str) -> None:
     built = robot()
-    run = sp.simulate(built, model=model, turns=100.0, weight=False, calibrated=False, samples_per_turn=40)
+    run = sp.simulate(
+        built, model=model, weight=False, calibrated=False, timing={"turns": 100.0, "samples_per_turn": 40}
+    )
     steady = sp.predict(built, model=model, motion="free", calibrated=False)
     settled = run.sel(time=slice(0.2, None))
     time, path = settled["time"].values, settled["position"].values
@@ -102,7 +104,8 @@ def test_reversed_tail_retraces_the_path() -> None:
 
 def test_left_handed_robot_is_the_mirror_image() -> None:
     right, left = (
-        sp.simulate(robot(**{"tail.handedness": hand}), duration="2 s", weight=False) for hand in ("right", "left")
+        sp.simulate(robot(**{"tail.handedness": hand}), weight=False, timing={"duration": "2 s"})
+        for hand in ("right", "left")
     )
     mirror = np.array([1.0, 1.0, -1.0])  # z -> -z takes the wire at phase 0 into its mirror image
     np.testing.assert_allclose(left["position"], right["position"] * mirror, atol=1e-10)

@@ -8,24 +8,21 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.remote import schedule, windows_of
-from spirillum.dynamics.sampling import duration_of, late_averages, sample_times
+from spirillum.dynamics.sampling import late_averages
+from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
 from spirillum.quantities import attributes
 from spirillum.robot.batch import Electrics, RobotBatch
-from spirillum.robot.options import Resolution
-from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import friction_torques, rates_per_torque
 from spirillum.swimming.motor import battery_voltage, winding_resistance
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.steady import calibrated_balance
 from spirillum.units import show
 from spirillum.version import versions
@@ -33,12 +30,13 @@ from spirillum.version import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AxialResponse", "MotorTransient", "axial_response", "motor_transient", "swim_in_time"]
+__all__ = ["AxialResponse", "MotorTransient", "axial_response", "held_run", "motor_transient"]
 
 _TOLERANCE = 1e-9
 # Orders above 4 have so small a region of stability that the decay with L/R needs ten times the steps.
 _HIGHEST_ORDER = 4
 _MOST_TIME_CONSTANTS = 1e6
+_SOURCE = "motor current (17) and the robot's linear response (8), (15)"
 
 
 class AxialResponse(NamedTuple):
@@ -187,61 +185,30 @@ def _segment(
     return block, np.array(last)
 
 
-def swim_in_time(
-    robot: str | Path | Mapping[str, Any] | Robot,
-    *,
-    model: str = "sbt",
-    friction: str | None = None,
-    calibrated: bool = True,
-    calibration: str | Path | None = None,
-    turns: float = 3.0,
-    duration: str | float | None = None,
-    on: Sequence[tuple[str | float, str | float]] | None = None,
-    duty: str | Path | None = None,
-    samples_per_turn: int = 100,
-    resolution: Resolution | Mapping[str, Any] | None = None,
-) -> xr.Dataset:
-    """Axial swimming (two degrees of freedom) from rest: `spirillum.simulate` with `motion="held"`.
+def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
+    """Axial swimming (two degrees of freedom) from rest.
 
     Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
-        model: `sbt`, `rft`, `slender` or `tube`.
-        friction: reading of the friction; None: the robot's own.
-        calibrated: apply the robot's calibration factors for this model.
-        calibration: calibration file whose factors replace the robot's.
-        turns: length of the run in turns of the tail at its steady rate (the paper's three periods).
-        duration: length of the run instead, with its unit (``"2 s"``) or a float in s.
-        on: times (start, stop) between which the remote switches the motor on, each with its unit (``"2 s"``) or a
-            float in s; None: on throughout.
-        duty: duty file instead, see `spirillum.dynamics.remote`.
-        samples_per_turn: samples of the output per steady turn of the tail.
-        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
+        prediction: steady motion of a robot with a `dc-motor` drive, any model that swims.
+        timing: length, sampling and remote control.
 
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
         averages over the last two thirds of the run as scalars; settings in the attributes.
 
     Raises:
-        InputError: for wrong input or a drive without a motor.
+        InputError: for a wrong timing or a drive without a motor.
     """
-    prediction = predict(
-        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, resolution=resolution
-    )
     batch = prediction.batch
     if batch.drive != "dc-motor" or batch.electrics is None:
         raise InputError(f"drive.kind = '{batch.drive}'; allowed: 'dc-motor', which alone has a transient")
     if prediction.tail_rotation_rate == 0:
         raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
-    end = duration_of(turns, turn, duration)
-    time = sample_times(end, turn, samples_per_turn)
-    switches = schedule(windows_of(on), duty, float(batch.electrics.duty[0]), end)
+    _, time, switches = timing.timetable(turn, float(batch.electrics.duty[0]))
     response = axial_response(batch, prediction)
     transient = motor_transient(batch.electrics, response.slip, time, switches)
     return _dataset(prediction, batch.electrics, response, transient, switches)
-
-
-_SOURCE = "motor current (17) and the robot's linear response (8), (15)"
 
 
 def _dataset(

@@ -60,8 +60,6 @@ def schedule(on: Sequence[Window] | None, table: str | Path | None, duty: float,
         InputError: for times that go back, both ways at once, or a wrong file.
     """
     if table is not None:
-        if not isinstance(table, (str, Path)):
-            raise InputError(f"duty = {str(table)[:40]}; allowed: a duty file; one number is drive.duty of the robot")
         if on is not None:
             raise InputError(f"on and duty = {str(table)[:80]} are given together; allowed: one of them")
         return [step for step in read_duty(table) if step.time < end]

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.held import swim_in_time
+from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import integrate
 from spirillum.dynamics.record import dataset_of
-from spirillum.dynamics.remote import schedule, windows_of
-from spirillum.dynamics.sampling import duration_of, sample_times
 from spirillum.dynamics.start import reach_of, start_state
+from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
@@ -40,11 +39,7 @@ def simulate(
     friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
-    turns: float = 3.0,
-    duration: str | float | None = None,
-    on: Sequence[tuple[str | float, str | float]] | None = None,
-    duty: str | Path | None = None,
-    samples_per_turn: int = 100,
+    timing: Timing | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
@@ -63,12 +58,8 @@ def simulate(
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
-        turns: length of the run in turns of the tail at its steady rate (the paper's three periods), or of the field.
-        duration: length of the run instead, with its unit (``"2 s"``) or a float in s.
-        on: times (start, stop) between which the remote switches the drive on, each with its unit (``"2 s"``) or a
-            float in s; None: on throughout.
-        duty: duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next.
-        samples_per_turn: samples of the output per steady turn of the tail.
+        timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
+            turns, on throughout.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
             starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
@@ -83,23 +74,12 @@ def simulate(
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
-    placed = Placement.of(placement)
-    if motion_of(motion) == "held":
+    placed, times = Placement.of(placement), Timing.of(timing)
+    held = motion_of(motion) == "held"
+    if held:
         _check_held(placed, roughness, weight=weight)
-        return swim_in_time(
-            robot,
-            model=model,
-            friction=friction,
-            calibrated=calibrated,
-            calibration=calibration,
-            turns=turns,
-            duration=duration,
-            on=on,
-            duty=duty,
-            samples_per_turn=samples_per_turn,
-            resolution=resolution,
-        )
-    check_full(find_swimmer_model(model))
+    else:
+        check_full(find_swimmer_model(model))
     steady = predict(
         robot,
         model=model,
@@ -109,11 +89,10 @@ def simulate(
         resolution=resolution,
         progress=progress,
     )
-    turn = 2.0 * np.pi / _turning(steady)
-    end = duration_of(turns, turn, duration)
-    time = sample_times(end, turn, samples_per_turn)
+    if held:
+        return held_run(steady, times)
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
-    switches = schedule(windows_of(on), duty, own, end)
+    end, time, switches = times.timetable(2.0 * np.pi / _turning(steady), own)
     links = _links(steady, roughness, weight=weight)
     start = start_state(steady.robot, placed, lying=float(links.weight[: kernel.MOMENT_BODY].sum()) > 0)
     _check_clear(links, start, placed)

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from dataclasses import field as repr_field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, cast, get_args, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
+from spirillum.fields.fluid_field import FluidField
 from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid, volume_grid
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fields.unbounded import flow_field
@@ -33,7 +34,6 @@ __all__ = [
     "PLANE_RESOLUTION",
     "VOLUME_RESOLUTION",
     "Flow",
-    "FluidField",
     "Frame",
     "box_around",
     "flow",
@@ -47,24 +47,6 @@ Frame = Literal["lab", "body"]
 _OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
 PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
 """Points along the longest side of a plane and of a box."""
-
-
-@runtime_checkable
-class FluidField(Protocol):
-    """Flow at one instant in the lab frame; SI, body axes."""
-
-    def inside(self, points: Samples) -> np.ndarray:
-        """Whether each of the points (n, 3) lies inside a solid or outside the tube, (n,)."""
-
-    def fields(self, points: Samples) -> tuple[Samples, Samples]:
-        """Velocity (n, 3) and pressure (n,) at points in the fluid.
-
-        Raises:
-            InputError: if a point lies inside a solid or outside the tube.
-        """
-
-    def wrench(self) -> Samples:
-        """Force (N) and torque about the origin (N m) that hold the robot to its motion, (6,)."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
-from spirillum.fields.unbounded import checked_points, in_fluid
+from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
 from spirillum.fluid.tube.domain import seat_of
 from spirillum.fluid.tube.model import held_robot
@@ -43,8 +43,8 @@ _SHARES = 8
 
 
 @dataclass(frozen=True)
-class TubeFlowField:
-    """Flow at one instant in the lab frame; SI, body axes, origin at the body's mid-length.
+class TubeFlowField(FluidField):
+    """Flow at one instant in a tube.
 
     The pressure is that above the mean of both ends of a tube in whose middle the body lies.
     """
@@ -63,55 +63,16 @@ class TubeFlowField:
     """Pa s."""
 
     def part_at(self, points: Samples) -> np.ndarray:
-        """Name of the part in which each point lies, `glass` at and beyond the wall, empty for the fluid, (n,).
-
-        Args:
-            points: (n, 3), m.
-        """
+        """See `FluidField.part_at`."""
         turned = checked_points(points) @ _TURN.T
-        x, rho = turned[:, 0], np.hypot(turned[:, 1], turned[:, 2])
-        names = np.full(len(turned), "", dtype="U8")
         placed = self.seat.placed(turned)
-        names[np.hypot(placed[:, 1], placed[:, 2]) >= self.seat.radius] = "glass"
-        for wire in self.held.strengths.wires:
-            names[wire.distance(turned) < wire.radius] = "tail"
-        for name, outline in self.solids:
-            names[outline.contains(x, rho)] = name
-        return names
-
-    def inside(self, points: Samples) -> np.ndarray:
-        """Whether each point lies in body, coupling, wire or glass, (n,)."""
-        return np.asarray(self.part_at(points) != "")
-
-    def velocity(self, points: Samples) -> Samples:
-        """Velocity of the fluid, m/s, (n, 3).
-
-        Args:
-            points: (n, 3), m.
-
-        Raises:
-            InputError: if a point lies inside a solid or outside the tube, or is not finite.
-        """
-        return self.fields(points)[0]
-
-    def pressure(self, points: Samples) -> Samples:
-        """Pressure of the fluid above the mean of both ends, Pa, (n,).
-
-        Args:
-            points: (n, 3), m.
-
-        Raises:
-            InputError: if a point lies inside a solid or outside the tube, or is not finite.
-        """
-        return self.fields(points)[1]
+        outside = np.hypot(placed[:, 1], placed[:, 2]) >= self.seat.radius
+        names = np.where(outside, "glass", "").astype("U8")
+        return name_parts(names, turned, self.held.strengths.wires, self.solids)
 
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
-        """Velocity, (n, 3), and pressure, (n,), together.
-
-        Raises:
-            InputError: if a point lies inside a solid or outside the tube, or is not finite.
-        """
-        turned = in_fluid(points, self.part_at) @ _TURN.T
+        """See `FluidField.fields`."""
+        turned = self.in_fluid(points) @ _TURN.T
         placed = self.seat.placed(turned)
         found = self._through_flow(placed)
         near = np.abs(placed[:, 0] - self._wall.middle) < self._wall.reach
@@ -126,7 +87,7 @@ class TubeFlowField:
         return found[:, :3] @ self.seat.rotation @ _TURN, found[:, 3]
 
     def wrench(self) -> Samples:
-        """Force (N) and torque about the origin (N m) that hold the whole robot to its motion, body axes, (6,)."""
+        """See `FluidField.wrench`."""
         both = self.viscosity * (self.held.matrix @ self.twists - self.mean_flow * self.held.load)
         held: Samples = both[:6] + both[6:]
         return held
@@ -168,17 +129,9 @@ class TubeFlowField:
 
     def _unbounded(self, turned: Samples) -> Samples:
         """The flow without the wall, as `kernels.field` has it, (n, 4)."""
-        from spirillum.kernels.field import add_blobs, add_layer
-
-        field = np.zeros((len(turned), 4))
-        start = 0
-        for wire in self.held.strengths.wires:
-            count = len(wire.points)
-            e2 = np.full(count, wire.blob**2)
-            add_blobs(turned, wire.points, self._forces[start : start + count], e2, field)
-            start += count
-        panels = self.held.strengths.solids.panels
-        add_layer(turned, panels.x, panels.rho, self._density, panels.rule, field)
+        strengths, field = self.held.strengths, np.zeros((len(turned), 4))
+        layer = strengths.solids.panels, self._density
+        add_tractions(turned, strengths.wires, self._forces, layer, field)
         return field
 
 
@@ -376,7 +329,7 @@ def tube_flow_field(
     Args:
         batch: one robot in its place, inside the domain of the model `tube`.
         body_twist: velocity (m/s) and rotation (rad/s) of the body about the origin, body axes, (6,).
-        rotor_twist: the same of the rotor.
+        rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
         phase: phase phi of the tail, rad.
         mean_flow: mean velocity of the fluid through the tube, m/s.
     """

@@ -79,7 +79,7 @@ class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
-        """The same flow resolved otherwise: the relative difference of the forward velocities is the error estimate.
+        """This model at another resolution: the relative difference of the forward velocities is the error estimate.
 
         None for a model in closed form, which has a known error only.
         """

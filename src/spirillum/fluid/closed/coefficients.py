@@ -34,7 +34,11 @@ class LocalCoefficients(NamedTuple):
 
 
 def printed(batch: RobotBatch) -> LocalCoefficients:
-    """Eqs (13) and (14) as the paper prints them, with log(lambda/D_t)."""
+    """Eqs (13) and (14) as the paper prints them.
+
+    (13)  c_t = 2 pi mu/(log(lambda/D_t) - 1/2)     along the wire
+    (14)  c_n = 4 pi mu/(log(lambda/D_t) + 1/2)     across it
+    """
     return _gray_hancock_form(batch.viscosity, np.log(batch.wavelength / batch.wire_diameter))
 
 

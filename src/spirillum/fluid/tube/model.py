@@ -44,7 +44,7 @@ END_LOSS = 1.09
 _CUT = 0.2
 """Tolerance of waves and modes over that of the speed: at gaps of 0.2 and 0.5 mm speeds are then good to a tenth."""
 _COARSER = 10.0
-"""The same of the resolution that gives the error estimate."""
+"""Tolerance of the resolution that gives the error estimate, over that of the answer."""
 _COARSEST = 0.05
 """Coarsest tolerance of Fourier modes."""
 _MOST_WAVES = 1_000_000

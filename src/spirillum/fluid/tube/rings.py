@@ -23,7 +23,7 @@ __all__ = ["LevelRings", "Rings", "Rows", "TiltedRings"]
 _FINER = 4
 """Nodes that average waves over a panel, over its own."""
 _FINER_TILTED = 2
-"""The same where the axis is pitched: bodies then come close to the wall in one place only."""
+"""Nodes of that average where the axis is pitched: bodies then come close to the wall in one place only."""
 _TIER = 1.6
 """Ratio of the distances from the wall in one tier of panels."""
 _AVERAGED_TIERS = 3

@@ -211,7 +211,7 @@ class _Images:
     drift: Samples
     """Velocities and gradients at the stations from the solids' motion; as S of `WireSystem`."""
     drag: Samples
-    """The same from what forces and moments at the stations exert on the solids; equal to `drift` by reciprocity."""
+    """Forces on the moving solids per force and moment at the stations; equal to `drift` by reciprocity."""
     moving: Amplitudes
     """Densities from the solids' motion, (2, 3 nodes, 12)."""
     held: tuple[tuple[np.ndarray, Samples], ...]

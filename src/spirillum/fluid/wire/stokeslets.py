@@ -140,7 +140,14 @@ def _checked(curve: Samples, radius: float, spacing: float, *, closed: bool) -> 
 
 
 def stations_along(curve: Samples, radius: float, spacing: float = 1.0, *, closed: bool = False) -> Wire:
-    """The same of a curve that is known to make a wire; it may touch itself."""
+    """Cut a curve that is known to make a wire into stations; it may touch itself.
+
+    Args:
+        curve: (n, 3) centreline, m.
+        radius: of the wire, m.
+        spacing: of the stations, relative to the standard one.
+        closed: whether the curve ends where it starts.
+    """
     from scipy.interpolate import CubicSpline
 
     gaps = np.linalg.norm(np.diff(curve, axis=0), axis=1)

@@ -1,0 +1,151 @@
+"""Flow at one instant: what flows in unbounded fluid and in a tube have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from spirillum.arrays import Amplitudes, Samples
+from spirillum.errors import InputError
+from spirillum.fluid.wire.revolution import Panels
+from spirillum.fluid.wire.stokeslets import Wire
+from spirillum.robot.outline import Outline
+
+__all__ = ["FluidField", "add_tractions", "checked_points", "name_parts"]
+
+_FARTHEST = 1e9
+
+
+class FluidField(ABC):
+    """Flow at one instant in the lab frame; SI, body axes, origin at the body's mid-length."""
+
+    @abstractmethod
+    def part_at(self, points: Samples) -> np.ndarray:
+        """Name of the part in which each point lies, `glass` at and beyond a tube's wall, empty for the fluid, (n,).
+
+        Args:
+            points: (n, 3), m.
+        """
+
+    @abstractmethod
+    def fields(self, points: Samples) -> tuple[Samples, Samples]:
+        """Velocity, (n, 3), and pressure, (n,), together.
+
+        Raises:
+            InputError: if a point lies inside a solid or outside the tube, or is not finite.
+        """
+
+    @abstractmethod
+    def wrench(self) -> Samples:
+        """Force (N) and torque about the origin (N m) that hold the whole robot to its motion, body axes, (6,)."""
+
+    def inside(self, points: Samples) -> np.ndarray:
+        """Whether each of the points (n, 3) lies inside a solid or outside the tube, (n,)."""
+        return np.asarray(self.part_at(points) != "")
+
+    def velocity(self, points: Samples) -> Samples:
+        """Velocity of the fluid, m/s, (n, 3).
+
+        Args:
+            points: (n, 3), m.
+
+        Raises:
+            InputError: as `fields`.
+        """
+        return self.fields(points)[0]
+
+    def pressure(self, points: Samples) -> Samples:
+        """Pressure of the fluid above that far away, in a tube above the mean of both ends, Pa, (n,).
+
+        Args:
+            points: (n, 3), m.
+
+        Raises:
+            InputError: as `fields`.
+        """
+        return self.fields(points)[1]
+
+    def in_fluid(self, points: Samples) -> Samples:
+        """Points that lie in the fluid, (n, 3).
+
+        Raises:
+            InputError: if one of them does not, or as `checked_points`.
+        """
+        places = checked_points(points)
+        names = self.part_at(places)
+        if np.any(names != ""):
+            first = int(np.argmax(names != ""))
+            at = ", ".join(f"{1e3 * float(value):.4g}" for value in places[first])
+            raise InputError(f"point {first} = ({at}) mm lies inside the {names[first]}; allowed: points in the fluid")
+        return places
+
+
+def checked_points(points: Samples) -> Samples:
+    """Points as floats, (n, 3).
+
+    Raises:
+        InputError: if they have another shape, are not finite or lie too far away.
+    """
+    try:
+        places = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError("points are no numbers; allowed: rows (x, y, z) in m") from error
+    if places.ndim != 2 or places.shape[1] != 3 or not np.all(np.isfinite(places)):
+        raise InputError(f"points have shape {places.shape}; allowed: finite coordinates in m, one row (x, y, z) each")
+    if np.any(np.abs(places) > _FARTHEST):
+        raise InputError(f"points lie farther away than {_FARTHEST:g} m; allowed: nearer ones")
+    return np.ascontiguousarray(places)
+
+
+def name_parts(
+    names: np.ndarray, points: Samples, wires: Iterable[Wire], solids: Iterable[tuple[str, Outline]]
+) -> np.ndarray:
+    """Enter the name of each part at the points inside it; returns `names`.
+
+    Args:
+        names: (n,), changed in place.
+        points: (n, 3) in axes whose x runs along the robot and in which the wires are given, m.
+        wires: all of them the tail.
+        solids: names and outlines of the solids of revolution.
+    """
+    x, rho = points[:, 0], np.hypot(points[:, 1], points[:, 2])
+    for wire in wires:
+        names[wire.distance(points) < wire.radius] = "tail"
+    for name, outline in solids:
+        names[outline.contains(x, rho)] = name
+    return names
+
+
+def add_tractions(
+    points: Samples,
+    wires: Sequence[Wire],
+    forces: Samples,
+    layer: tuple[Panels, Amplitudes] | None,
+    field: Samples,
+    moments: Samples | None = None,
+) -> None:
+    """Add the flow of forces along wires and of a single layer in unbounded fluid to `field`, see `kernels.field`.
+
+    Args:
+        points: (n, 3), m.
+        wires: wires with stations.
+        forces: at the stations of all wires, (stations, 3).
+        layer: panels of the solids and modes of the tractions on them, (panels, p, modes, 3).
+        field: velocity and pressure, (n, 4), without the factors 1/(8 pi mu) and 1/(8 pi).
+        moments: first moments of the forces at the stations, (stations, 3, 3).
+    """
+    from spirillum.kernels.field import add_blobs, add_layer, add_moments
+
+    start = 0
+    for wire in wires:
+        count = len(wire.points)
+        at, e2 = slice(start, start + count), np.full(count, wire.blob**2)
+        add_blobs(points, wire.points, forces[at], e2, field)
+        if moments is not None and np.any(moments):
+            add_moments(points, wire.points, moments[at], e2, field)
+        start += count
+    if layer is not None:
+        panels, density = layer
+        add_layer(points, panels.x, panels.rho, density, panels.rule, field)
