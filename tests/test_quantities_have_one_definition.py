@@ -49,8 +49,8 @@ def assert_registered(dataset: Any) -> None:
 
 
 def test_runs_carry_the_registrys_units() -> None:
-    assert_registered(sp.simulate("biorob2012-wide", motion="held", turns=0.2))
-    assert_registered(sp.simulate("biorob2012-wide", turns=0.2))
+    assert_registered(sp.simulate("biorob2012-wide", motion="held", timing={"turns": 0.2}))
+    assert_registered(sp.simulate("biorob2012-wide", timing={"turns": 0.2}))
 
 
 def test_studies_carry_the_registrys_units() -> None:

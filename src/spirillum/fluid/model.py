@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot
+from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.options import ModelOptions
@@ -55,6 +56,17 @@ class ResistanceModel(ABC):
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """Requirements on one part alone: those of the tail do not matter to body and coupling."""
         return [] if part in ("body", "coupling") else self.domain(batch)
+
+    def check_part(self, batch: RobotBatch, part: str) -> None:
+        """Refuse a part that the model does not know or the robot does not have.
+
+        Raises:
+            InputError: if it is one.
+        """
+        if part not in self.parts:
+            raise InputError(f"part = {part!r} with model '{self.name}'; allowed: {', '.join(self.parts)}")
+        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
+            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory's accuracy: where they are broken, the answer carries a warning."""

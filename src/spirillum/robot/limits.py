@@ -13,7 +13,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing, shortest_body
 from spirillum.units import show
 
-__all__ = ["Limit", "all_hold", "assembly_limits", "broken"]
+__all__ = ["Limit", "all_hold", "assembly_limits", "broken", "within"]
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,12 @@ def all_hold(limits: Iterable[Limit]) -> Flags:
 def assembly_limits(batch: RobotBatch) -> list[Limit]:
     """What a robot needs so that it can be built and put into its channel."""
     return [*_body_limits(batch), *_tail_limits(batch), *_channel_limits(batch)]
+
+
+def within(batch: RobotBatch, limits: Iterable[Limit] = ()) -> list[int]:
+    """Numbers of the robots that are known, can be built and keep all limits."""
+    fit = batch.known & all_hold([*assembly_limits(batch), *limits])
+    return [int(index) for index in np.flatnonzero(np.broadcast_to(fit, (batch.size,)))]
 
 
 def _channel_limits(b: RobotBatch) -> list[Limit]:

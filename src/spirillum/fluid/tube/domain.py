@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ from spirillum.answer import quantity
 from spirillum.arrays import PerRobot
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.limits import Limit, within
 from spirillum.robot.seat import Seat, gap_of, largest_gap
 from spirillum.units import show
 
@@ -150,8 +149,10 @@ def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
 def _films(batch: RobotBatch, part: str) -> _Films:
     asked, largest, coupling, tail = (np.full(batch.size, np.inf) for _ in range(4))
     where = ""
-    for index in _seated(batch):
+    for index in within(batch):
         g, radius = RobotGeometry.of(batch, index), _radius(batch, index)
+        if not np.isfinite(radius):
+            continue
         outlines = g.outlines
         asked[index] = gap_of(batch.placement, g.body_diameter, radius)
         largest[index] = largest_gap(outlines["body"], radius, batch.placement.pitch or 0.0)
@@ -163,9 +164,3 @@ def _films(batch: RobotBatch, part: str) -> _Films:
         if "tail" in PIECES[part]:
             tail[index], where = _tail_clearance(g, seat)
     return _Films(asked, largest, coupling, tail, where if batch.size == 1 else "")
-
-
-def _seated(batch: RobotBatch) -> Iterator[int]:
-    """Robots that can be built and have a channel around them."""
-    there = batch.known & all_hold(assembly_limits(batch)) & np.isfinite(batch.channel_diameter)
-    yield from np.flatnonzero(np.broadcast_to(there, (batch.size,))).tolist()

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Axial, AxialLoad, Flags, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
@@ -32,7 +32,7 @@ from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
 from spirillum.fluid.wire.stokeslets import Wire
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.limits import Limit, all_hold, within
 from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
@@ -185,9 +185,8 @@ class Tube(SwimmerModel):
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
         limits = [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
-        fit = np.broadcast_to(batch.known & all_hold(assembly_limits(batch) + limits), (batch.size,))
         unknowns, waves = np.zeros(batch.size), np.zeros(batch.size)
-        for index in np.flatnonzero(fit).tolist():
+        for index in within(batch, limits):
             g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
             key = _solid_key(g, part, seat, self.fineness(batch.options))
             unknowns[index] = _size(key)
@@ -256,22 +255,17 @@ class Tube(SwimmerModel):
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
         """See `ResistanceModel.part_matrix`; that part alone in the channel, where the robot lies."""
-        if part not in self.parts:
-            raise InputError(f"part = {part!r} with model 'tube'; allowed: {', '.join(self.parts)}")
-        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
-            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
+        self.check_part(batch, part)
         return joint_locked(self._with_ends(batch, self._full(batch, part, phase))[0][:, :-1, :-1])
 
     def _full(self, batch: RobotBatch, part: str, phase: PerRobot) -> Samples:
         """R, load and drag of a part, (n, 13, 13), no net flux; NaN outside the domain."""
         found = np.full((batch.size, MOTIONS, MOTIONS), np.nan)
-        limits = assembly_limits(batch) + self.part_domain(batch, part)
-        answerable: Flags = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
         fineness = self.fineness(batch.options)
         turns = np.broadcast_to(phase, (batch.size,))
-        for index in np.flatnonzero(answerable):
-            g, seat = RobotGeometry.of(batch, int(index)), seat_of(batch, int(index))
+        for index in within(batch, self.part_domain(batch, part)):
+            g, seat = RobotGeometry.of(batch, index), seat_of(batch, index)
             turn = float(turns[index]) if "tail" in PIECES[part] else 0.0
             question = _Question(g, part, seat, fineness, turn)
-            found[index] = number_of(batch.viscosity, int(index)) * _answer(question)
+            found[index] = number_of(batch.viscosity, index) * _answer(question)
         return found

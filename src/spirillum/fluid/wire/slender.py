@@ -11,8 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from spirillum.arrays import Axial, Flags, Matrix6, Matrix12, PerRobot, Samples
-from spirillum.errors import InputError
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
@@ -21,7 +20,7 @@ from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_spacing
-from spirillum.robot.limits import Limit, all_hold, assembly_limits
+from spirillum.robot.limits import Limit, within
 from spirillum.robot.options import ModelOptions
 
 __all__ = ["Slender", "robot_solution"]
@@ -65,12 +64,11 @@ def _slimness(batch: RobotBatch) -> list[Limit]:
     return [Limit.of(name, value, "at least", bound, "mm", why, "solid-too-slim") for name, value, bound in rows]
 
 
-def _apart(batch: RobotBatch, fit: Flags) -> Limit:
-    """No part of the wire touches another, the arm at its root included; asked of robots that can be built."""
-    fit = np.broadcast_to(fit & batch.known & all_hold(assembly_limits(batch)), (batch.size,))
+def _apart(batch: RobotBatch, limits: list[Limit]) -> Limit:
+    """No part of the wire touches another, the arm at its root included; asked of robots that keep the other limits."""
     nearest = np.full(batch.size, np.inf)
-    for index in np.flatnonzero(fit):
-        nearest[index] = _closest(RobotGeometry.of(batch, int(index)))
+    for index in within(batch, limits):
+        nearest[index] = _closest(RobotGeometry.of(batch, index))
     why = "the wire would touch another part of itself (tail.taper, tail.wavelength, tail.amplitude)"
     return Limit.of("tail.wire_diameter", batch.wire_diameter, "less than", nearest, "mm", why, "turns-touch")
 
@@ -177,7 +175,7 @@ class Slender(SwimmerModel):
             ),
             *_slimness(batch),
         ]
-        return [*limits, _apart(batch, all_hold(limits))]
+        return [*limits, _apart(batch, limits)]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
@@ -222,19 +220,14 @@ class Slender(SwimmerModel):
 
     def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:
         """See `ResistanceModel.part_matrix`; the rotor is coupling and tail."""
-        if part not in self.parts:
-            raise InputError(f"part = {part!r} with model 'slender'; allowed: {', '.join(self.parts)}")
-        if part == "coupling" and np.any((batch.coupling_length == 0) | (batch.coupling_diameter == 0)):
-            raise InputError("part = 'coupling': this robot has none (coupling.length or coupling.diameter is 0)")
+        self.check_part(batch, part)
         return rotated(joint_locked(self._matrices(batch, part)), axis_rotation(phase))
 
     def _matrices(self, batch: RobotBatch, part: str) -> Samples:
         """12x12 of a part at phase 0; the other entries are zero, all are NaN outside the domain."""
-        limits = assembly_limits(batch) + self.part_domain(batch, part)
-        answerable = np.broadcast_to(batch.known & all_hold(limits), (batch.size,))
         resolution = self._resolution or _RESOLUTIONS[batch.options.slender.accuracy]
         found = np.full((batch.size, 12, 12), np.nan)
-        for index in np.flatnonzero(answerable):
-            viscosity = number_of(batch.viscosity, int(index))
-            found[index] = viscosity * _matrix(RobotGeometry.of(batch, int(index)), part, resolution)
+        for index in within(batch, self.part_domain(batch, part)):
+            viscosity = number_of(batch.viscosity, index)
+            found[index] = viscosity * _matrix(RobotGeometry.of(batch, index), part, resolution)
         return found
