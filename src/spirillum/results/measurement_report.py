@@ -67,7 +67,7 @@ def _page(measurement: Measurement, pictures: list[EmbeddedPicture], thumbnails:
         overview=[picture for picture in pictures if picture.name == "trials"],
         scale=f"{100 * scale.relative_uncertainty:.2g} %",
         sources=[(name, f"{100 * share:.2g} %") for name, share in sources],
-        alike=_looks_alike(measurement),
+        aliasing=_aliasing(measurement),
         intervals=any(math.isfinite(item.low) for trial in measurement.trials for item in trial.quantities.values()),
         files=[name for name in measurement.files if not name.startswith("figures/")],
         versions=versions(),
@@ -89,7 +89,7 @@ def _trial(trial: Trial, pictures: list[EmbeddedPicture], thumbnails: Mapping[st
     }
 
 
-def _looks_alike(measurement: Measurement) -> str:
+def _aliasing(measurement: Measurement) -> str:
     """What no camera can tell of a rate, with the numbers of these films where all have the same."""
     angles = ("body_rotation_rate", "tail_rotation_rate")
     seen = [trial for trial in measurement.trials if any(trial.fits[name].frames > 2 for name in angles)]

@@ -126,7 +126,7 @@ def _signed_percent(share: float) -> str:
 
 def _draw(axes: Axes, comparison: ModelComparison, panel: _Panel) -> None:
     values = {name: panel.value(answer) for name, answer in comparison.predictions.items()}
-    scale = Scale(1.0, panel.unit) if panel.unit in ("1", "%") else Scale.of(np.array([*values.values()]), panel.unit)
+    scale = Scale.of(np.array([*values.values()]), panel.unit)
     reference = values[comparison.reference] / scale.factor
     axes.axvline(reference, color="#555555", linewidth=0.8, linestyle=(0, (4, 2)), zorder=1)
     axes.axvline(0.0, color="#444444", linewidth=0.7, zorder=1)

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from spirillum.arrays import Samples
 from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
-from spirillum.units import Hz
+from spirillum.quantities import unit_of
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain
 
@@ -27,12 +27,6 @@ _SERIES = (
     ("body_rotation_rate", "body's angle", "turn"),
     ("tail_rotation_rate", "tail's phase", "turn"),
 )
-_TITLES = {
-    "forward_velocity": ("forward velocity", "m/s"),
-    "body_rotation_rate": ("body rotation rate", "Hz"),
-    "tail_rotation_rate": ("tail rotation rate", "Hz"),
-    "motor_rotation_rate": ("motor rotation rate", "Hz"),
-}
 
 
 def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
@@ -107,7 +101,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     if not np.isfinite(rate.low):  # a line through two readings leaves nothing but rounding
         right.text(0.5, 0.5, "two readings", transform=right.transAxes, ha="center", color="#777777")
         return
-    small = Scale.of(rate.residual, "m") if unit == "m" else Scale(np.pi / 180, "deg")
+    small = Scale.of(rate.residual, "m" if unit == "m" else "rad")
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
     right.set_ylabel(small.unit)
@@ -118,10 +112,9 @@ def trials_figure(measurement: Measurement) -> Figure:
     figure = new_figure(7.2, 2.7)
     figure.set_layout_engine("constrained")
     for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
-        title, unit = _TITLES[name]
         items = [trial.quantities[name] for trial in measurement.trials]
         values = np.array([item.value for item in items])
-        scale = Scale(Hz, "Hz") if unit == "Hz" else Scale.of(values, unit)
+        scale = Scale.of(values, unit_of(name))
         at = np.arange(1.0, len(items) + 1.0)
         mean = measurement.summary.quantities[name]
         if np.isfinite(mean.low):
@@ -131,7 +124,7 @@ def trials_figure(measurement: Measurement) -> Figure:
         reach = np.array([[item.value - item.low for item in items], [item.high - item.value for item in items]])
         reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
         axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
-        axes.set_title(f"{title}, {scale.unit}", fontsize=8.0)
+        axes.set_title(f"{name.replace('_', ' ')}, {scale.unit}", fontsize=8.0)
         axes.set_xlim(0.4, len(items) + 0.6)
         axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])
         axes.yaxis.set_major_locator(MaxNLocator(5))

@@ -31,7 +31,7 @@ __all__ = [
 MOST_CURVES = 6
 """Amplitudes with a curve of their own against the assumed motor rate, for one or two models."""
 FEW_CURVES = 2
-"""The same for more models."""
+"""Amplitudes with a curve of their own, for more than two models."""
 MOST_LARGE_MARKS = 60
 """Robots of a list whose marks have full size."""
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")

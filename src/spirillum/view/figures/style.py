@@ -19,6 +19,7 @@ from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
 from spirillum.arrays import Values
 from spirillum.files import whole_file
+from spirillum.units import for_people, shown_in
 
 __all__ = [
     "COLOURS",
@@ -81,6 +82,7 @@ _NO_DATE: dict[str, dict[str, Any]] = {
 }
 _FORMULA = re.compile(r"(?<!\\)\$(.*?)(?<!\\)\$")
 _LETTERS = {r"\omega": "ω", r"\lambda": "λ", r"\mu": "μ", r"\rho": "ρ", r"\pi": "π", r"\Omega": "Ω", r"\,": " "}
+_WITHOUT_PREFIX = ("rad/s", "rad", "1", "%")
 _PREFIXES = (
     (1e-18, "a"),
     (1e-15, "f"),
@@ -133,7 +135,13 @@ class Scale:
 
     @classmethod
     def of(cls, values: Values, unit: str) -> Scale:
-        """Prefix for SI `values` of an SI `unit`: the largest one is then between 0.1 and 100, if possible."""
+        """Unit for SI `values` of an SI `unit`, with a prefix by which the largest is between 0.1 and 100, if possible.
+
+        Rates are shown in Hz, angles in degrees, shares as they are: none of them with a prefix.
+        """
+        if unit in _WITHOUT_PREFIX:
+            shown = for_people(unit)
+            return cls(1.0 / shown_in(1.0, shown) if shown != unit else 1.0, shown)
         finite = np.abs(values[np.isfinite(values)])
         largest = float(finite.max()) if finite.size else 0.0
         if largest == 0.0:

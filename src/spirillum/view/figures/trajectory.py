@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.units import Hz
+from spirillum.quantities import unit_of
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
@@ -37,8 +37,6 @@ class _Panel:
     """Lines over time with one unit."""
 
     label: str
-    unit: str
-    """SI unit; `Hz` and `deg` are shown without a prefix."""
     lines: tuple[tuple[str, str], ...]
     """Variable, and its words in the legend."""
     logarithmic: bool = False
@@ -46,18 +44,15 @@ class _Panel:
 
 
 _PANELS = (
-    _Panel("gap to the wall", "m", (("wall_gap", ""),)),
-    _Panel("velocity $U_x$", "m/s", (("forward_velocity", ""),)),
-    _Panel(
-        "rate", "Hz", (("tail_rotation_rate", "tail"), ("body_rotation_rate", "body"), ("motor_rotation_rate", "motor"))
-    ),
-    _Panel("angle", "deg", (("pitch", "pitch"), ("yaw", "yaw"))),
-    _Panel("wobble angle", "deg", (("wobble_angle", ""),)),
-    _Panel("phase lag", "deg", (("phase_lag", ""),)),
-    _Panel("motor current", "A", (("motor_current", ""),)),
+    _Panel("gap to the wall", (("wall_gap", ""),)),
+    _Panel("velocity $U_x$", (("forward_velocity", ""),)),
+    _Panel("rate", (("tail_rotation_rate", "tail"), ("body_rotation_rate", "body"), ("motor_rotation_rate", "motor"))),
+    _Panel("angle", (("pitch", "pitch"), ("yaw", "yaw"))),
+    _Panel("wobble angle", (("wobble_angle", ""),)),
+    _Panel("phase lag", (("phase_lag", ""),)),
+    _Panel("motor current", (("motor_current", ""),)),
     _Panel(
         "power",
-        "W",
         (
             ("electrical_power", "electrical"),
             ("shaft_power", "shaft"),
@@ -68,7 +63,6 @@ _PANELS = (
     ),
     _Panel(
         "energy",
-        "J",
         (
             ("electrical_energy", "electrical"),
             ("drive_energy", "drive"),
@@ -170,11 +164,10 @@ def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
 
 
 def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> Iterator[tuple[str, Samples]]:
-    """Words and values of the lines of a panel that the run has, in units of the panel before its prefix."""
-    factor = {"Hz": Hz, "deg": float(np.radians(1.0))}.get(panel.unit, 1.0)
+    """Words and SI values of the lines of a panel that the run has."""
     for name, words in panel.lines:
         if name in dataset and dataset[name].dims == ("time",):
-            values = np.asarray(dataset[name].values, dtype=float) / factor
+            values = np.asarray(dataset[name].values, dtype=float)
             if values.size == time.size and np.any(np.isfinite(values)):
                 yield words, values
 
@@ -203,7 +196,7 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
 def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples) -> None:
     lines = list(_lines(dataset, panel, time))
     values = np.concatenate([line for _, line in lines])
-    scale = Scale(1.0, panel.unit) if panel.unit in ("Hz", "deg") else Scale.of(values, panel.unit)
+    scale = Scale.of(values, unit_of(panel.lines[0][0]))
     largest = [float(np.nanmax(np.abs(line))) for _, line in lines]
     steep = panel.logarithmic and min(largest) > 0 and max(largest) > _SPREAD * min(largest)
     for words, line in lines:
