@@ -13,6 +13,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from spirillum.arrays import Samples
 from spirillum.units import Hz
 from spirillum.view.figures.posterior import posterior_figure, profile_figure
+from spirillum.view.figures.rows import draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import spread
 from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
@@ -199,24 +200,10 @@ def _draw(axes: Axes, found: Calibrated, row: dict[str, Any], here: np.ndarray) 
     order = np.argsort(x)
     x = x[order]
     values, low, high, seen, half = (row[name][here][order] for name in ("values", "low", "high", "seen", "half"))
-    known = np.isfinite(low)
-    if np.any(known):
-        axes.fill_between(x, low, high, where=known, color=look.colour, alpha=0.18, linewidth=0.0)
-        axes.vlines(x[known], low[known], high[known], color=look.colour, alpha=0.18, linewidth=4.0)
+    draw_band(axes, x, low, high, look, joined=True)
     axes.plot(x, values, color=look.colour, linestyle=look.line, marker=look.marker)
-    measured = np.isfinite(seen)
-    if np.any(measured):
-        axes.errorbar(
-            x[measured],
-            seen[measured],
-            yerr=half[measured],
-            fmt="D",
-            color=_OBSERVED,
-            markersize=4.0,
-            capsize=2.5,
-            elinewidth=1.0,
-            zorder=5,
-        )
+    if np.any(np.isfinite(seen)):
+        draw_means(axes, x, seen, half)
 
 
 def residual_figure(found: Calibrated) -> Figure:
@@ -253,6 +240,8 @@ def residual_figure(found: Calibrated) -> Figure:
         names_of_tails = [f"{tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g}" for tail in tails]
         last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=6)
         last.tick_params(labelbottom=True)
+        low, high = last.get_ylim()
+        last.set_ylim(low - 0.15 * (high - low), high)  # room for the names of the channels
         for start, stop in zip([0, *edges], [*edges, len(order)], strict=True):
             diameter = experiment.channels[int(experiment.channel[order[start]])] * 1e3
             last.text(
@@ -280,9 +269,6 @@ def _draw_residuals(axes: Axes, found: Calibrated, name: Quantity, order: list[i
         width = 200.0 * found.discrepancy[name].value
         axes.axhspan(-width, width, color=COLOURS["orange"], alpha=0.25, linewidth=0.0)
     axes.axhline(0.0, color="#444444", linewidth=0.8)
-    seen = np.isfinite(left)
-    axes.errorbar(
-        x[seen], left[seen], yerr=half[seen], fmt="D", color=_OBSERVED, markersize=3.5, capsize=2.0, elinewidth=0.9
-    )
+    draw_means(axes, x, left, half)
     axes.set_xlim(-0.7, len(order) - 0.3)
     axes.set_xticks([])

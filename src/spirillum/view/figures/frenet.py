@@ -13,9 +13,9 @@ from matplotlib.patches import FancyArrowPatch
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.robot.geometry import centreline
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.scene import FAINT, HALO, INK
+from spirillum.view.figures.solids import centreline_of
 from spirillum.view.figures.style import COLOURS, new_figure, styled
 
 __all__ = ["Frames", "frenet_figure", "frenet_frames"]
@@ -53,8 +53,10 @@ def frenet_frames(robot: Robot, xi: Samples) -> Frames:
         InputError: if the wire is straight somewhere, where it has no normal.
     """
     step = 1e-5 * robot.tail.length
-    ahead, behind = (_line(robot, np.clip(xi + sign * step, 0.0, robot.tail.length))[1] for sign in (1.0, -1.0))
-    position, tangent = _line(robot, xi)
+    ahead, behind = (
+        centreline_of(robot, np.clip(xi + sign * step, 0.0, robot.tail.length), 0.0)[1] for sign in (1.0, -1.0)
+    )
+    position, tangent = centreline_of(robot, xi, 0.0)
     bend = ahead - behind
     bend = bend - np.sum(bend * tangent, axis=1, keepdims=True) * tangent
     size = np.linalg.norm(bend, axis=1, keepdims=True)
@@ -62,21 +64,6 @@ def frenet_frames(robot: Robot, xi: Samples) -> Frames:
         raise InputError("the wire is straight, where it has no normal; allowed: a helix")
     normal = bend / size
     return Frames(position, tangent, normal, np.asarray(np.cross(tangent, normal)))
-
-
-def _line(robot: Robot, xi: Samples) -> tuple[Samples, Samples]:
-    tail = robot.tail
-    found = centreline(
-        xi,
-        wavelength=np.array(tail.wavelength),
-        amplitude=np.array(tail.amplitude),
-        length=np.array(tail.length),
-        taper=np.array(np.inf if tail.taper is None else tail.taper),
-        root=np.array(0.5 * robot.body.length + robot.coupling.length),
-        hand=np.array(robot.hand),
-        phase=np.array(0.0),
-    )
-    return found.position, found.tangent
 
 
 def _basis() -> tuple[Samples, Samples, Samples]:
@@ -96,7 +83,7 @@ def frenet_figure(robot: Robot) -> Figure:
     tail = robot.tail
     unit = tail.amplitude
     xi = np.linspace(0.0, tail.length, _POINTS)
-    wire = _line(robot, xi)[0] / unit
+    wire = centreline_of(robot, xi, 0.0)[0] / unit
     middle = wire.mean(axis=0)
     marked = frenet_frames(robot, np.array(_MARKED) * tail.length)
     reach = 0.085 * tail.length / unit

@@ -23,6 +23,7 @@ __all__ = [
     "bound_row",
     "draw_band",
     "draw_curve",
+    "draw_means",
     "grid_rows",
     "model_handles",
     "robot_rows",
@@ -148,7 +149,7 @@ def bound_row(shown: StudyView) -> Row:
         _own_drive(axes, part, x, "forward_velocity", scale)
         if part.observed:
             seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
-            _bars(axes, x, scale(seen), scale(half))
+            draw_means(axes, x, scale(seen), scale(half))
 
     tells = "Speeds are upper bounds: no contact friction." if shown.upper_bound else ""
     return Row(f"{what} $U_x$ ({scale.unit})", draw, tells=tells)
@@ -201,7 +202,7 @@ def _assumed_friction_row(shown: StudyView) -> Row:
     return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
-def _bars(axes: Axes, x: Values, y: Values, half: Values) -> None:
+def draw_means(axes: Axes, x: Values, y: Values, half: Values) -> None:
     """Observed means with their 95 % intervals; a mean without an interval stands alone."""
     seen = np.isfinite(y)
     axes.errorbar(
@@ -227,14 +228,14 @@ def _observed_rows(shown: StudyView) -> list[Row]:
             y = part.values("forward_velocity_at_observed_rate", model=model, friction=reading)
             draw_curve(axes, x, speed(y), look_of_model(model), joined=part.grid)
         seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
-        _bars(axes, x, speed(seen), speed(half))
+        draw_means(axes, x, speed(seen), speed(half))
 
     def rate(axes: Axes, part: StudyView, x: Values) -> None:
         seen, half = part.observed_motor_rate()
         for model in part.models:
             y = part.values("motor_rotation_rate_at_observed_rate", model=model, friction=reading)
             draw_curve(axes, x, np.where(np.isfinite(seen), np.nan, y) / Hz, look_of_model(model), joined=False)
-        _bars(axes, x, seen / Hz, half / Hz)
+        draw_means(axes, x, seen / Hz, half / Hz)
 
     rows = [
         Row(

@@ -12,7 +12,7 @@ from spirillum.robot.geometry import centreline
 from spirillum.robot.parts import Body, End
 from spirillum.robot.robot import Robot
 
-__all__ = ["Metal", "body_profile", "crests", "draw_solid", "draw_wire", "wire_line"]
+__all__ = ["Metal", "body_profile", "centreline_of", "crests", "draw_solid", "draw_wire", "wire_line"]
 
 Metal = tuple[str, str, str]
 """Colours of a shaded surface: shadow, middle, highlight."""
@@ -75,13 +75,11 @@ def draw_solid(axes: Axes, x: Values, radius: Values, colours: Metal, *, order: 
     axes.plot(np.concatenate([x, x[::-1]]), edge, color="#2b3a44", linewidth=0.8, zorder=order + 0.1)
 
 
-def wire_line(robot: Robot, phase: float, unit: float) -> Values:
-    """Points (x, y, z) of the wire's centreline from its root on, in `unit`."""
+def centreline_of(robot: Robot, xi: Values, phase: float) -> tuple[Values, Values]:
+    """Points of the wire's centreline and its unit tangents, (n, 3), m, at axial distances `xi` (n,) from the root."""
     tail = robot.tail
-    turns = tail.length / tail.wavelength
-    count = int(np.clip(90 * turns, 200, _LARGEST_WIRE))
     found = centreline(
-        np.linspace(0.0, tail.length, count),
+        xi,
         wavelength=np.array(tail.wavelength),
         amplitude=np.array(tail.amplitude),
         length=np.array(tail.length),
@@ -90,7 +88,14 @@ def wire_line(robot: Robot, phase: float, unit: float) -> Values:
         hand=np.array(robot.hand),
         phase=np.array(phase),
     )
-    points: Values = found.position / unit
+    return found.position, found.tangent
+
+
+def wire_line(robot: Robot, phase: float, unit: float) -> Values:
+    """Points (x, y, z) of the wire's centreline from its root on, in `unit`."""
+    tail = robot.tail
+    count = int(np.clip(90 * tail.length / tail.wavelength, 200, _LARGEST_WIRE))
+    points: Values = centreline_of(robot, np.linspace(0.0, tail.length, count), phase)[0] / unit
     return points
 
 
