@@ -264,7 +264,7 @@ def _draw_residuals(axes: Axes, found: Calibrated, name: Quantity, order: list[i
     ratio, values = found.problem.ratio(name), found.predicted[name][0]
     left = 100.0 * (ratio.mean / values - 1.0)[order]
     half = 100.0 * np.abs(_half_width(found, name) / values)[order]
-    x = np.arange(len(order))
+    x = np.arange(len(order), dtype=float)
     if name in found.discrepancy:
         width = 200.0 * found.discrepancy[name].value
         axes.axhspan(-width, width, color=COLOURS["orange"], alpha=0.25, linewidth=0.0)
