@@ -9,6 +9,7 @@ import pytest
 
 WIDE = "biorob2012-wide"
 QUICK = ("--tail-rate", "1.2Hz", "--gap", "2mm", "--tolerance", "0.05", "--drain", "8mm:2mm", "--gaps", "2")
+QUICK += ("--set", "tail.length=25mm", "--phases", "2")  # as in tests/dynamics, whose solutions it then shares
 
 
 def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -> None:
