@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import whole_file
+from spirillum.files import netcdf_file
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
@@ -254,11 +254,11 @@ def write_posterior(tree: xr.DataTree, path: Path) -> None:
         tree: groups and attributes, see `spirillum.calibration.posterior_tree`.
         path: the file.
     """
-    with whole_file(path) as temporary:
-        squeezed = {"zlib": True, "complevel": 4}
-        encoding = {
-            f"/{name}": {str(item): squeezed for item in group.data_vars}
-            for name, group in tree.children.items()
-            if name in ("posterior", "log_likelihood")
-        }
-        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    from xarray.backends import H5NetCDFStore
+
+    squeezed = {"zlib": True, "complevel": 4}
+    with netcdf_file(path) as file:
+        for node in tree.subtree:
+            names = node.data_vars if node.name in ("posterior", "log_likelihood") else ()
+            store = H5NetCDFStore(file if node.path == "/" else file.create_group(node.path))
+            node.to_dataset(inherit=False).dump_to_store(store, encoding={str(name): squeezed for name in names})
