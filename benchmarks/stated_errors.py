@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import spirillum as sp
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.fluid.wire.slender import robot_solution
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire, wire_along
@@ -126,11 +126,11 @@ def body_rows() -> list[Row]:
         rows.append({"body": title, "against": "exact", "error": float(np.max(np.abs(found / exact - 1.0)))})
     for title, rear in (("capsule, hemispherical ends", "hemisphere"), ("capsule, flat rear", "flat")):
         outline = body_outline("capsule", 18e-3, 35e-3, 0.0, "hemisphere", rear)
-        coarse, fine = (np.diag(solve([(outline, 0)], [], Resolution(order=n)).matrix)[:6] for n in (8, 20))
+        coarse, fine = (np.diag(solve([(outline, 0)], [], Discretisation(order=n)).matrix)[:6] for n in (8, 20))
         rows.append({"body": title, "against": "20 nodes", "error": float(np.max(np.abs(coarse / fine - 1.0)))})
     for slenderness, (along, across) in CYLINDERS.items():
         outline = cylinder_outline(1.0, 0.5 * slenderness, -0.5 * slenderness)
-        drag = np.diag(solve([(outline, 0)], [], Resolution()).matrix)
+        drag = np.diag(solve([(outline, 0)], [], Discretisation()).matrix)
         log = np.log(slenderness)
         true = np.array([2.0 / (log + along), 4.0 / (log + across)]) * np.pi * slenderness
         error = float(np.max(np.abs(drag[:2] / true - 1.0)))
@@ -165,7 +165,7 @@ def published_rows(*, without: Collection[str] = ()) -> list[Row]:
 
 
 def _resistance(wire: Wire, accuracy: Accuracy) -> np.ndarray:
-    return solve([], [(wire, 0)], Resolution(wire=accuracy)).matrix[:6, :6]
+    return solve([], [(wire, 0)], Discretisation(wire=accuracy)).matrix[:6, :6]
 
 
 def _ring(ratio: float) -> Wire:
@@ -193,7 +193,7 @@ def times(*, baseline: bool) -> Row:
         found[f"robot 12x12, {accuracy}"] = _best(lambda b=batch: robot_solution(b))
         found[f"robot with coupling 12x12, {accuracy}"] = _best(lambda b=coupled: robot_solution(b))
     outline = RobotGeometry.of(batch).body
-    found["body 6x6, standard"] = _best(lambda: solve([(outline, 0)], [], Resolution()))
+    found["body 6x6, standard"] = _best(lambda: solve([(outline, 0)], [], Discretisation()))
     answer: Row = {"milliseconds": {name: round(1e3 * value, 2) for name, value in found.items()}}
     if baseline:
         import resolved_reference

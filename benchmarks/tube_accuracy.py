@@ -26,8 +26,8 @@ from tube_reference import annulus_axial_drag, annulus_axial_drag_no_flux, annul
 import spirillum as sp
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.confined import Held, held_in_tube
-from spirillum.fluid.tube.model import END_LOSS
 from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.batch import RobotBatch

@@ -22,7 +22,7 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     import spirillum.fields.flow as module
     import spirillum.fields.in_tube as tube
     import spirillum.fields.unbounded as core
-    from spirillum.fluid.tube.model import Tube
+    from spirillum.fluid.tube.tube import Tube
     from spirillum.swimming.prediction import predict, prepared
 
     def quick(robot: Any, **options: Any) -> Any:

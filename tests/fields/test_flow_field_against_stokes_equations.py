@@ -12,7 +12,7 @@ from spirillum.errors import InputError
 from spirillum.fields.unbounded import FlowField, flow_field
 from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.robot.outline import Arc, Outline
 
 MU = 3.5
@@ -49,7 +49,7 @@ def outside(outline: Outline, distance: float, count: int = 25) -> np.ndarray:
 
 def sphere_alone(twist: np.ndarray, radius: float = 0.01) -> FlowField:
     outline = Outline((Arc((0.0, 0.0), (radius, radius), (0.0, np.pi)),), ())
-    solution = solve([(outline, 0)], [], Resolution(order=12))
+    solution = solve([(outline, 0)], [], Discretisation(order=12))
     return FlowField(solution, (("body", outline),), np.concatenate([twist, np.zeros(6)]), 0.0, MU)
 
 

@@ -10,7 +10,7 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.fields.in_tube import TubeFlowField, tube_flow_field
 from spirillum.fields.unbounded import flow_field
-from spirillum.fluid.tube.model import END_LOSS
+from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.placement import Placement
 
 MU, R = 3.5, 0.02

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from spirillum.fluid.algebra import about_point, axial_entries, axis_rotation, joint_locked
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.slender import robot_solution
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.limits import all_hold, assembly_limits
@@ -143,7 +143,7 @@ def test_phase_against_a_tail_that_is_built_turned(wide: Any) -> None:
 
     wires = [(replace(w, points=w.points @ turn.T, tangents=w.tangents @ turn.T), 1) for w in solution.wires]
     solids = RobotGeometry.of(wide).solids("robot")
-    anew = solve(solids, wires, Resolution(order=8, tolerance=1e-4)).matrix
+    anew = solve(solids, wires, Discretisation(order=8, tolerance=1e-4)).matrix
     found = MODEL.resistance(wide, np.array([phase]))[0] / float(wide.viscosity[0])
     assert_same(anew, found, 1e-10)
 
@@ -213,7 +213,7 @@ def test_sphere_and_wire_against_faxen() -> None:
     x = np.linspace(-0.5, 0.5, 50)
     curve = np.array([-3.0, 4.0, 2.0]) + np.stack([x, 0.3 * x, 0 * x], axis=1)
     wire = wire_along(curve, 0.05)
-    solution = solve([(outline, 0)], [(wire, 1)], Resolution(order=12, tolerance=1e-10))
+    solution = solve([(outline, 0)], [(wire, 1)], Discretisation(order=12, tolerance=1e-10))
     assert solution.asymmetry < 1e-10
     unit = np.zeros(12)
     unit[7] = 1.0  # the wire moves along y, the sphere is free
@@ -237,10 +237,10 @@ def test_more_modes_and_nodes_change_little(wide: Any) -> None:
 
     solids = RobotGeometry.of(wide).solids("robot")
     wires = [(RobotGeometry.of(wide).wire(), 1)]
-    fine = solve(solids, wires, Resolution(order=16, tolerance=1e-9))
+    fine = solve(solids, wires, Discretisation(order=16, tolerance=1e-9))
     errors = []
     for order, tolerance in ((6, 1e-3), (8, 1e-4), (12, 1e-6)):
-        found = solve(solids, wires, Resolution(order=order, tolerance=tolerance))
+        found = solve(solids, wires, Discretisation(order=order, tolerance=tolerance))
         scale = np.sqrt(np.outer(np.diag(fine.matrix), np.diag(fine.matrix)))
         errors.append(np.max(np.abs(found.matrix - fine.matrix) / scale))
     assert errors[0] < 1.5e-3

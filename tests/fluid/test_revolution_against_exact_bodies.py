@@ -8,7 +8,7 @@ from scipy.special import ellipe, ellipkm1
 
 from spirillum.fluid.algebra import about_point
 from spirillum.fluid.closed.perrin import spheroid_drag
-from spirillum.fluid.wire.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
 from spirillum.fluid.wire.revolution import panels_of
 from spirillum.robot.outline import Outline, body_outline, cylinder_outline
 
@@ -17,7 +17,7 @@ DIAGONAL = [0, 1, 3, 4]
 
 
 def alone(outline: Outline, order: int = 12) -> Solution:
-    return solve([(outline, 0)], [], Resolution(order=order))
+    return solve([(outline, 0)], [], Discretisation(order=order))
 
 
 def matrix_of(outline: Outline, order: int = 12) -> np.ndarray:

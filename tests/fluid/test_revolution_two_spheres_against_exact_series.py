@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from spirillum.fluid.wire.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
 from spirillum.robot.outline import Arc, Outline
 
 
@@ -17,7 +17,7 @@ def sphere(centre: float, radius: float = 1.0) -> Outline:
 @lru_cache
 def pair(half: float, order: int = 12) -> Solution:
     """Two unit spheres with their centres at +-half; the one in front is the body."""
-    return solve([(sphere(half), 0), (sphere(-half), 1)], [], Resolution(order=order))
+    return solve([(sphere(half), 0), (sphere(-half), 1)], [], Discretisation(order=order))
 
 
 def series(half: float) -> tuple[np.ndarray, float]:
@@ -136,7 +136,9 @@ def test_far_apart() -> None:
     worst = []
     for distance in (10.0, 20.0, 40.0):
         x = (0.4 * distance, -0.6 * distance)
-        matrix = solve([(sphere(x[0], radius[0]), 0), (sphere(x[1], radius[1]), 1)], [], Resolution(order=12)).matrix
+        matrix = solve(
+            [(sphere(x[0], radius[0]), 0), (sphere(x[1], radius[1]), 1)], [], Discretisation(order=12)
+        ).matrix
         to_centre = np.eye(12)  # twists about the origin from twists about the centres
         for which in (0, 1):
             to_centre[6 * which + 1, 6 * which + 5] = -x[which]
@@ -152,9 +154,9 @@ def test_far_apart() -> None:
 def test_three_spheres_in_a_row() -> None:
     """Two spheres of one part and one of the other: joined, the matrix is that of a chain of three."""
     solids = [(sphere(3.0), 0), (sphere(0.0), 0), (sphere(-3.0), 1)]
-    solution = solve(solids, [], Resolution(order=10))
+    solution = solve(solids, [], Discretisation(order=10))
     assert solution.asymmetry < 1e-10
     whole = solution.matrix[:6, :6] + solution.matrix[:6, 6:] + solution.matrix[6:, :6] + solution.matrix[6:, 6:]
-    chain = solve([(outline, 0) for outline, _ in solids], [], Resolution(order=10)).matrix[:6, :6]
+    chain = solve([(outline, 0) for outline, _ in solids], [], Discretisation(order=10)).matrix[:6, :6]
     np.testing.assert_allclose(whole, chain, rtol=1e-10, atol=1e-9)
     assert 6 * np.pi < chain[0, 0] < 2 * moving_alike(1.5) * 6 * np.pi + 6 * np.pi

@@ -10,7 +10,7 @@ import pytest
 
 from spirillum.fluid.tube import cache
 
-MODEL = "spirillum.fluid.tube.model"
+MODEL = "spirillum.fluid.tube.tube"
 
 
 def imports_of(module: str) -> Iterator[str]:

@@ -9,7 +9,7 @@ import pytest
 from spirillum.fluid.tube.confined import Held, held_in_tube
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.stokeslets import Wire, wire_along
 from spirillum.kernels.blobs import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
@@ -199,7 +199,7 @@ def test_reciprocity_and_power_with_a_wire(accuracy: Literal["standard", "high"]
 def test_in_a_wide_tube_nothing_is_confined(accuracy: Literal["standard", "high"]) -> None:
     """R to infinity: the matrix of unbounded fluid, by 1/R."""
     wire, solid = coil(), ball(0.0, 0.4)
-    free = solve([(solid, 0)], [(wire, 1)], Resolution(accuracy, order=8, tolerance=1e-7)).matrix
+    free = solve([(solid, 0)], [(wire, 1)], Discretisation(accuracy, order=8, tolerance=1e-7)).matrix
     scale = np.sqrt(np.outer(np.diag(free), np.diag(free)))
     errors = []
     for radius in (50.0, 200.0):

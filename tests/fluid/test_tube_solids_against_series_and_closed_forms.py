@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from spirillum.fluid.tube.confined import Held, held_in_tube
-from spirillum.fluid.tube.model import END_LOSS
 from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.robot.outline import Outline, body_outline
 from spirillum.robot.seat import Seat
 

@@ -16,7 +16,7 @@ import spirillum as sp
 from spirillum.fluid.algebra import joint_locked
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.cache import cache_folder
-from spirillum.fluid.tube.model import END_LOSS, held_robot
+from spirillum.fluid.tube.tube import END_LOSS, held_robot
 from spirillum.robot.placement import Placement
 
 MODEL: Any = find_swimmer_model("tube")
@@ -227,7 +227,7 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def _forget() -> None:
-    from spirillum.fluid.tube import model as tube
+    from spirillum.fluid.tube import tube
 
     tube._answer.cache_clear()
 
@@ -236,7 +236,7 @@ PRINT = """
 import sys, numpy as np, spirillum as sp
 import spirillum.fluid.tube.confined as confined
 if sys.argv[1] == "kept":
-    import spirillum.fluid.tube.model as tube
+    import spirillum.fluid.tube.tube as tube
     def refuse(*arguments):
         raise AssertionError("computed anew")
     tube.held_in_tube = refuse

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import about_point
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.stokeslets import Wire, station_count, wire_along
 from spirillum.robot.outline import cylinder_outline
 
@@ -17,7 +17,7 @@ both = pytest.mark.parametrize("accuracy", ["standard", "high"])
 
 def matrix_of(*wires: Wire, accuracy: str = "standard") -> np.ndarray:
     """6x6 of wires that move together, viscosity 1."""
-    return solve([], [(wire, 1) for wire in wires], Resolution(accuracy)).matrix[6:, 6:]
+    return solve([], [(wire, 1) for wire in wires], Discretisation(accuracy)).matrix[6:, 6:]
 
 
 def assert_same(found: np.ndarray, wanted: np.ndarray, tolerance: float) -> None:
@@ -52,7 +52,7 @@ def test_rods_against_solid_cylinders(accuracy: str, slenderness: float) -> None
     wire = wire_along(straight(2 * slenderness), 1.0)
     found = np.diag(matrix_of(wire, accuracy=accuracy))
     cylinder = cylinder_outline(2.0, 0.0, -2 * slenderness)
-    wanted = np.diag(solve([(cylinder, 1)], [], Resolution(order=12)).matrix)[6:]
+    wanted = np.diag(solve([(cylinder, 1)], [], Discretisation(order=12)).matrix)[6:]
     np.testing.assert_allclose(found[:3], wanted[:3], rtol=0.001 + 0.06 / slenderness)
     np.testing.assert_allclose(found[4:], wanted[4:], rtol=0.001 + 0.09 / slenderness)
     # Its spin is that of an infinite cylinder, 4 pi a^2 per length, and more for the ends, which the wire leaves out.
@@ -152,7 +152,7 @@ def test_measured_helices(accuracy: str, row: tuple[float, ...]) -> None:
 @settings(max_examples=5)
 @given(seed=st.integers(0, 10**6), a=st.floats(0.04, 0.12))
 def test_symmetric_positive_definite(accuracy: str, seed: int, a: float) -> None:
-    solution = solve([], [(wire_along(bent(seed), a), 1)], Resolution(accuracy))
+    solution = solve([], [(wire_along(bent(seed), a), 1)], Discretisation(accuracy))
     assert solution.asymmetry < 1e-12
     matrix = about_point(solution.matrix[None, 6:, 6:], bent(seed).mean(axis=0)[None])[0]
     scale = np.sqrt(np.diag(matrix))
@@ -206,7 +206,7 @@ def test_several_wires() -> None:
         pair = [wire_along(rod, 0.2), wire_along(rod + shift, 0.2)]
         together = matrix_of(*pair)
         lost.append(1 - together[0, 0] / (2 * one[0, 0]))
-        apart = solve([], [(pair[0], 0), (pair[1], 1)], Resolution()).matrix
+        apart = solve([], [(pair[0], 0), (pair[1], 1)], Discretisation()).matrix
         locked = apart[:6, :6] + apart[:6, 6:] + apart[6:, :6] + apart[6:, 6:]
         assert_same(locked, together, 1e-10)
     np.testing.assert_allclose(np.log2(np.array(lost[:-1]) / lost[1:]), 1.0, atol=0.05)

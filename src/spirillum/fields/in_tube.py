@@ -20,8 +20,8 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
 from spirillum.fluid.tube.domain import seat_of
-from spirillum.fluid.tube.model import held_robot
 from spirillum.fluid.tube.solids import Solids
+from spirillum.fluid.tube.tube import held_robot
 from spirillum.fluid.tube.wall import waves_between
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch

@@ -7,7 +7,7 @@ from spirillum.fluid.closed.perrin import Perrin
 from spirillum.fluid.closed.rft import Rft
 from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import ResistanceModel, SwimmerModel
-from spirillum.fluid.tube.model import Tube
+from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.slender import Slender
 from spirillum.robot.fields import field_values
 from spirillum.robot.placement import Placement

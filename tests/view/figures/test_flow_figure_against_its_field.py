@@ -29,7 +29,7 @@ def around(sphere: Any) -> Flow:
 @pytest.fixture(scope="module")
 def in_tube(sphere: Any) -> Callable[..., Flow]:
     """A sphere's flow under the name of a robot that lies in a tube."""
-    from spirillum.fluid.tube.model import Tube
+    from spirillum.fluid.tube.tube import Tube
     from spirillum.robot.placement import Placement
 
     def make(**placement: str) -> Flow:

@@ -26,13 +26,13 @@ from spirillum.robot.outline import Outline
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-__all__ = ["Resolution", "Solution", "one_thread", "share", "solve", "surface_motion"]
+__all__ = ["Discretisation", "Solution", "one_thread", "share", "solve", "surface_motion"]
 
 _EIGHT_PI = 8.0 * np.pi
 
 
 @dataclass(frozen=True)
-class Resolution:
+class Discretisation:
     """How finely the flow is resolved."""
 
     wire: Accuracy = "standard"
@@ -67,7 +67,9 @@ class Solution:
     """First moments of the forces there, force by displacement, with `high` accuracy, (stations, 3, 3, 12)."""
 
 
-def solve(solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Resolution) -> Solution:
+def solve(
+    solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
+) -> Solution:
     """Resistance of two rigid parts in unbounded fluid of viscosity 1, twists about the origin.
 
     Args:
@@ -94,7 +96,7 @@ def _thread_pools() -> ThreadpoolController:
 
 
 def _solve(
-    solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Resolution
+    solids: Sequence[tuple[Outline, int]], wires: Sequence[tuple[Wire, int]], resolution: Discretisation
 ) -> Solution:
     lines = tuple(wire for wire, _ in wires)
     points = np.concatenate([wire.points for wire in lines]) if lines else np.zeros((0, 3))
@@ -165,7 +167,7 @@ def _longest(
     return longest
 
 
-def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Resolution) -> list[int]:
+def _mode_counts(panels: Panels, wires: tuple[Wire, ...], resolution: Discretisation) -> list[int]:
     """Number of modes to keep on each solid; 0 and 1 hold all rigid motions.
 
     With cosh(zeta) = (X^2 + rho^2 + rho'^2 + e^2)/(2 rho rho'), what mode m sends from a wire to a surface and back
@@ -227,7 +229,7 @@ class _Images:
         parts: np.ndarray,
         wires: tuple[Wire, ...],
         system: WireSystem,
-        resolution: Resolution,
+        resolution: Discretisation,
     ) -> _Images:
         """Solve mode by mode.
 

@@ -15,7 +15,7 @@ from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
 from spirillum.fluid.algebra import axial_entries, axis_rotation, joint_locked, rotated
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, thin_wire_cautions
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.wire.interaction import Resolution, Solution, solve
+from spirillum.fluid.wire.interaction import Discretisation, Solution, solve
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
 from spirillum.fluid.wire.stokeslets import Accuracy, closest_approach, station_count
 from spirillum.robot.batch import RobotBatch
@@ -31,12 +31,12 @@ _SMALLEST_GAP = 0.01  # of the tail from the body, relative to the amplitude
 _SLIMMEST = 1e-3  # thickness of a solid over its length, or length over thickness
 
 _RESOLUTIONS = {
-    "standard": Resolution("standard", order=8, tolerance=1e-4),
-    "high": Resolution("high", order=12, tolerance=1e-6),
+    "standard": Discretisation("standard", order=8, tolerance=1e-4),
+    "high": Discretisation("high", order=12, tolerance=1e-6),
 }
 _CHECKS = {  # what differs most from each: the form of the wire, and the spacing of its stations
-    "standard": Resolution("high", order=8, tolerance=1e-4),
-    "high": Resolution("high", order=8, tolerance=1e-4, spacing=1.25),
+    "standard": Discretisation("high", order=8, tolerance=1e-4),
+    "high": Discretisation("high", order=8, tolerance=1e-4, spacing=1.25),
 }
 
 
@@ -45,7 +45,7 @@ def robot_solution(batch: RobotBatch, index: int = 0) -> Solution:
     return _solved(RobotGeometry.of(batch, index), "robot", _RESOLUTIONS[batch.options.slender.accuracy])
 
 
-def _solved(g: RobotGeometry, part: str, resolution: Resolution) -> Solution:
+def _solved(g: RobotGeometry, part: str, resolution: Discretisation) -> Solution:
     wires = [(g.wire(resolution.spacing), 1)] if "tail" in PIECES[part] else []
     return solve(g.solids(part), wires, resolution)
 
@@ -79,7 +79,7 @@ def _closest(g: RobotGeometry) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _matrix(g: RobotGeometry, part: str, resolution: Resolution) -> Samples:
+def _matrix(g: RobotGeometry, part: str, resolution: Discretisation) -> Samples:
     """12x12 of a part at phase 0 and viscosity 1."""
     matrix = _solved(g, part, resolution).matrix
     matrix.flags.writeable = False
@@ -109,7 +109,7 @@ class Slender(SwimmerModel):
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
 
-    def __init__(self, resolution: Resolution | None = None) -> None:
+    def __init__(self, resolution: Discretisation | None = None) -> None:
         """Resolve the flow as each robot's `model.slender.accuracy` says, or in one way for all."""
         self._resolution = resolution
 

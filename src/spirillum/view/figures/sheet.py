@@ -98,7 +98,12 @@ class Sheet:
         Args:
             shape: height over width of the panels of the first row, instead of their height.
         """
+        beside = self.panels[:, 1:].ravel()
+        for axes in beside if shape is None else ():  # one column tells the height, in a fraction of the time
+            axes.set_in_layout(False)
         lay_out(self.figure)
+        for axes in beside:
+            axes.set_in_layout(True)
         first, dpi = self.panels[0, 0].get_window_extent(), self.figure.dpi
         height = self.heights[0] if shape is None else shape * first.width / dpi
         missing = (height - first.height / dpi) * sum(self.heights) / self.heights[0]
