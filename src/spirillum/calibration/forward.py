@@ -77,13 +77,13 @@ class TableError:
     """Against the model solved there as finely as at the points."""
     resolution: float = 0.0
     """Of the model solved as finely as at the points, against its own resolution."""
-    whole: float = 0.0
+    total: float = 0.0
     """Of the table, against the model at its own resolution."""
 
     @property
     def largest(self) -> float:
         """What no prediction is taken to be better than; the parts may happen to cancel at one place."""
-        return max(self.interpolation, self.resolution, self.whole)
+        return max(self.interpolation, self.resolution, self.total)
 
 
 def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tuple[Samples, ...]:

@@ -23,7 +23,7 @@ from spirillum.calibration.least_squares import (
 )
 from spirillum.calibration.problem import Problem
 
-__all__ = ["FAR", "Identifiability", "Profile", "identified", "profiles"]
+__all__ = ["FAR", "Identifiability", "LikelihoodProfile", "identified", "profiles"]
 
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
@@ -125,7 +125,7 @@ def _change(before: float, after: float) -> str:
 
 
 @dataclass(frozen=True)
-class Profile:
+class LikelihoodProfile:
     """Least misfit with one number held."""
 
     label: str
@@ -135,8 +135,8 @@ class Profile:
     """Sum of squared residuals above its least; 3.84 is the limit of the 95 % interval."""
 
 
-def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[Profile]:
-    """Profile likelihood of every free number: the others are fitted anew at each held value.
+def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[LikelihoodProfile]:
+    """LikelihoodProfile likelihood of every free number: the others are fitted anew at each held value.
 
     Args:
         problem: the fit.
@@ -158,7 +158,7 @@ def profiles(problem: Problem, fit: LeastSquares, count: int = 13) -> list[Profi
             start = fit.z
             for n in side:
                 start, misfit[n] = _others_fitted(residuals, start, place, float(held[n]))
-        found.append(Profile(item.label, item.prior.value(held), np.maximum(misfit - least, 0.0)))
+        found.append(LikelihoodProfile(item.label, item.prior.value(held), np.maximum(misfit - least, 0.0)))
     return found
 
 

@@ -95,7 +95,7 @@ def tube_forward(
     error = TableError(
         interpolation=forward.interpolation_error(coarse, there),
         resolution=coarse.interpolation_error(fine, {}),
-        whole=forward.interpolation_error(fine, there),
+        total=forward.interpolation_error(fine, there),
     )
     return forward, ranges, error
 

@@ -8,7 +8,7 @@ from spirillum.kernels.raster import develop
 from spirillum.virtual.disturbances import Disturbances
 from spirillum.virtual.label import stamp
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.trajectory import Trajectory
+from spirillum.virtual.trajectory import TrialTrajectory
 
 __all__ = ["Frames"]
 
@@ -22,7 +22,9 @@ _BRIGHTNESS = 1.05
 class Frames:
     """The frames of one video, in order: noise differs from frame to frame."""
 
-    def __init__(self, painter: Painter, disturbances: Disturbances, trajectory: Trajectory, exposure: float) -> None:
+    def __init__(
+        self, painter: Painter, disturbances: Disturbances, trajectory: TrialTrajectory, exposure: float
+    ) -> None:
         """Prepare.
 
         Args:

@@ -11,7 +11,7 @@ from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.options import CameraOptions
 from spirillum.virtual.tank import Tank, tank_of
-from spirillum.virtual.trajectory import Trajectory
+from spirillum.virtual.trajectory import TrialTrajectory
 
 __all__ = ["check_size", "framed", "lens_of", "swimming_range"]
 
@@ -73,7 +73,7 @@ def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
     return low - rear, high - nose
 
 
-def framed(trajectory: Trajectory, robot: Robot, lens: Lens, start: float | None) -> Trajectory:
+def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float | None) -> TrialTrajectory:
     """The trajectory from a first x, or centred in the picture.
 
     Args:

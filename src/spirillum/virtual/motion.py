@@ -14,7 +14,7 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.tank import tube_height
-from spirillum.virtual.trajectory import Trajectory, lab_to_camera, run_trajectory, steady_trajectory
+from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,7 +26,7 @@ __all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
 class Motion:
     """A trajectory and its source."""
 
-    trajectory: Trajectory
+    trajectory: TrialTrajectory
     model: str
     """Model, `prescribed`, or both; of a run `run` and its model."""
     warnings: tuple[str, ...] = ()

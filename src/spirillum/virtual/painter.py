@@ -10,7 +10,7 @@ from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.solids import Solid, solids_of
 from spirillum.virtual.tank import Tank, backdrop, spots, tint
-from spirillum.virtual.trajectory import Pose, Trajectory
+from spirillum.virtual.trajectory import Pose, TrialTrajectory
 
 __all__ = ["Painter"]
 
@@ -54,7 +54,7 @@ class Painter:
         self._depth = np.empty(0, dtype=np.float32)
         self._samples = np.empty(0, dtype=np.float32)
 
-    def light(self, trajectory: Trajectory, time: float, exposure: float) -> np.ndarray:
+    def light(self, trajectory: TrialTrajectory, time: float, exposure: float) -> np.ndarray:
         """(rows, columns, 3) linear light of an exposure about a time.
 
         Args:
@@ -79,7 +79,7 @@ class Painter:
         return picture
 
     def _parts(
-        self, trajectory: Trajectory, middle: Pose, time: float, exposure: float
+        self, trajectory: TrialTrajectory, middle: Pose, time: float, exposure: float
     ) -> list[tuple[Solid, Samples, list[Samples]]]:
         """Body and rotor, each with its rotation and the pixels of its vertices at times over the exposure."""
         found = []

@@ -1,4 +1,4 @@
-"""Trajectory of the robot in the camera's frame: steady swimming, or a run of `spirillum simulate`."""
+"""TrialTrajectory of the robot in the camera's frame: steady swimming, or a run of `spirillum simulate`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Trajectory", "lab_to_camera", "run_trajectory", "steady_trajectory"]
+__all__ = ["Pose", "TrialTrajectory", "lab_to_camera", "run_trajectory", "steady_trajectory"]
 
 _MAX_OBLIQUITY = 0.5
 """Largest angle of a run's robot to the channel, rad."""
@@ -34,7 +34,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class TrialTrajectory:
     """Position and angles over time in the camera's frame, linear between samples."""
 
     time: Samples = field(repr=False)
@@ -69,11 +69,11 @@ class Trajectory:
         position = np.array([now["x"], now["y"], now["z"]])
         return Pose(position, attitude @ _about_x(now["body_angle"]), attitude @ _about_x(now["tail_phase"]))
 
-    def shifted(self, x: float) -> Trajectory:
+    def shifted(self, x: float) -> TrialTrajectory:
         """Translated along the channel by `x`, m."""
         return replace(self, position=self.position + np.array([x, 0.0, 0.0]))
 
-    def until(self, end: float) -> Trajectory:
+    def until(self, end: float) -> TrialTrajectory:
         """Truncated at a time.
 
         Raises:
@@ -88,7 +88,7 @@ class Trajectory:
             raise InputError(f"duration = {end:g} s; allowed: more than 0 s")
         now = self.series(time)
         place = np.stack([now["x"], now["y"], now["z"]], axis=-1)
-        return Trajectory(time, place, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
+        return TrialTrajectory(time, place, now["heading"], now["pitch"], now["body_angle"], now["tail_phase"])
 
     def rates(self) -> dict[str, float]:
         """Mean rates from the first sample to the last: `forward_velocity`, `body_rotation_rate`, ..."""
@@ -128,7 +128,7 @@ def steady_trajectory(
     wobble: float = 0.0,
     body_angle: float = 0.0,
     tail_phase: float = 0.0,
-) -> Trajectory:
+) -> TrialTrajectory:
     """Swimming at constant rates along the channel.
 
     Args:
@@ -146,7 +146,7 @@ def steady_trajectory(
     time = np.linspace(0.0, duration, 2 + (int(_SAMPLES_PER_TURN * turns) if wobble > 0 else 0))
     places = position + np.outer(time, [forward_velocity, 0.0, 0.0])
     places[:, 1] += wobble * np.cos(tail_phase + tail_rotation_rate * time)
-    return Trajectory(
+    return TrialTrajectory(
         time,
         places,
         np.full_like(time, heading),
@@ -164,8 +164,8 @@ def lab_to_camera(view: str, *, leftwards: bool) -> Samples:
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -side], [0.0, side, 0.0]])
 
 
-def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, level: float) -> Trajectory:
-    """Trajectory of a run.
+def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: float, level: float) -> TrialTrajectory:
+    """TrialTrajectory of a run.
 
     Args:
         dataset: what `spirillum.simulate` returns.
@@ -195,4 +195,4 @@ def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: flo
     guess = angle[0] + poses.roll - poses.roll[0]
     roll = angle + 2.0 * np.pi * np.round((guess - angle) / (2.0 * np.pi))
     place = poses.position @ turn.T + np.array([0.0, 0.0, axis])
-    return Trajectory(poses.time - poses.time[0], place, heading, pitch, roll, roll + poses.tail_phase)
+    return TrialTrajectory(poses.time - poses.time[0], place, heading, pitch, roll, roll + poses.tail_phase)

@@ -13,7 +13,7 @@ from spirillum.answer import as_json, envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.options import CameraOptions
-from spirillum.virtual.trajectory import Trajectory
+from spirillum.virtual.trajectory import TrialTrajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +91,7 @@ def truth_text(rates: Mapping[str, float], content: Mapping[str, Any]) -> str:
 
 
 def truth_dataset(
-    trajectory: Trajectory, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]
+    trajectory: TrialTrajectory, times: Samples, numbers: np.ndarray, attributes: Mapping[str, str]
 ) -> xr.Dataset:
     """The truth on every frame of the video.
 

@@ -16,7 +16,7 @@ from spirillum.view.figures.style import COLOURS, Scale, look_of_model, plain, s
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
-    from spirillum.calibration.identifiability import Profile
+    from spirillum.calibration.identifiability import LikelihoodProfile
 
 __all__ = ["posterior_figure", "profile_figure"]
 
@@ -118,14 +118,14 @@ def _ticks(axes: Axes, *, left: bool, bottom: bool) -> None:
     axes.grid(visible=False)
 
 
-def profile_figure(found: Calibrated, profiles: Sequence[Profile]) -> Figure:
+def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> Figure:
     """Least misfit against each number, all others fitted anew; the dotted line cuts out the 95 % interval."""
     columns = min(len(profiles), 4)
     rows = -(-len(profiles) // columns)
     synthetic = " (synthetic)" if found.experiment.synthetic else ""
     with styled():
         sheet = Sheet(
-            "Profile likelihood",
+            "LikelihoodProfile likelihood",
             f"{plain(found.experiment.source, 40)}{synthetic}, model {found.problem.model.name}: least chi squared "
             "above the best fit",
             width=width_of(columns, 1.72),

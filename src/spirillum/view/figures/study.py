@@ -22,7 +22,7 @@ from spirillum.view.figures.style import Scale, plain
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Picture", "study_figures"]
+__all__ = ["study_figures"]
 
 PANEL = (1.72, 1.5)
 """Width and height of a panel of a grid of tails, inches."""
