@@ -7,8 +7,8 @@ from typing import Any
 import av
 
 import spirillum as sp
+from spirillum.papers.biorob2012.frenet_figure import frenet_figure
 from spirillum.view.figures.flow import flow_figure
-from spirillum.view.figures.frenet import frenet_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.robot import robot_figure
 

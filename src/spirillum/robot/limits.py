@@ -71,10 +71,6 @@ class Limit:
             f"because {self.why}"
         )
 
-    def first_broken(self) -> int:
-        """Index of the first robot that breaks it."""
-        return int(np.argmin(self.holds))
-
 
 def broken(limits: Iterable[Limit]) -> list[Limit]:
     """The limits that at least one robot breaks."""
