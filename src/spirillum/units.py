@@ -171,7 +171,7 @@ def _factor(unit: str, kind: Kind) -> float:
 
 
 def _factor_by_pint(unit: str, kind: Kind) -> float:
-    """The same for any unit."""
+    """SI value of one `unit` as a quantity of `kind`, by parsing it with pint."""
     unit = unit.translate(_OHM_SIGNS)
     hint = f'allowed: a unit of {kind.name}, as in "{kind.example}"'
     if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit) or _POWER_OF_A_POWER.search(unit):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from spirillum.measurement.outliers import outlying_frames, outlying_trial
-from spirillum.measurement.rates import Cycle, mean_of, rate_of
+from spirillum.measurement.rates import PeriodicError, mean_of, rate_of
 
 FRAMES = 300
 TIME = np.arange(FRAMES) / 30.0
@@ -22,29 +22,29 @@ def autoregression(rng: np.random.Generator, rho: float) -> np.ndarray:
     return values
 
 
-def white(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+def white(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
     return rng.normal(size=FRAMES), []
 
 
-def short_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+def short_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
     return autoregression(rng, 0.9) + rng.normal(size=FRAMES), []
 
 
-def long_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+def long_memory(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
     return autoregression(rng, 0.97), []
 
 
-def few_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+def few_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
     """The stretch is a third of a period: nothing in the residuals shows it."""
     angle = 2 * np.pi * 0.3 * TIME / TIME[-1]
     returning = 1.4 * np.cos(angle + rng.uniform(0, 2 * np.pi))
-    return returning + rng.normal(size=FRAMES), [Cycle(angle, 1.0)]
+    return returning + rng.normal(size=FRAMES), [PeriodicError(angle, 1.0)]
 
 
-def many_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[Cycle]]:
+def many_cycles(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
     """Larger than usual, but seen often enough to be known."""
     angle = 2 * np.pi * 2.7 * TIME / TIME[-1]
-    return 10.0 * np.cos(angle + rng.uniform(0, 2 * np.pi)) + rng.normal(size=FRAMES), [Cycle(angle, 1.0)]
+    return 10.0 * np.cos(angle + rng.uniform(0, 2 * np.pi)) + rng.normal(size=FRAMES), [PeriodicError(angle, 1.0)]
 
 
 @pytest.mark.parametrize("errors", [white, short_memory, long_memory, few_cycles, many_cycles])
@@ -55,7 +55,9 @@ def test_intervals_cover_the_truth_as_often_as_they_say(errors: Callable[..., An
     for _ in range(trials):
         noise, cycles = errors(rng)
         truth = rng.uniform(5.0, 20.0)
-        rate = rate_of(TIME, truth * TIME + 0.1 * noise, cycles=[Cycle(c.angle, 0.1 * c.amplitude) for c in cycles])
+        rate = rate_of(
+            TIME, truth * TIME + 0.1 * noise, periodic=[PeriodicError(c.angle, 0.1 * c.amplitude) for c in cycles]
+        )
         covered += rate.low <= truth <= rate.high
         assert rate.steady
     assert covered >= 24

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.motion import Motion
 
 PIXEL = 2.5e-4
 
@@ -28,7 +29,7 @@ def unwrapped(angle, period):
 @pytest.mark.parametrize(("start", "end"), [(4.0, 6.0), (2.0, 3.1), (7.0, 7.4)])
 def test_a_missing_piece_is_found_where_it_is(start, end):
     true, x, body, tail = series(missing=[(start, end)])
-    (flag,) = cuts_in(np.arange(true.size) / 30.0, x, unwrapped(body, np.pi), unwrapped(tail, 2 * np.pi), PIXEL)
+    (flag,) = cuts_in(Motion(np.arange(true.size) / 30.0, x, unwrapped(body, np.pi), unwrapped(tail, 2 * np.pi)), PIXEL)
     assert flag.name == "video-is-cut"
     assert f"at {start - 0.5 / 30:.2f} s" in flag.sentence
     assert "forward_velocity" in flag.spoils
@@ -37,14 +38,14 @@ def test_a_missing_piece_is_found_where_it_is(start, end):
 @pytest.mark.parametrize("seed", range(20))
 def test_whole_films_are_whole(seed):
     _, x, body, tail = series(noise=3.0, seed=seed)
-    assert cuts_in(np.arange(x.size) / 30.0, x, body, tail, PIXEL) == ()
+    assert cuts_in(Motion(np.arange(x.size) / 30.0, x, body, tail), PIXEL) == ()
 
 
 @pytest.mark.parametrize("gap", [0.2, 0.5, 2.0, 5.0])
 def test_a_gap_with_true_times_is_honest(gap):
     true, x, body, tail = series(missing=[(4.0, 4.0 + gap)])
-    assert cuts_in(true, x, body, tail, PIXEL) == ()
-    assert jumps_of_time(true, x, body, tail, PIXEL, np.pi) == ()
+    assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
+    assert jumps_of_time(Motion(true, x, body, tail), PIXEL, np.pi) == ()
 
 
 @pytest.mark.parametrize("jump", [0.5, 1.7, 4.7])
@@ -53,7 +54,7 @@ def test_times_that_jump_alone_are_said(jump):
     stamps = np.where(true > 4.0, true + jump, true)
     tail = np.where(true > 4.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)  # as it is unwrapped by these times
     body = np.where(true > 4.0, body - np.pi * np.round(0.24 * jump), body)
-    (flag,) = jumps_of_time(stamps, x, body, tail, PIXEL, np.pi)
+    (flag,) = jumps_of_time(Motion(stamps, x, body, tail), PIXEL, np.pi)
     assert flag.name == "times-do-not-fit"
     assert f"jump by {jump + 1 / 30:.2f} s at {true[120]:.2f} s" in flag.sentence
     assert "tail_rotation_rate" in flag.spoils
@@ -61,14 +62,14 @@ def test_times_that_jump_alone_are_said(jump):
 
 def test_a_push_moves_the_robot_alone():
     true, x, body, tail = series()
-    assert cuts_in(true, np.where(true > 5.0, x + 2e-3, x), body, tail, PIXEL) == ()
+    assert cuts_in(Motion(true, np.where(true > 5.0, x + 2e-3, x), body, tail), PIXEL) == ()
 
 
 def test_short_and_unseen_series_say_nothing():
     true, x, body, tail = series(frames=20)
-    assert cuts_in(true, x, body, tail, PIXEL) == ()
-    assert cuts_in(true[:1], x[:1], body[:1], tail[:1], PIXEL) == ()
-    assert jumps_of_time(true[:1], x[:1], body[:1], tail[:1], PIXEL, np.pi) == ()
-    assert jumps_of_time(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3], PIXEL, np.pi) == ()
+    assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
+    assert cuts_in(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL) == ()
+    assert jumps_of_time(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL, np.pi) == ()
+    assert jumps_of_time(Motion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == ()
     true, x, body, tail = series()
-    assert cuts_in(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan), PIXEL) == ()
+    assert cuts_in(Motion(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan)), PIXEL) == ()

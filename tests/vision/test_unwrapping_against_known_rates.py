@@ -5,8 +5,10 @@ import pytest
 
 from spirillum.fluid.resistance import resistance
 from spirillum.robot.load import load
-from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup
-from spirillum.vision.track.unwrapping import _largest_advance, contradictions, nyquist, unwrapped
+from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup, stripes_of
+from spirillum.vision.track.colours import pattern_period
+from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.unwrapping import _largest_advance, contradictions, unwrapped
 
 FPS = 30.0
 TURN = 2 * np.pi
@@ -95,13 +97,13 @@ def test_body_and_tail_cannot_turn_the_same_way() -> None:
     robot = load("biorob2012-wide")
     time = np.arange(300) / FPS
     forward, back, still = 0.005 * time, -0.005 * time, 0.0 * time
-    assert contradictions(time, -0.7 * time, 7.0 * time, forward, robot) == ()
-    assert contradictions(time, still, -7.0 * time, back, robot) == ()
+    assert contradictions(Motion(time, forward, -0.7 * time, 7.0 * time), robot) == ()
+    assert contradictions(Motion(time, back, still, -7.0 * time), robot) == ()
     for hand, name in ((0, "handedness"), (1, "aliased-tail")):
-        (flag,) = contradictions(time, -0.7 * time, -7.0 * time, forward, robot, hand)
+        (flag,) = contradictions(Motion(time, forward, -0.7 * time, -7.0 * time), robot, hand)
         assert flag.name == name
         assert "tail_rotation_rate" in flag.spoils
-    (flag,) = contradictions(time, np.full(300, np.nan), -7.0 * time, forward, robot)
+    (flag,) = contradictions(Motion(time, forward, np.full(300, np.nan), -7.0 * time), robot)
     assert flag.name == "aliased-tail"
 
 
@@ -109,8 +111,8 @@ def test_no_wire_advances_more_than_it_can_without_a_body() -> None:
     time = np.arange(300) / FPS
     robot = load("biorob2012-wide")
     advance = 0.3 * robot.tail.wavelength * 3.0 / TURN
-    assert contradictions(time, -0.1 * time, 3.0 * time, advance * time, robot) == ()
-    (flag,) = contradictions(time, -0.1 * time, 3.0 * time, 1.2 * advance * time, robot)
+    assert contradictions(Motion(time, advance * time, -0.1 * time, 3.0 * time), robot) == ()
+    (flag,) = contradictions(Motion(time, 1.2 * advance * time, -0.1 * time, 3.0 * time), robot)
     assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
     for amplitude in ("1 mm", "3 mm", "8 mm"):  # the tail alone, free of any body, by resistive force theory
         tail = load("biorob2012-wide", **{"tail.amplitude": amplitude, "tail.wavelength": "15 mm"})
@@ -122,10 +124,12 @@ def test_a_robot_that_swims_on_a_tail_at_rest_betrays_a_tail_at_the_frame_rate()
     time = np.arange(300) / FPS
     robot = load("biorob2012-wide")
     still = 1e-3 * np.sin(time)
-    (flag,) = contradictions(time, -0.1 * time, still, 1e-3 * time, robot)
+    (flag,) = contradictions(Motion(time, 1e-3 * time, -0.1 * time, still), robot)
     assert (flag.name, flag.spoils) == ("aliased-tail", ("tail_rotation_rate",))
-    assert contradictions(time, still, still, 1e-5 * time, robot) == ()  # a robot at rest
-    assert contradictions(time, -0.1 * time, np.full(300, np.nan), 1e-3 * time, robot) == ()  # a tail that is not seen
+    assert contradictions(Motion(time, 1e-5 * time, still, still), robot) == ()  # a robot at rest
+    assert (
+        contradictions(Motion(time, 1e-3 * time, -0.1 * time, np.full(300, np.nan)), robot) == ()
+    )  # a tail that is not seen
 
 
 def test_largest_rates_are_half_a_period_a_frame() -> None:
@@ -134,9 +138,14 @@ def test_largest_rates_are_half_a_period_a_frame() -> None:
         markers=Markers(length_per_pixel="0.3 mm"),
         robot=RobotSetup(file="biorob2012-wide", axis_height="10 mm"),
     )
-    robot = load("biorob2012-wide")
-    assert nyquist(setup, robot, 30.0) == pytest.approx((30.0 * np.pi, 15.0 * np.pi))
-    assert np.isnan(nyquist(setup, load("biorob2012-wide", seal="none"), 30.0).body)
+    body = pattern_period(stripes_of(setup, load("biorob2012-wide")))
+    assert body == pytest.approx(np.pi)
+    assert stripes_of(setup, load("biorob2012-wide", seal="none")) == ()
+    time, error = np.arange(300) / 30.0, np.full(300, 0.01)
+    for period, largest in ((2.0 * np.pi, 30.0 * np.pi), (body, 15.0 * np.pi)):
+        for rate, seen in ((0.95 * largest, 0.95 * largest), (1.05 * largest, -0.95 * largest)):
+            angle, _ = unwrapped(time, (rate * time) % period, error, period)
+            assert np.polyfit(time, angle, 1)[0] == pytest.approx(seen)
 
 
 @pytest.mark.parametrize(("leaps", "said"), [(0, False), (1, False), (2, True), (5, True)])

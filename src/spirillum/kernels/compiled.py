@@ -29,5 +29,5 @@ def compiled(function: _F) -> _F:
 
 
 def compiled_parallel(function: _F) -> _F:
-    """The same for a function whose `numba.prange` loops run on several cores."""
+    """Compile a function whose `numba.prange` loops run on several cores; its machine code is kept on disk."""
     return _compile(function, parallel=True)

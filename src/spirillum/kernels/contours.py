@@ -1,4 +1,4 @@
-"""Apparent edges of a body from polynomials, and where they are in the picture, compiled."""
+"""Apparent contour of a body from its polynomials, and its projection into the picture, compiled."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ __all__ = ["edge_places", "edge_points"]
 
 @compiled
 def edge_points(pose: Samples, factors: Samples, normals: Samples, reach: Samples, out: Samples) -> None:
-    """Edge points (n, 2) on the plane through the axis, in the body's frame, m.
+    """Edge points in the plane through the axis, in the body's frame.
 
     Args:
         pose: x, y, heading.
-        factors: Chebyshev coefficients, of each term those of the points' x and y, and those of a flat end's lower rim,
-            (a, b, 4, n); the outer one of both counts.
-        normals: outward directions, (n, 2).
-        reach: largest distances of the lens along and across, (2,).
-        out: the points, (n, 2).
+        factors: Chebyshev coefficients of x and y with the upper rims of flat ends, and of x and y with the lower ones,
+            (a, b, 4, n); the outer point of the two is taken.
+        normals: outward normals, (n, 2).
+        reach: largest distances of the lens along and across, m, (2,).
+        out: the points, m, (n, 2).
     """
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     place = (-(cos * pose[0] + sin * pose[1]), -(-sin * pose[0] + cos * pose[1]))
@@ -56,19 +56,19 @@ def edge_places(
     size: Samples,
     slopes: Samples,
 ) -> None:
-    """Where edges are in the picture.
+    """Project a body's apparent contour into the picture.
 
     Args:
         pose: x, y, heading.
-        factors: as in `edge_points`.
-        normals: outward directions in the body's frame, (n, 2).
-        reach: as in `edge_points`.
+        factors: Chebyshev coefficients of the edge points, as in `edge_points`, (a, b, 4, n).
+        normals: outward normals in the body's frame, (n, 2).
+        reach: largest distances of the lens along and across, m, (2,).
         axis_height: height of the axis, m.
-        numbers: the camera, as `Optics.numbers` has it.
+        numbers: the camera's parameters, as of `Optics.numbers`.
         pixels: the edge points, (n, 2).
         directions: unit normals in the picture, (n, 2).
         size: pixels per m along them, (n,).
-        slopes: change of the distance along each normal with (x, y, heading), pixels per m and per rad, (n, 3).
+        slopes: Jacobian of the displacement along each normal by (x, y, heading), pixels per m and per rad, (n, 3).
     """
     count = normals.shape[0]
     local = np.empty((count, 2))

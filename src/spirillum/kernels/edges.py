@@ -1,4 +1,4 @@
-"""Brightness across edges of a picture, and how far an edge has moved, compiled."""
+"""Brightness profiles across edges, displacements of edges, and robust pose updates, compiled."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from spirillum.robust import MAD_TO_SIGMA
 __all__ = ["edge_scores", "profiles_across", "robust_change", "shifts_of_profiles", "sums_along"]
 
 _RUN = 6
-"""Neighbouring points of an edge on which brightness rises or falls in the same sense."""
+"""Neighbouring edge points whose gradients are averaged with their sign."""
 
 
 @compiled
 def profiles_across(
     picture: Samples, origin: Samples, pixels: Samples, normals: Samples, offsets: Samples, out: Samples
 ) -> None:
-    """Brightness (n, m) at offsets (m,) along the normals (n, 2) of edge points (n, 2), by cubic interpolation.
+    """Brightness profiles along the normals of edge points, by cubic interpolation.
 
     Args:
-        picture: brightness of a part of the picture, (h, w).
-        origin: pixel (u, v) of that part's first corner, (2,).
+        picture: brightness of a region of the picture, (h, w).
+        origin: pixel (u, v) of the region's upper left corner, (2,).
         pixels: the edge points, (n, 2).
         normals: unit directions, (n, 2).
         offsets: distances along them, pixels, (m,).
-        out: the brightness, (n, m); NaN outside.
+        out: the profiles, (n, m); NaN outside the region.
     """
     height, width = picture.shape
     for i in range(pixels.shape[0]):
@@ -64,20 +64,20 @@ def profiles_across(
 
 @compiled
 def shifts_of_profiles(
-    profiles: Samples, usual: Samples, slopes: Samples, shifts: Samples, strengths: Samples, misses: Samples
+    profiles: Samples, templates: Samples, slopes: Samples, shifts: Samples, strengths: Samples, residuals: Samples
 ) -> None:
-    """How far each edge has moved along its normal: q(s) = b + c s + a (p(s) - d p'(s)) by least squares.
+    """Displacement d of each edge along its normal: q(s) = b + c s + a (p(s) - d p'(s)) by least squares.
 
-    Brightness, its gradient, and the contrast (also its sign) are free at every point, so that lamp, shadows and the
-    colour of a stripe do not move an edge.
+    Offset b, slope c and contrast a of either sign are free at every point, so that lamp, shadows and the colour of a
+    stripe do not bias the displacement.
 
     Args:
         profiles: brightness q, (n, m).
-        usual: what p it is like when the edge is in its place, (n, m), free of a mean and a slope.
-        slopes: its derivative p', per sample, (n, m).
-        shifts: d, samples, (n,); NaN where it cannot be told.
+        templates: template p of the undisplaced edge, without mean and slope, (n, m).
+        slopes: derivative p' of the template, per sample, (n, m).
+        shifts: d, samples, (n,); NaN where the fit is singular.
         strengths: a, (n,).
-        misses: root mean square of what remains, (n,).
+        residuals: root mean square residual, (n,).
     """
     count, length = profiles.shape
     half = 0.5 * (length - 1)
@@ -98,7 +98,7 @@ def shifts_of_profiles(
         pp, ps, ss, pq, sq, qq = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(length):
             q = profiles[i, k] - mean - tilt * (k - half)
-            p = usual[i, k]
+            p = templates[i, k]
             s = slopes[i, k] - m_slope - t_slope * (k - half)
             pp += p * p
             ps += p * s
@@ -108,19 +108,19 @@ def shifts_of_profiles(
             qq += q * q
         determinant = pp * ss - ps * ps
         if bad or determinant <= 1e-9 * pp * ss or pp == 0.0:
-            shifts[i], strengths[i], misses[i] = math.nan, 0.0, math.nan
+            shifts[i], strengths[i], residuals[i] = math.nan, 0.0, math.nan
             continue
         a = (pq * ss - sq * ps) / determinant
         c = (sq * pp - pq * ps) / determinant
         rest = max(qq - a * pq - c * sq, 0.0)
         strengths[i] = a
-        misses[i] = math.sqrt(rest / (length - 4.0))
+        residuals[i] = math.sqrt(rest / (length - 4.0))
         shifts[i] = -c / a if a != 0.0 else math.nan
 
 
 @compiled
 def _score(sums: Samples, seen: Samples, all_of: Samples, place: int) -> float:
-    """Geometric mean of the first four groups' means at a place, and a share of the fifth's."""
+    """Score at a place: geometric mean of the first four groups' means, plus a share of the fifth's."""
     score, used, groups = 1.0, 0.0, all_of.size
     for g in range(min(groups, 4)):
         if all_of[g] == 0.0:
@@ -148,24 +148,24 @@ def edge_scores(
     first: tuple[float, float],
     scores: Samples,
 ) -> None:
-    """How clearly a shape's edges show in a picture, with the shape at different places.
+    """Edge scores of a shape at a grid of places in a picture.
 
-    Of each group of edges the mean brightness gradient along the normals counts, first over a few neighbouring points
-    with its sign, which noise and clutter change, then without; of the groups the geometric mean of
-    the first four (both ends, both sides), so that none can stand in for another, and a share of the fifth.
+    The score of a group of edges is its mean gradient along the normals: signed over a few neighbouring points, which
+    cancels noise and clutter, then in magnitude. The total is the geometric mean of the first four groups (both ends,
+    both sides), so that none can replace another, plus a share of the fifth.
 
-    The innermost loops go down the columns of all places at once, so that the processor works on several.
+    The innermost loops run down the columns of all places, so that they vectorise.
 
     Args:
-        slope_u: brightness gradient along u, its columns one after the other, (w, h).
-        slope_v: the same along v, (w, h).
+        slope_u: brightness gradient along u, transposed, (w, h).
+        slope_v: brightness gradient along v, transposed, (w, h).
         pixels: edge points of the shape, (n, 2).
         normals: their unit normals, (n, 2).
         group: index of the group of each point, (n,).
         groups: number of groups.
         first: shift of the shape to the first place, pixels.
-        scores: the scores at that place and those a whole number of columns and rows further, (c, r); 0 where more
-            than half of a group is outside.
+        scores: the scores at shifts by whole columns and rows from the first place, (c, r); 0 where more than half of
+            a group is outside.
     """
     width, height = slope_u.shape
     columns, rows = scores.shape
@@ -197,7 +197,7 @@ def edge_scores(
 
 @compiled
 def _least_squares(shifts: Samples, slopes: Samples, weights: Samples, size: Samples, change: Samples) -> None:
-    """The change (3,) that explains the shifts best; `size` makes its three slopes alike."""
+    """Weighted least squares for the pose change (3,); `size` scales its three slopes for conditioning."""
     normal, right = np.zeros((3, 3)), np.zeros(3)
     for i in range(shifts.size):
         if weights[i] > 0.0:
@@ -213,9 +213,9 @@ def _least_squares(shifts: Samples, slopes: Samples, weights: Samples, size: Sam
 
 @compiled
 def _solve(normal: Samples, right: Samples) -> None:
-    """Solve three linear equations with a positive definite matrix, given in its lower half, in place."""
+    """Solve a symmetric positive definite (3, 3) system in place, given the lower triangle."""
     little = 1e-9 * (normal[0, 0] + normal[1, 1] + normal[2, 2]) + 1e-300
-    for a in range(3):  # Cholesky's factors in the lower half
+    for a in range(3):  # Cholesky factor in the lower triangle
         for b in range(a + 1):
             value = normal[a, b] + (little if a == b else 0.0)
             for c in range(b):
@@ -233,17 +233,17 @@ def _solve(normal: Samples, right: Samples) -> None:
 
 @compiled
 def robust_change(shifts: Samples, slopes: Samples, weights: Samples, used: Samples, change: Samples) -> float:
-    """Least squares in which what does not fit the others does not count (Tukey's biweight).
+    """Robust least squares of a pose change, by reweighting with Tukey's biweight.
 
     Args:
-        shifts: how far each edge has moved along its normal, pixels, (n,).
-        slopes: how far it would for each unit of a change, (n, 3).
-        weights: inverse variances, 0 for what is not known, (n,).
-        used: the weights in the end, (n,).
-        change: the change, (3,).
+        shifts: displacement of each edge along its normal, pixels, (n,).
+        slopes: Jacobian of the displacements, (n, 3).
+        weights: inverse variances, 0 for invalid edges, (n,).
+        used: the final weights, 0 for outliers, (n,).
+        change: the pose change, (3,).
 
     Returns:
-        the level of what remains over what was expected, at least 1/2.
+        The residual scale over the expected one, at least 1/2.
     """
     count = shifts.size
     size = np.full(3, 1e-300)
@@ -273,13 +273,13 @@ def robust_change(shifts: Samples, slopes: Samples, weights: Samples, used: Samp
 
 @compiled
 def sums_along(rows: Samples, design: Samples, middle: float, numbers: Samples, out: Samples) -> None:
-    """Sums of one sample from each row, at places that are linear in some numbers; nothing beyond the rows' ends.
+    """Sums of one sample from each row, at positions linear in trial parameters; 0 beyond the rows' ends.
 
     Args:
         rows: samples, (n, m).
-        design: by how many samples the place in each row moves with each number, (n, k).
-        middle: place where all numbers are zero, samples.
-        numbers: the numbers to be tried, (q, k).
+        design: Jacobian of the position in each row, samples, (n, k).
+        middle: position where all parameters are zero, samples.
+        numbers: the trial parameters, (q, k).
         out: the sums, (q,).
     """
     for q in range(numbers.shape[0]):

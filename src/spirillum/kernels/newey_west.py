@@ -1,4 +1,4 @@
-"""The variance of a sum whose terms are alike where they are neighbours, compiled."""
+"""Variance of a sum of autocorrelated terms (Newey and West), compiled."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ __all__ = ["variance_of_sum"]
 
 @compiled
 def variance_of_sum(terms: Samples, reach: int) -> float:
-    """Variance of the sum of terms with mean zero: products of neighbours under a triangular window.
+    """Variance of the sum of autocorrelated terms with mean zero: autocovariances with Bartlett's triangular window.
 
     W. K. Newey and K. D. West, A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent
     covariance matrix, Econometrica 55:703, 1987.
 
     Args:
-        terms: in their order, (n,).
-        reach: how far from each other terms may be alike.
+        terms: the terms in order, (n,).
+        reach: largest lag with a correlation.
     """
     total, count = 0.0, terms.size
     for i in range(count):

@@ -1,4 +1,4 @@
-"""Colours of a picture between its pixels, and stripes on a cylinder compared with them, compiled."""
+"""Sampling of a picture between its pixels, and a fit of stripes on a cylinder, compiled."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ __all__ = ["profile_of_rows", "sampled", "stripe_fit", "stripes_at"]
 
 _CHANNELS = 3
 _STEPS, _LAST = 8, 2e-5
-"""Gauss-Newton steps at most, and the change, rad, at which they end."""
+"""Most Gauss-Newton steps, and the step below which they end, rad."""
 _AHEAD = 0.008
-"""Angle on both sides from which the change with the angle is taken, rad."""
-_SLANTED = 0.15
-"""Scale over the largest one below which the surface is too slanted to count."""
-_SEEN = 0.3
-"""Least share of the surface that has to be seen."""
-_ALIKE = 6
-"""Angles next to each other whose residuals are taken to be alike."""
+"""Step of the central differences in the angle, rad."""
+_OBLIQUE = 0.15
+"""Scale over the largest one below which the surface is too oblique to be used."""
+_VISIBLE = 0.3
+"""Least visible share of the surface."""
+_CORRELATED = 6
+"""Largest lag, in angles, at which residuals are taken as correlated."""
 
 
 @compiled
 def sampled(image: Samples, pixels: Samples, out: Samples) -> None:
-    """Colours (k, 3) of a picture (h, w, 3) at pixels (k, 2), linear between their centres; NaN outside."""
+    """Colours (k, 3) of a picture (h, w, 3) at pixels (k, 2), by bilinear interpolation; NaN outside."""
     height, width = image.shape[0], image.shape[1]
     for k in range(len(pixels)):
         u, v = pixels[k, 0], pixels[k, 1]
@@ -44,14 +44,12 @@ def sampled(image: Samples, pixels: Samples, out: Samples) -> None:
 
 @compiled
 def profile_of_rows(image: Samples, first: Samples, last: Samples, rows: int, out: Samples) -> None:
-    """Mean of the middle half of the colours on lines between pixels first (n, 2) and last (n, 2), (n, 3).
-
-    Bright spots and bubbles on less than a quarter of a line leave no trace.
+    """Interquartile mean of the colours on lines between pixels, which rejects highlights and bubbles.
 
     Args:
         image: the picture, (h, w, 3).
-        first: where the lines begin, (n, 2).
-        last: where they end, (n, 2).
+        first: start of each line, pixels, (n, 2).
+        last: end of each line, pixels, (n, 2).
         rows: number of samples on a line.
         out: the colours, (n, 3); NaN where fewer than half of the samples lie in the picture.
     """
@@ -64,7 +62,7 @@ def profile_of_rows(image: Samples, first: Samples, last: Samples, rows: int, ou
         sampled(image, pixels, colours)
         for c in range(_CHANNELS):
             seen = 0
-            for m in range(rows):  # sorted by insertion, without what lies outside
+            for m in range(rows):  # insertion sort of the samples inside the picture
                 value = colours[m, c]
                 if math.isnan(value):
                     continue
@@ -86,11 +84,11 @@ def profile_of_rows(image: Samples, first: Samples, last: Samples, rows: int, ou
 
 @compiled
 def stripes_at(angles: Samples, blur: Samples, roll: float, order: Whole, palette: Samples, out: Samples) -> None:
-    """Colours (n, 3) of blurred stripes at angles about the axis, when the body has turned by `roll`.
+    """Colours of blurred stripes at angles about the axis, for the body's rotation angle `roll`.
 
     Args:
-        angles: where, rad, (n,).
-        blur: standard deviation of the blur there, rad, (n,).
+        angles: angles about the axis, rad, (n,).
+        blur: standard deviation of the blur at each angle, rad, (n,).
         roll: angle of the first stripe's middle, rad.
         order: class of each stripe, (s,).
         palette: colour of each class, (classes, 3).
@@ -118,7 +116,7 @@ def stripes_at(angles: Samples, blur: Samples, roll: float, order: Whole, palett
 
 @compiled
 def _gains(profile: Samples, weight: Samples, shade: Samples, model: Samples, tint: float, out: Samples) -> None:
-    """Brightness of each channel against the model; the channels hold together with the strength `tint`."""
+    """Gain of each channel by least squares, with a prior of strength `tint` at their common gain."""
     top, bottom = np.zeros(_CHANNELS), np.zeros(_CHANNELS)
     for n in range(len(profile)):
         for c in range(_CHANNELS):
@@ -134,7 +132,7 @@ def _gains(profile: Samples, weight: Samples, shade: Samples, model: Samples, ti
 def _reweighted(
     profile: Samples, base: Samples, shade: Samples, model: Samples, gain: Samples, scale: float, weight: Samples
 ) -> float:
-    """Weights that leave out what the model cannot explain; the share of the loss (biweight) that remains."""
+    """Biweight weights of the residuals, and the mean loss relative to its largest value."""
     loss, total = 0.0, 0.0
     for n in range(len(profile)):
         square = 0.0
@@ -149,7 +147,7 @@ def _reweighted(
 
 @compiled
 def _even_loss(profile: Samples, base: Samples, shade: Samples, palette: Samples, cut: float) -> float:
-    """How badly one even colour fits; arguments as in `stripe_fit`."""
+    """Loss of a uniform colour; arguments as in `stripe_fit`."""
     even, weight, gain, loss = np.zeros((len(base), 3)), np.empty(len(base)), np.empty(3), 1.0
     for n in range(len(base)):
         weight[n] = base[n]
@@ -163,8 +161,8 @@ def _even_loss(profile: Samples, base: Samples, shade: Samples, palette: Samples
 
 
 @compiled
-def _error(base: Samples, weight: Samples, slope: Samples, rest: Samples, usual: float) -> float:
-    """Standard error of the angle: neighbours on the surface share pixels, so that their residuals are alike."""
+def _error(base: Samples, weight: Samples, slope: Samples, residual: Samples, usual: float) -> float:
+    """Standard error of the angle, with autocorrelated residuals, as neighbouring angles share pixels."""
     count = len(base)
     information, variance, total, most = 0.0, 0.0, 0.0, 0.0
     scores = np.zeros(count)
@@ -173,21 +171,21 @@ def _error(base: Samples, weight: Samples, slope: Samples, rest: Samples, usual:
         most = max(most, base[n])
         for c in range(_CHANNELS):
             information += weight[n] * slope[n, c] ** 2
-            scores[n] += weight[n] * slope[n, c] * rest[n, c]
-            variance += weight[n] * rest[n, c] ** 2 / _CHANNELS
+            scores[n] += weight[n] * slope[n, c] * residual[n, c]
+            variance += weight[n] * residual[n, c] ** 2 / _CHANNELS
     if information < 1e-6:
-        return math.nan  # nothing changes with the angle
+        return math.nan  # the colours do not depend on the angle
     variance = max(variance / (total + 1e-12), usual**2)
     plain = _CHANNELS * variance * most / information
-    return math.sqrt(max(plain, variance_of_sum(scores, _ALIKE) / information**2))
+    return math.sqrt(max(plain, variance_of_sum(scores, _CORRELATED) / information**2))
 
 
 @compiled
-def _counted(profile: Samples, scale: Samples, trust: Samples, clean: Samples, base: Samples) -> bool:
-    """Colours without what is not seen, and the weight of each angle; whether enough is seen."""
+def _visible(profile: Samples, scale: Samples, trust: Samples, clean: Samples, base: Samples) -> bool:
+    """Colours with 0 where invisible, and the weight of each angle; returns whether enough is visible."""
     most, seen, all_of = scale.max(), 0.0, 0.0
     for n in range(len(scale)):
-        good = scale[n] > _SLANTED * most
+        good = scale[n] > _OBLIQUE * most
         for c in range(_CHANNELS):
             good = good and math.isfinite(profile[n, c])
         for c in range(_CHANNELS):
@@ -195,11 +193,11 @@ def _counted(profile: Samples, scale: Samples, trust: Samples, clean: Samples, b
         base[n] = trust[n] * scale[n] / most if good else 0.0
         all_of += scale[n] / most
         seen += scale[n] / most if good else 0.0
-    return seen >= _SEEN * all_of
+    return seen >= _VISIBLE * all_of
 
 
 @compiled
-def _tried(
+def _grid_search(
     clean: Samples,
     base: Samples,
     angles: Samples,
@@ -210,9 +208,9 @@ def _tried(
     settings: tuple[float, float, float, float, float],
     losses: Samples,
 ) -> int:
-    """Losses at evenly spaced angles of a period, and which is the best of them; arguments as in `stripe_fit`.
+    """Losses on a grid of rotation angles, and the index of the least; arguments as in `stripe_fit`.
 
-    Every other place along the angle is enough for that.
+    Only every other sample of the profile is used.
     """
     period, tint, cut, _, _ = settings
     count = (len(angles) + 1) // 2
@@ -246,15 +244,15 @@ def _slopes(
     weight: Samples,
     gain: Samples,
     slope: Samples,
-    rest: Samples,
+    residual: Samples,
 ) -> float:
-    """Change of the colours with the angle and what is left of them, (n, 3); the Gauss-Newton step."""
+    """Derivatives of the colours by the angle and residuals, (n, 3); returns the Gauss-Newton step."""
     top, bottom = 0.0, 1e-300
     for n in range(len(weight)):
         for c in range(_CHANNELS):
             slope[n, c] = gain[c] * shade[n, c] * (ahead[n, c] - behind[n, c]) / (2.0 * _AHEAD)
-            rest[n, c] = clean[n, c] - gain[c] * (shade[n, c] * model[n, c] + shade[n, 3 + c])
-            top += weight[n] * slope[n, c] * rest[n, c]
+            residual[n, c] = clean[n, c] - gain[c] * (shade[n, c] * model[n, c] + shade[n, 3 + c])
+            top += weight[n] * slope[n, c] * residual[n, c]
             bottom += weight[n] * slope[n, c] ** 2
     return top / bottom
 
@@ -272,44 +270,42 @@ def stripe_fit(
     losses: Samples,
     answer: Samples,
 ) -> None:
-    """The angle by which stripes are turned that explains colours along the angle best.
-
-    Evenly spaced angles of a period are tried, then Gauss-Newton steps are taken from the best one.
+    """Fit the rotation angle of stripes to a colour profile: grid search, then robust Gauss-Newton steps.
 
     Args:
-        profile: colours along the angle, NaN where they are not seen, (n, 3).
-        scale: pixels of a radian at each angle, (n,).
+        profile: colours along the angle, (n, 3); NaN where invisible.
+        scale: pixels per radian at each angle, (n,).
         trust: weight of each angle, beside that of its scale, (n,).
-        angles: rad, (n,).
-        shade: brightness of the same colour at each angle, and what shines there whatever the colour, (n, 6).
+        angles: angles about the axis, rad, (n,).
+        shade: shading factor and additive sheen at each angle, in each channel, (n, 6).
         order: class of each stripe, (s,).
         palette: colour of each class, (classes, 3).
-        settings: period, rad; strength that holds the channels together; residual at which a sample no longer counts;
-            residual that is the least to be expected; standard deviation of the blur, pixels.
-        losses: how badly each of the angles tried fits, an answer, 0 to 1.
-        answer: angle, its standard error, loss, least loss of an angle that is another one, loss of one even colour,
-            and the brightness of the channels; left alone where too little is seen, (8,).
+        settings: period, rad; strength of the prior on the channels' common gain; residual beyond which a sample is an
+            outlier; least expected residual; standard deviation of the blur, pixels.
+        losses: output, loss at each angle of the grid, 0 to 1, (t,).
+        answer: output, (8,): angle, its standard error, loss, least loss at a distant angle, loss of a uniform colour,
+            gains of the channels; unchanged where too little is visible.
     """
     period, tint, cut, usual, blurred = settings
     count, tries = len(angles), len(losses)
     clean, base, blur = np.empty((count, 3)), np.empty(count), np.empty(count)
-    if not _counted(profile, scale, trust, clean, base):
+    if not _visible(profile, scale, trust, clean, base):
         return
     for n in range(count):
         blur[n] = min(max(blurred / max(scale[n], 1e-9), 0.004), 0.5)
-    first = _tried(clean, base, angles, blur, shade, order, palette, settings, losses)
+    first = _grid_search(clean, base, angles, blur, shade, order, palette, settings, losses)
     model, ahead, behind = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
-    slope, rest, weight, gain = np.empty((count, 3)), np.empty((count, 3)), base.copy(), np.empty(3)
+    slope, residual, weight, gain = np.empty((count, 3)), np.empty((count, 3)), base.copy(), np.empty(3)
     roll, loss = first * period / tries, 1.0
     for repeat in range(1 + _STEPS):
         stripes_at(angles, blur, roll, order, palette, model)
         _gains(clean, weight, shade, model, tint, gain)
         loss = _reweighted(clean, base, shade, model, gain, cut, weight)
         if repeat == 0:
-            continue  # that was to find the weights
+            continue  # the first pass only sets the weights
         stripes_at(angles, blur, roll + _AHEAD, order, palette, ahead)
         stripes_at(angles, blur, roll - _AHEAD, order, palette, behind)
-        change = _slopes(clean, ahead, behind, model, shade, weight, gain, slope, rest)
+        change = _slopes(clean, ahead, behind, model, shade, weight, gain, slope, residual)
         roll += min(max(change, -0.1), 0.1)
         if abs(change) < _LAST:
             break
@@ -317,7 +313,12 @@ def stripe_fit(
     for trial in range(tries):
         if abs((trial - first + tries // 2) % tries - tries // 2) > away:
             other = min(other, losses[trial])
-    answer[0], answer[1], answer[2], answer[3] = roll % period, _error(base, weight, slope, rest, usual), loss, other
+    answer[0], answer[1], answer[2], answer[3] = (
+        roll % period,
+        _error(base, weight, slope, residual, usual),
+        loss,
+        other,
+    )
     answer[4] = _even_loss(clean, base, shade, palette, cut)
     for c in range(_CHANNELS):
         answer[5 + c] = gain[c]

@@ -1,4 +1,4 @@
-"""Rays of a pinhole camera that looks through a flat surface, exact by Snell's law."""
+"""Rays of a pinhole camera through a flat refracting surface, exact by Snell's law, compiled."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ __all__ = ["pixels_of_points", "points_of_pixels", "surface_crossing"]
 
 _STEPS = 30
 _LAST = 1e-9
-"""Step over the distance after which Newton's method is exact to rounding: each squares the error."""
+"""Relative step after which Newton's method is exact to rounding, as its convergence is quadratic."""
 
 
 @compiled
 def surface_crossing(distance: float, above: float, below: float, index: float) -> float:
     """Horizontal distance from the lens at which the ray to a point crosses the surface, m.
 
-    Solves s / sqrt(s^2 + a^2) = n (d - s) / sqrt((d - s)^2 + b^2) by Newton's method; the left side rises and the right
-    side falls with s, so that there is one root between 0 and d.
+    Solves s / sqrt(s^2 + a^2) = n (d - s) / sqrt((d - s)^2 + b^2) by Newton's method; the left side increases and
+    the right side decreases with s, so that there is one root between 0 and d.
 
     Args:
         distance: horizontal distance d of the point from the lens, m.
@@ -50,14 +50,14 @@ def surface_crossing(distance: float, above: float, below: float, index: float) 
 
 @compiled
 def pixels_of_points(points: Samples, numbers: Samples, out: Samples) -> None:
-    """Pixels (k, 2) of points (k, 3); `numbers` as `Optics.numbers` has them."""
+    """Project points (k, 3), m, to pixels (k, 2); `numbers` are the camera's parameters, as of `Optics.numbers`."""
     focal, centre_u, centre_v, k1, k2 = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
     height, surface, index = numbers[5], numbers[6], numbers[7]
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         across = np.sqrt(x * x + y * y)
         above, below = height - surface, surface - z
-        if below <= 0.0:  # nothing refracts
+        if below <= 0.0:  # no refraction
             d_x, d_y, d_z = x, y, z - height
         else:
             s = surface_crossing(across, above, below, index)
@@ -78,7 +78,7 @@ def pixels_of_points(points: Samples, numbers: Samples, out: Samples) -> None:
 
 @compiled
 def points_of_pixels(pixels: Samples, level: float, numbers: Samples, out: Samples) -> None:
-    """Points (k, 3) at the height `level` that pixels (k, 2) show; NaN where a ray does not get there."""
+    """Points (k, 3) at the height `level` on the rays of pixels (k, 2), m; NaN where a ray does not reach it."""
     focal, centre_u, centre_v, k1, k2 = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
     height, surface, index = numbers[5], numbers[6], numbers[7]
     for i in range(pixels.shape[0]):

@@ -1,10 +1,10 @@
-"""A travelling wave fitted to a bright ridge in a strip of a picture, compiled.
+"""Fit of a travelling wave to a ridge in a strip of a picture, compiled.
 
-The strip's columns j lie across, its rows i along the tail. In it a wire of phase phi is the curve
+Columns j of the strip run across the tail, rows i along it. A wire of phase phi appears as the curve
 
     y' = y + f z + g y z   at   xi' = xi + e z,   y = r cos(a), z = r sin(a), a = K xi + a_0 + phi,
 
-where e, f and g say how the picture moves and grows with the height z.
+where e, f and g are the derivatives with height z of the shift along and across, and of the magnification.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from spirillum.kernels.newey_west import variance_of_sum
 __all__ = ["ridge_of", "wave_fit", "wave_scores"]
 
 _STEPS = 8
-"""Steps of least squares at most."""
+"""Most Gauss-Newton steps."""
 
 
 @compiled
 def ridge_of(image: Samples, middle: Samples, across: Samples, contrast: Samples, inner: int, ridge: Samples) -> None:
-    """How much a line along each place of a strip differs from both of its sides, (rows, columns).
+    """Ridge filter: contrast of a line at each pixel of a strip to both of its sides.
 
     Args:
         image: the picture, (h, w, 3).
         middle: pixel of each row's middle, (rows, 2).
-        across: step from a column to the next, pixels, (rows, 2).
+        across: step from one column to the next, pixels, (rows, 2).
         contrast: weight of each channel, (3,).
         inner: half the width of the line, columns.
-        ridge: the answer; NaN where the strip leaves the picture.
+        ridge: output, (rows, columns); NaN where the strip leaves the picture.
     """
     height, width = image.shape[0], image.shape[1]
     rows, columns = ridge.shape
@@ -69,7 +69,7 @@ def ridge_of(image: Samples, middle: Samples, across: Samples, contrast: Samples
             low, high = max(0, j - inner), min(columns, j + inner + 1)
             centre = (sums[high] - sums[low]) / (high - low)
             left, right = max(0, low - side), min(columns, high + side)
-            # The weaker of both steps: an edge of something else is not a line.
+            # The weaker of both steps, so that a single edge gives no ridge.
             before = centre - (sums[low] - sums[left]) / (low - left) if low > left else math.inf
             after = centre - (sums[right] - sums[high]) / (right - high) if right > high else math.inf
             step = min(before, after)
@@ -78,7 +78,7 @@ def ridge_of(image: Samples, middle: Samples, across: Samples, contrast: Samples
 
 @compiled
 def _radius(at: float, decay: float, amplitude: float) -> float:
-    """Distance of the wire from the axis."""
+    """Distance of the tapered wire from the axis, m."""
     return amplitude * (1.0 - math.exp(-decay * max(at, 0.0)))
 
 
@@ -92,12 +92,12 @@ def _crossing(
     tilt: tuple[float, float, float],
     hand: float,
 ) -> tuple[float, float, float]:
-    """Where the wire crosses a row, r cos(a) there, and the change of the place with the phase.
+    """Lateral position of the wire in a row, r cos(a) there, and the derivative of the position by the phase.
 
-    `first` are r cos(a) and r sin(a) at xi itself; `hand` -1 mirrors the heights.
+    `first` are r cos(a) and r sin(a) at xi; `hand` = -1 mirrors the heights.
     """
     e, f, g = tilt
-    at, at_turn = xi - e * hand * first[1], -e * hand * first[0]  # and their changes with the phase
+    at, at_turn = xi - e * hand * first[1], -e * hand * first[0]  # with its derivative by the phase
     a, a_turn = wave[0] * at + wave[1] + phase, 1.0 + wave[0] * at_turn
     r = _radius(at, decay, wave[3])
     r_turn = (wave[3] - r) * decay * at_turn if at > 0.0 else 0.0
@@ -111,7 +111,7 @@ def _crossing(
 def wave_scores(
     ridge: Samples, xi: Samples, tilt: Samples, wave: Samples, step: float, every: int, scores: Samples
 ) -> None:
-    """Mean ridge along the wire at evenly spaced phases; NaN where fewer than a third of the rows are in the picture.
+    """Mean ridge along the wire at evenly spaced phases; NaN with fewer than a third of the rows in the picture.
 
     Args:
         ridge: the strip, (rows, columns).
@@ -119,8 +119,8 @@ def wave_scores(
         tilt: e, f and g of each row, (rows, 3).
         wave: K, a_0, c/L_t (0 or less: no taper), amplitude.
         step: width of a column, m.
-        every: only each such row.
-        scores: the answer, one for each phase.
+        every: stride of the rows.
+        scores: output, one for each phase.
     """
     rows, columns = ridge.shape
     half, count = 0.5 * (columns - 1), 0
@@ -149,7 +149,7 @@ def wave_scores(
 
 
 @compiled
-def _beside(
+def _residuals(
     ridge: Samples,
     xi: Samples,
     tilt: Samples,
@@ -158,19 +158,17 @@ def _beside(
     aside: Samples,
     fit: Samples,
 ) -> None:
-    """Where the ridge lies in each row beside the curve.
+    """Lateral distance of the ridge from the curve in each row.
 
     Args:
         ridge: the strip, (rows, columns).
         xi: distance from the root of each row, m, (rows,).
         tilt: e, f and g of each row, (rows, 3).
         wave: K, a_0, c/L_t (0 or less: no taper), amplitude.
-        settings: phase, rad; width of a column, m; half width in which the ridge is looked for, m; typical ridge on the
-            wire.
-        aside: sideways offset of the curve in each row, m, (rows,).
-        fit: the answer: what is left beside the curve, its weight, change of the curve with the phase, r cos(a), half
-            the distance to the curve of the other hand, the ridge on the curve; weight NaN outside the picture,
-            (rows, 6).
+        settings: phase, rad; width of a column, m; half width of the search window, m; typical ridge on the wire.
+        aside: lateral offset of the curve in each row, m, (rows,).
+        fit: output, (rows, 6): residual, its weight (NaN outside the picture), derivative of the curve by the phase,
+            r cos(a), half the distance to the curve of opposite handedness, ridge on the curve.
     """
     rows, columns = ridge.shape
     half = 0.5 * (columns - 1)
@@ -205,7 +203,7 @@ def _beside(
 
 @compiled
 def _inverse(matrix: Samples, out: Samples) -> None:
-    """Inverse of a symmetric (3, 3) matrix by its cofactors."""
+    """Inverse of a symmetric (3, 3) matrix by cofactors."""
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         for d in range(3):
@@ -219,7 +217,7 @@ def _inverse(matrix: Samples, out: Samples) -> None:
 
 @compiled
 def _row_times(matrix: Samples, row: int, vector: Samples) -> float:
-    """One number of the product of a (3, 3) matrix and a vector."""
+    """One component of the product of a (3, 3) matrix and a vector."""
     return float(matrix[row, 0] * vector[0] + matrix[row, 1] * vector[1] + matrix[row, 2] * vector[2])
 
 
@@ -237,7 +235,7 @@ def _normal(basis: Samples, weight: Samples, wanted: Samples, normal: Samples, r
 
 @compiled
 def _weights(fit: Samples, scale: float, width: float, weight: Samples) -> tuple[float, float, int]:
-    """Weights that leave out what lies far from the curve; their sum, the typical distance, and the rows in view."""
+    """Biweight weights of the residuals; returns their sum, the mean absolute residual, and the rows in view."""
     total, spread, inside = 0.0, 0.0, 0
     for i in range(weight.size):
         if math.isnan(fit[i, 1]):
@@ -261,18 +259,18 @@ def wave_fit(
     settings: tuple[float, float, float, float, float, float],
     answer: Samples,
 ) -> None:
-    """Robust least squares of phase, sideways offset and lean of a wire, from a phase nearby.
+    """Robust Gauss-Newton fit of phase, lateral offset and tilt of a wire, from a phase nearby.
 
     Args:
         ridge: the strip, (rows, columns).
         xi: distance from the root of each row, m, (rows,).
         tilt: e, f and g of each row, (rows, 3).
         wave: K, a_0, c/L_t (0 or less: no taper), amplitude.
-        settings: phase, rad; width of a column, m; width of the wire, m; typical ridge on the wire; likely offset, m;
-            likely offset from end to end, m.
-        answer: phase, its standard error, share of the rows in which the wire is where it should be, offset, lean, top
-            and bottom of two quotients: the misfit against the other hand (0 for this hand, -2 for the other), and the
-            share of the amplitude that is missing; mean ridge. Left alone where too little is in view, (10,).
+        settings: phase, rad; width of a column, m; width of the wire, m; typical ridge on the wire; prior standard
+            deviations of the offset and of the difference of offsets from end to end, m.
+        answer: output, (10,): phase, its standard error, inlier share of the rows, offset, tilt, numerator and
+            denominator of the handedness (0 as assumed, -2 opposite) and of the relative error of the amplitude, mean
+            ridge; unchanged where too little is in view.
     """
     phase, step, width, usual, likely_offset, likely_lean = settings
     rows, length = xi.size, xi[-1] - xi[0]
@@ -286,7 +284,7 @@ def wave_fit(
         for i in range(rows):
             aside[i] = offset + basis[i, 2] * lean
         window = (2.0 if repeat < 2 else 1.25) * width
-        _beside(ridge, xi, tilt, wave, (phase, step, window, usual), aside, fit)
+        _residuals(ridge, xi, tilt, wave, (phase, step, window, usual), aside, fit)
         total, spread, inside = _weights(fit, scale, width, weight)
         if total < 1e-6 or 3 * inside < rows:
             return
@@ -295,12 +293,12 @@ def wave_fit(
         for i in range(rows):
             basis[i, 0] = fit[i, 2]
         _normal(basis, weight, fit[:, 0], normal, right)
-        held_offset, held_lean = noise / likely_offset**2, noise / likely_lean**2  # both are small
+        prior_offset, prior_lean = noise / likely_offset**2, noise / likely_lean**2  # Gaussian priors at zero
         normal[0, 0] += 1e-300
-        normal[1, 1] += held_offset
-        normal[2, 2] += held_lean
-        right[1] -= held_offset * offset
-        right[2] -= held_lean * lean
+        normal[1, 1] += prior_offset
+        normal[2, 2] += prior_lean
+        right[1] -= prior_offset * offset
+        right[2] -= prior_lean * lean
         _inverse(normal, inverse)
         change = _row_times(inverse, 0, right)
         phase += 1.2 * min(max(change, -0.5), 0.5)
@@ -309,11 +307,11 @@ def wave_fit(
         if repeat > 2 and abs(change) < 2e-4:
             break
     answer[0], answer[3], answer[4] = phase, offset, lean / length
-    _judge(xi, width, total, inside, fit, weight, basis, normal, inverse, answer)
+    _assess(xi, width, total, inside, fit, weight, basis, normal, inverse, answer)
 
 
 @compiled
-def _judge(
+def _assess(
     xi: Samples,
     width: float,
     total: float,
@@ -325,7 +323,7 @@ def _judge(
     inverse: Samples,
     answer: Samples,
 ) -> None:
-    """What else `wave_fit` answers, at the end of its steps."""
+    """Standard error, inlier share, handedness and amplitude error of a converged `wave_fit`."""
     rows = xi.size
     close, square, mean = 0.0, 0.0, 0.0
     scores = np.empty(rows)
@@ -336,12 +334,12 @@ def _judge(
         if not math.isnan(fit[i, 1]):
             close += weight[i] > 0.15 and abs(fit[i, 0]) < 0.5 * width
             mean += fit[i, 5]
-    # Errors of rows near each other are alike.
+    # Errors of neighbouring rows are correlated.
     reach = max(4, int(3.0 * width / (xi[1] - xi[0])))
     plain = square / total * inverse[0, 0] * max(1.0, 0.5 * reach)
     answer[1] = math.sqrt(max(plain, variance_of_sum(scores, reach)))
     answer[2], answer[9] = close / inside, mean / inside
-    # What the other hand would change beyond what phase, offset and lean explain already.
+    # The effect of opposite handedness, orthogonal to those of phase, offset and tilt.
     gram, right, other = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     _normal(basis, weight, fit[:, 4], gram, right)
     for a in range(3):
@@ -350,10 +348,10 @@ def _judge(
     for k in range(5, 9):
         answer[k] = 0.0
     for i in range(rows):
-        rest = fit[i, 4]
+        residual = fit[i, 4]
         for a in range(3):
-            rest -= basis[i, a] * _row_times(other, a, right)
-        answer[5] += weight[i] * rest * fit[i, 0]
-        answer[6] += weight[i] * rest * rest
+            residual -= basis[i, a] * _row_times(other, a, right)
+        answer[5] += weight[i] * residual * fit[i, 0]
+        answer[6] += weight[i] * residual * residual
         answer[7] += weight[i] * fit[i, 3] * fit[i, 0]
         answer[8] += weight[i] * fit[i, 3] ** 2

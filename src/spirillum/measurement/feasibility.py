@@ -1,4 +1,4 @@
-"""Before an experiment: whether a camera resolves the expected rates, and what uncertainty to expect."""
+"""Feasibility of an experiment: whether a camera resolves the expected rates, and the expected uncertainty."""
 
 from __future__ import annotations
 
@@ -24,36 +24,36 @@ _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
 _DURATION = 20.0
 _POSITION_ERROR = 0.05
-"""Error of the position on a frame, pixels."""
+"""Standard error of the position on a frame, pixels."""
 _EDGE_ERROR = 0.25
-"""Error of a stripe's edge on a frame, pixels of the body's circumference."""
+"""Standard error of a stripe's edge on a frame, pixels along the circumference."""
 _WAVE_ERROR = 0.1
-"""Error of the wire across the axis on a frame, pixels."""
+"""Standard error of the wire's lateral position on a frame, pixels."""
 _STRIPE_ERROR = math.radians(0.2)
-"""Usual size of errors that come back with every stripe, rad."""
-_TOGETHER = 4.0
-"""Frames over which errors of position and wire are correlated."""
-_EDGE_TOGETHER = 20.0
-"""Frames over which errors of the stripes' edges are correlated."""
+"""Expected amplitude of errors that repeat with every stripe, rad."""
+_CORRELATION = 4.0
+"""Correlation time of errors of position and wire, frames."""
+_EDGE_CORRELATION = 20.0
+"""Correlation time of errors of the stripes' edges, frames."""
 _NORMAL = 1.959964
 _FEWEST = 4
-"""Fewest frames in view that give a rate."""
+"""Fewest frames that give a rate."""
 _FOREVER = 1e9
-"""Time in view of a robot that does not move, s."""
+"""Stands for the infinite time in view of a robot at rest, s."""
 _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
-"""Fewest pixels with which the trackers' tests have been passed with room to spare."""
+"""Sizes at which the tracker passes its tests with a margin, pixels."""
 _NEEDED = {"robot": 20.0, "spacing": 3.0}
-"""Fewest pixels below which nothing is found: no lines of a ruler, and no robot that can be told from a speck."""
+"""Sizes below which ruler or robot are not detected, pixels."""
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
-    f"{_WAVE_ERROR:g} pixels of the wire across; {_TOGETHER:g} neighbouring frames err alike, "
-    f"{_EDGE_TOGETHER:g} of the stripes. Orders of magnitude of clean synthetic films, not of your camera"
+    f"{_WAVE_ERROR:g} pixels of the wire across; {_CORRELATION:g} neighbouring frames err alike, "
+    f"{_EDGE_CORRELATION:g} of the stripes. Orders of magnitude of clean synthetic films, not of your camera"
 )
 
 
 @dataclass(frozen=True)
 class Check:
-    """One thing that has to hold."""
+    """A condition of feasibility."""
 
     name: str
     value: float
@@ -61,7 +61,7 @@ class Check:
     unit: str
     passed: bool
     decides: bool
-    """Whether a rate cannot be resolved if it fails; others only warn."""
+    """Whether its failure makes the experiment infeasible; otherwise it is a warning."""
     sentence: str
 
     def to_dict(self) -> dict[str, Any]:
@@ -78,28 +78,27 @@ class Check:
 
 @dataclass(frozen=True)
 class Feasibility:
-    """What to expect of an experiment."""
+    """The feasibility of an experiment."""
 
     robot: Robot
     setup: str
     expected: Mapping[str, tuple[float, str]]
-    """What is expected: value in SI and where it is from."""
+    """Expected values, SI, and their sources."""
     checks: tuple[Check, ...]
     intervals: Mapping[str, tuple[float, float]]
-    """Half width of the 95 % interval that one trial is expected to have, and that share of the value.
+    """Expected half width of the 95 % interval of one trial, absolute and relative.
 
-    Empty where nothing tells how large a pixel is, robot or ruler are too small to be found, or the robot never fits
-    into the view.
+    Empty where the scale is unknown, robot or ruler are too small to be detected, or the robot exceeds the view.
     """
     measured: float
-    """Time of a trial in which the robot is in view as a whole, s."""
+    """Time for which the whole robot is in view, s."""
     shares: Mapping[str, float]
-    """Relative standard uncertainty of lengths by what it comes from."""
+    """Relative standard uncertainty of lengths by source."""
     warnings: tuple[str, ...]
 
     @property
     def feasible(self) -> bool:
-        """Whether all rates can be resolved."""
+        """Whether all decisive checks pass."""
         return all(check.passed for check in self.checks if check.decides)
 
     def to_dict(self) -> dict[str, Any]:
@@ -144,7 +143,7 @@ def feasibility(
     video: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
 ) -> Feasibility:
-    """Whether a camera resolves what a robot is expected to do, and how well.
+    """Whether a camera resolves the expected motion of a robot, and with what uncertainty.
 
     Args:
         setup: the setup file.
@@ -153,9 +152,9 @@ def feasibility(
         speed: expected forward velocity.
         duration: length of a trial; unset: 20 s.
         frames_per_second: of the camera; unset: the setup's, else 30.
-        view_width: width of what the picture shows at the height of the axis, instead of a scale from the setup.
+        view_width: width of the field of view at the height of the axis; replaces the scale of the setup.
         picture_width: width of the picture, pixels.
-        video: a film or folder that shows the ruler, from which the scale is found.
+        video: a film or folder of images from whose ruler the scale is fitted.
         overrides: dotted fields of the robot, as for `spirillum.load`.
 
     Raises:
@@ -203,7 +202,7 @@ def feasibility(
 def _warnings(
     checks: Sequence[Check], expected: Mapping[str, tuple[float, str]], pixel: float, shares: Mapping[str, float]
 ) -> list[str]:
-    """What to be careful about, a sentence each."""
+    """Warnings, a sentence each."""
     warnings = [check.sentence for check in checks if not check.passed]
     if not math.isfinite(pixel):
         warnings.append(
@@ -246,7 +245,7 @@ def _expected(
 def _pixel(
     setup: Setup, folder: Path, view_width: str | float | None, width: int, video: str | Path | None
 ) -> tuple[float, str, int]:
-    """Length per pixel at the height of the axis, where it is from, and the picture's width in pixels."""
+    """Length per pixel at the height of the axis, m, its source, and the picture's width, pixels."""
     if view_width is not None:
         return parse_option("view-width", view_width, KINDS["length"]) / width, "view width", width
     if video is not None:
@@ -289,7 +288,7 @@ def _rates(expected: Mapping[str, tuple[float, str]], rate: float, stripes: tupl
 
 
 def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Check]:
-    """Sizes in the picture; they decide where robot or ruler are too small to be found at all."""
+    """Checks of sizes in the picture; decisive where robot or ruler are too small to be detected."""
     if not math.isfinite(pixel):
         return []
     sizes = {
@@ -320,7 +319,7 @@ def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Chec
 
 
 def _view(expected: Mapping[str, tuple[float, str]], robot: Robot, view: float, span: float, rate: float) -> Check:
-    """Whether the robot is in view for a whole trial; it decides if that is too short for any rate."""
+    """Check of the time in view; decisive where it is too short for any rate."""
     length = robot.body.length + robot.coupling.length + robot.tail.length
     whole = f"the whole robot ({1e3 * length:.4g} mm)"
     if view <= length:
@@ -350,8 +349,8 @@ def _intervals(
     rate: float,
     span: float,
 ) -> dict[str, tuple[float, float]]:
-    """Half widths of 95 % intervals of one trial: the slope of n frames over a time T has sigma sqrt(12/n)/T."""
-    slope = math.sqrt(12.0 * _TOGETHER / (span * rate)) / span
+    """Half widths of the 95 % intervals of one trial; the standard error of a slope is sigma sqrt(12/n)/T."""
+    slope = math.sqrt(12.0 * _CORRELATION / (span * rate)) / span
     speed, body = expected["forward_velocity"][0], abs(expected["body_rotation_rate"][0])
     scale = math.sqrt(sum(share**2 for share in shares.values()))
     found = {"forward_velocity": math.hypot(_POSITION_ERROR * pixel * slope, scale * speed)}
@@ -359,9 +358,9 @@ def _intervals(
         edges = max(stripes / 3.0, 1.0)  # a third of the circumference is seen well
         error = _EDGE_ERROR * pixel / (0.5 * robot.body.diameter) / math.sqrt(edges)
         cycles = max(body * span * stripes / (2 * math.pi), 1.0)
-        returning = math.sqrt(2.0) * _STRIPE_ERROR / span / cycles
-        longer = math.sqrt(_EDGE_TOGETHER / _TOGETHER)
-        found["body_rotation_rate"] = math.hypot(error * slope * longer, returning)
+        periodic = math.sqrt(2.0) * _STRIPE_ERROR / span / cycles
+        longer = math.sqrt(_EDGE_CORRELATION / _CORRELATION)
+        found["body_rotation_rate"] = math.hypot(error * slope * longer, periodic)
     waves = max(robot.tail.length / robot.tail.wavelength, 1.0)
     found["tail_rotation_rate"] = _WAVE_ERROR * pixel / robot.tail.amplitude / math.sqrt(waves) * slope
     return {

@@ -1,4 +1,4 @@
-"""What to know about a trial: flags, each a name for machines and a sentence for people."""
+"""Flags of a trial: warnings with a machine-readable name and a sentence."""
 
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ from spirillum.vision.track.track import Track
 __all__ = ["BY_HAND", "IMPORTED", "SEEN", "SYNTHETIC", "flags_of", "says_synthetic"]
 
 SEEN = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
-"""Rates that a camera sees; the motor's follows from them."""
+"""Rates measured directly; that of the motor follows from them."""
 BY_HAND = "by-hand"
-"""Name of the flag of a track that was read by hand alone."""
+"""Name of the flag of a track of manual readings alone."""
 IMPORTED = "imported"
-"""Name of the flag of a track that another program has found."""
+"""Name of the flag of a track from another program."""
 SYNTHETIC = "synthetic"
-"""The word by which computed videos are known, and the name of the flag."""
+"""Word in the metadata of computed videos, and name of the flag."""
 _MANY_OUTLIERS = 0.02
+"""Share of outliers above which a flag is raised."""
 _FEWEST_FRAMES = 4
-"""A video of which fewer were measured gives no rates."""
+"""Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
-"""Flags that are no news where there are hardly any frames, or no robot."""
+"""Flags that follow from too few frames, or from another object than the robot."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
-"""Flags of which the first says enough."""
+"""Flags of which only the first is kept."""
 
 
 def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag, ...]:
-    """The trackers' flags and our own: each once, and a cause without what is said because of it.
+    """All flags of a trial, without duplicates and without those that another flag implies.
 
     Args:
-        fits: the fitted lines by the names of `SEEN`, and others.
-        track: the track, with the trackers' flags.
+        fits: the fitted lines, by the names of `SEEN` at least.
+        track: the track, with the flags of the tracker.
         robot: the robot, for its stripes.
     """
     both = (*track.flags, *_own_flags(fits, track, robot))
@@ -48,16 +49,16 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag
         if not same or (flag.name not in _ONCE and all(other.sentence != flag.sentence for other in same)):
             flags.append(flag)
     names = {flag.name for flag in flags}
-    unsaid = {"stripes-unreadable"} if "no-stripes" in names else set()
+    implied = {"stripes-unreadable"} if "no-stripes" in names else set()
     if "not-the-robot" in names:
-        unsaid |= {*_FOLLOWING, "nothing-moves"}
+        implied |= {*_FOLLOWING, "nothing-moves"}
     count = track.time.size
     if count < _FEWEST_FRAMES and not {BY_HAND, IMPORTED} & names:
         frames = "1 frame was" if count == 1 else f"{count} frames were"
         few = f"only {frames} measured; a rate needs at least {_FEWEST_FRAMES}"
         flags.insert(0, Flag("too-few-frames", few, SEEN))
-        unsaid |= _FOLLOWING
-    return tuple(flag for flag in flags if flag.name not in unsaid)
+        implied |= _FOLLOWING
+    return tuple(flag for flag in flags if flag.name not in implied)
 
 
 def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Flag]:
@@ -90,10 +91,10 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
 
 
 def says_synthetic(words: str) -> bool:
-    """Whether a file says of itself that it is synthetic.
+    """Whether the metadata of a file declare it synthetic.
 
     Args:
-        words: its title and comment.
+        words: title and comment of the file.
     """
     return SYNTHETIC in words.lower()
 

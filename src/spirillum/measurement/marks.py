@@ -1,4 +1,4 @@
-"""Readings by hand, frame by frame, as the paper has taken them: alone, or as corrections to a track."""
+"""Manual readings, frame by frame, as in the paper: alone, or as corrections of a track."""
 
 from __future__ import annotations
 
@@ -34,38 +34,38 @@ __all__ = [
 _WHAT = "a table of readings by hand (CSV)"
 _READINGS = ("x_px", "y_px", "x_mm", "y_mm", "body_angle_deg", "tail_phase_deg")
 MARK_COLUMNS = ("video", "frame", "time_s", *_READINGS)
-"""Columns of a table of readings by hand; all may be left out but one of `frame` and `time_s`, and one reading."""
+"""Columns of a table of manual readings; required are `frame` or `time_s`, and one reading."""
 _NEAR = 0.51
-"""A reading belongs to the frame that is nearer than this share of the time between frames."""
-_CLICK = 1.0
-"""Standard error that is taken for a click with the mouse, pixels."""
-_RULE = 0.5e-3
-"""Standard error that is taken for a length read by eye where the scale is not known, m: a quarter of the 2 mm between
-the markers of the paper's ruler; assumed."""
+"""Largest time between a reading and its frame, over the time between frames."""
+_CLICK_ERROR = 1.0
+"""Assumed standard error of a mouse click, pixels."""
+_LENGTH_ERROR = 0.5e-3
+"""Assumed standard error of a length read by eye where the scale is unknown, m: a quarter of the 2 mm marker spacing of
+the paper's ruler."""
 _APART = 0.75
-"""Difference from which on frame and time of a row contradict each other, s: times may be whole seconds."""
-_GLANCE = math.radians(5.0)
-"""Standard error that is taken for an angle read by eye, rad."""
+"""Largest difference between the time of a row and that of its frame, s: times may be rounded to seconds."""
+_ANGLE_ERROR = math.radians(5.0)
+"""Assumed standard error of an angle read by eye, rad."""
 EDGE = 0.5
-"""From the centre of a picture's outermost pixels, which are at whole numbers, to its edge, pixels."""
+"""Distance of the border from the centres of the outermost pixels, pixels; centres have integer coordinates."""
 _LATER = 1.02
-"""Latest time of a reading over the length of the video, which is known to about a frame."""
+"""Latest time of a reading over the duration of the video, which is known to about a frame."""
 
 
 @dataclass(frozen=True)
 class Ruled:
-    """What turns pixels into lengths."""
+    """The map from pixels to lengths."""
 
     scale: Scale
     """Scale of lengths."""
     size: tuple[int, int]
     """Width and height of the picture, pixels."""
     points: Callable[[Samples], Samples] = field(repr=False)
-    """Takes pixels (k, 2) to (x, y) at the height of the axis, m, (k, 2)."""
+    """Maps pixels (k, 2) to (x, y) at the height of the axis, m, (k, 2)."""
 
     @classmethod
     def plain(cls, scale: Scale, size: tuple[int, int], *, leftward: bool) -> Ruled:
-        """One scale for the whole picture: no perspective, no refraction."""
+        """A uniform scale without perspective and refraction."""
         sign = -1.0 if leftward else 1.0
 
         def points(pixels: Samples) -> Samples:
@@ -77,37 +77,37 @@ class Ruled:
 
 @dataclass(frozen=True)
 class Marks:
-    """Readings by hand of one video; NaN where nothing was read; SI, but pixels."""
+    """Manual readings of one video, in SI units and pixels; NaN where nothing was read."""
 
     path: Path
     frame: Samples
-    """Number of the frame, (k,)."""
+    """Frame numbers, (k,)."""
     time: Samples
     """Time in the video, s, (k,)."""
     pixels: Samples
     """Pixel of the body's mid-length, (k, 2)."""
     position: Samples
-    """Position (x, y) of readings in lengths, m, (k, 2)."""
+    """Position (x, y) where it was read as a length, m, (k, 2)."""
     body_angle: Samples
     """rad, (k,)."""
     tail_phase: Samples
     """rad, (k,)."""
     lines: tuple[int, ...] = ()
-    """Line of each reading in the file."""
+    """Line number of each reading in the file."""
     counted: tuple[str, ...] = ()
-    """Columns whose angles were read within a turn and counted on."""
+    """Columns whose angles were read modulo 2 pi and have been unwrapped."""
 
 
 def read_marks(path: str | Path) -> dict[str, Marks]:
-    """Read a table of readings by hand.
+    """Read a table of manual readings.
 
     Args:
-        path: CSV with some of the columns `MARK_COLUMNS`. Angles are counted on over full turns (370 after a full turn
-            and ten degrees); if all of them lie within one turn and one step is longer than half a turn, they are
-            taken as read within a turn and are counted on the shorter way.
+        path: CSV with some of the columns `MARK_COLUMNS`. Angles are cumulative (370 after a full turn and ten
+            degrees). If all of them lie within one turn and a step exceeds half a turn, they are taken as angles
+            modulo 360 and unwrapped.
 
     Returns:
-        The readings by the video that they name; by the empty text where the table has no such column.
+        The readings by video; the key is empty where the table has no such column.
 
     Raises:
         InputError: if a column is unknown, one is missing, or a cell is wrong; the sentence names row and column.
@@ -151,7 +151,7 @@ def _marks(table: Table, rows: list[Row]) -> Marks:
     pixels = np.stack([column("x_px"), column("y_px")], axis=1)
     position = 1e-3 * np.stack([column("x_mm"), column("y_mm")], axis=1)
     read = {name: np.radians(column(name)[order]) for name in ("body_angle_deg", "tail_phase_deg")}
-    angles = {name: _counted(values) for name, values in read.items()}
+    angles = {name: _unwrapped(values) for name, values in read.items()}
     counted = tuple(name for name in read if not np.array_equal(read[name], angles[name], equal_nan=True))
     return Marks(
         table.path, frame[order], time[order], pixels[order], position[order],
@@ -160,8 +160,8 @@ def _marks(table: Table, rows: list[Row]) -> Marks:
     )  # fmt: skip
 
 
-def _counted(angle: Samples) -> Samples:
-    """Angles read within a turn, counted on; angles that go on over full turns stay as they are."""
+def _unwrapped(angle: Samples) -> Samples:
+    """Angles modulo 2 pi, unwrapped; cumulative angles are returned unchanged."""
     known = np.isfinite(angle)
     values = angle[known]
     within = values.size > 1 and np.ptp(values) <= 2 * np.pi and np.abs(np.diff(values)).max() > np.pi
@@ -173,11 +173,11 @@ def _counted(angle: Samples) -> Samples:
 
 
 def check_times(marks: Marks, duration: float | None) -> None:
-    """Refuse readings from after the end of a video.
+    """Refuse readings after the end of a video.
 
     Args:
         marks: the readings.
-        duration: length of the video, s; None where it is not known.
+        duration: duration of the video, s; None where unknown.
 
     Raises:
         InputError: if there is one; the sentence names its row.
@@ -192,7 +192,7 @@ def check_times(marks: Marks, duration: float | None) -> None:
 
 
 def check_pixels(marks: Marks, size: tuple[int, int]) -> None:
-    """Refuse readings from outside the picture.
+    """Refuse readings outside the picture.
 
     Args:
         marks: the readings.
@@ -210,7 +210,7 @@ def check_pixels(marks: Marks, size: tuple[int, int]) -> None:
 
 
 def _check_agreement(marks: Marks, time: Samples) -> None:
-    """Refuse a reading whose frame was not taken at its time; `time` is that of its frame, s, or NaN."""
+    """Refuse a reading whose time differs from the time of its frame, s, (k,); NaN where unknown."""
     for place in np.flatnonzero(np.abs(marks.time - time) > _APART):
         row = f"row {marks.lines[place]}" if marks.lines else f"reading {place + 1}"
         raise InputError(
@@ -220,7 +220,7 @@ def _check_agreement(marks: Marks, time: Samples) -> None:
 
 
 def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
-    """Where the readings put the body, m, (k, 2); a coordinate that was not read is taken from the picture's middle."""
+    """Positions of the body, m, (k, 2); a missing coordinate is replaced by that of the picture's centre."""
     position = marks.position.copy()
     known = np.isfinite(marks.pixels[:, 0])
     if ruled is not None and known.any():
@@ -235,14 +235,14 @@ def _positions(marks: Marks, ruled: Ruled | None) -> Samples:
 def track_of_marks(
     marks: Marks, setup: Setup, video: str, ruled: Ruled | None, time_of: Callable[[Samples], Samples] | None
 ) -> Track:
-    """A track of readings by hand alone.
+    """A track of manual readings alone.
 
     Args:
         marks: the readings.
         setup: the setup.
         video: name of the video.
-        ruled: turns pixels into lengths; None where no readings are in pixels.
-        time_of: takes numbers of frames to times, s; None where nothing tells.
+        ruled: maps pixels to lengths; None where no reading is in pixels.
+        time_of: maps frame numbers to times, s; None where unknown.
 
     Raises:
         InputError: if a reading has no time.
@@ -265,27 +265,28 @@ def track_of_marks(
     scale = ruled.scale if ruled else Scale(math.nan, 0.0, {}, 0, math.nan)
     nothing = np.full(inside.size, np.nan)
     picture = np.concatenate([marks.pixels[inside], np.full((inside.size, 2), np.nan)], axis=1)
-    click = np.full(inside.size, _RULE if ruled is None else _CLICK * scale.length_per_pixel)
-    glance = np.full(inside.size, _GLANCE)
+    click = np.full(inside.size, _LENGTH_ERROR if ruled is None else _CLICK_ERROR * scale.length_per_pixel)
+    angle_error = np.full(inside.size, _ANGLE_ERROR)
     return Track(
         time=time[inside], frame=marks.frame[inside], position=_positions(marks, ruled)[inside], heading=nothing,
         body_angle=marks.body_angle[inside], tail_phase=marks.tail_phase[inside],
-        position_error=click, body_angle_error=glance, tail_phase_error=glance,
+        position_error=click, body_angle_error=angle_error, tail_phase_error=angle_error,
         picture=picture, size=ruled.size if ruled else (0, 0), scale=scale, setup=setup, video=video,
         flags=(
-            Flag(BY_HAND, f"{_all_readings(inside.size)} taken by hand, from {marks.path.name}"), *_counted_flag(marks)
+            Flag(BY_HAND, f"{_all_readings(inside.size)} taken by hand, from {marks.path.name}"),
+            *_unwrapped_flag(marks),
         ),
     )  # fmt: skip
 
 
 def _all_readings(count: int) -> str:
-    """All readings, and the verb that goes with them."""
+    """Subject and verb of a sentence on all readings."""
     few = {1: "the only reading was", 2: "both readings were"}
     return few.get(count, f"all {count} readings were")
 
 
-def _counted_flag(marks: Marks) -> tuple[Flag, ...]:
-    """What has to be known where angles were read within a turn."""
+def _unwrapped_flag(marks: Marks) -> tuple[Flag, ...]:
+    """The flag on angles that were unwrapped."""
     if not marks.counted:
         return ()
     verb = "was" if len(marks.counted) == 1 else "were"
@@ -297,14 +298,14 @@ def _counted_flag(marks: Marks) -> tuple[Flag, ...]:
 
 
 def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
-    """A track with the readings by hand in place of what was seen.
+    """A track in which manual readings replace the automatic ones.
 
-    Angles are taken to the full turn that is nearest to the track.
+    To angles the multiple of 2 pi is added that brings them nearest to the track.
 
     Args:
         track: the automatic track.
         marks: the readings.
-        ruled: turns pixels into lengths.
+        ruled: maps pixels to lengths.
 
     Raises:
         InputError: if a reading belongs to no frame of the track; the sentence names its row.
@@ -318,11 +319,11 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
         known = np.isfinite(read[:, axis])
         position[index[known], axis] = read[known, axis]
     known = np.isfinite(read[:, 0])
-    errors[0][index[known]] = _CLICK * track.scale.length_per_pixel
+    errors[0][index[known]] = _CLICK_ERROR * track.scale.length_per_pixel
     for angle, by_hand, error in ((body, marks.body_angle, errors[1]), (tail, marks.tail_phase, errors[2])):
         known = np.isfinite(by_hand)
         angle[index[known]] = _nearest_turn(track.time, angle, index[known], by_hand[known])
-        error[index[known]] = _GLANCE
+        error[index[known]] = _ANGLE_ERROR
     flag = Flag("corrected-by-hand", f"{frames} by hand, from {marks.path.name}")
     return replace(
         track, position=position, body_angle=body, tail_phase=tail, position_error=errors[0],
@@ -331,7 +332,7 @@ def corrected(track: Track, marks: Marks, ruled: Ruled | None) -> Track:
 
 
 def frames_read(track: Track, marks: Marks) -> np.ndarray:
-    """Frames of a track that were read by hand, truth values, (n,).
+    """Mask of the frames of a track that were read by hand, (n,).
 
     Args:
         track: the track.
@@ -346,7 +347,7 @@ def frames_read(track: Track, marks: Marks) -> np.ndarray:
 
 
 def _frames_of(track: Track, marks: Marks) -> np.ndarray:
-    """Place in the track of each reading."""
+    """Index into the track of each reading."""
     step = float(np.median(np.diff(track.time))) if track.time.size > 1 else np.inf
     found = np.empty(marks.frame.size, dtype=np.int64)
     for number, (frame, time) in enumerate(zip(marks.frame, marks.time, strict=True)):

@@ -1,10 +1,10 @@
 """The rate of a noisy series over true times, with an interval that allows for autocorrelated errors.
 
-A straight line is fitted by generalised least squares. Its errors are three: white noise of each frame; a part with a
-memory (Ornstein and Uhlenbeck's, in discrete time an autoregression of first order) of unknown share and unknown time;
-and errors that come back with an angle, such as those of reading a stripe that moves under the glare. Share and time
-are not estimated and then believed: the interval is averaged over all of them, each weighted by its restricted
-likelihood (Harville 1974), so that a short stretch with a long memory gives a wide interval.
+A straight line is fitted by generalised least squares. The noise model has three parts: white noise; an
+Ornstein-Uhlenbeck process (a first-order autoregression in discrete time) of unknown variance share and correlation
+time; and periodic errors of an angle, such as the error of reading a stripe that passes under a highlight. Share and
+correlation time are marginalised on a grid, each node weighted by its restricted likelihood (Harville 1974), so that a
+short series with a long correlation time gets a wide interval.
 """
 
 from __future__ import annotations
@@ -20,58 +20,62 @@ from spirillum.arrays import Samples
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.statistics import student_t, student_t_quantile
 
-__all__ = ["Cycle", "Rate", "mean_of", "rate_of"]
+__all__ = ["PeriodicError", "Rate", "mean_of", "rate_of"]
 
 _MOST_BLOCKS = 100
-"""Frames are averaged to so many blocks: the slope lives in the slow part, and the work grows with the third power."""
+"""Most blocks into which frames are averaged: a slope is a low-frequency quantity; the cost is cubic in blocks."""
 _SHARES = (0.03, 0.1, 0.25, 0.5, 0.75, 0.9, 0.97, 0.995)
-_MEMORIES = 8
+"""Variance shares of the correlated part on the grid."""
+_TIMES = 8
+"""Correlation times on the grid."""
 _SIZES = (0.25, 1.0)
-"""Variances of errors that come back with an angle, over what is usual: the series says which of them is likely."""
+"""Variances of the periodic errors on the grid, over the expected ones; weighted by their likelihood."""
 _WHITE = 3.0
-"""Odds, before anything is seen, of errors without a memory against all others."""
+"""Prior odds of white noise against all correlated noises."""
 _FEWEST = 8
-"""With fewer frames nothing can be said about memory: their errors are taken as independent."""
+"""Fewest frames from which autocorrelation is estimated; errors of fewer frames are taken as independent."""
 _UNSTEADY_P = 1e-5
+"""p-value below which a rate is taken to change."""
 _LARGEST_RATIO = 1e6
-"""Variance of what returns over that of noise: beyond it nothing changes but rounding."""
+"""Largest variance of a periodic error over that of the noise; a larger one only adds rounding errors."""
 _UNSTEADY_SHARE = 0.1
+"""Relative change of a rate below which it counts as steady."""
 _ENDS = 5
-"""Readings of which an end consists."""
+"""Readings averaged at each end of a series."""
 _ROUNDING = 1e-12
-"""Range of a series over its values that is rounding: what rests is steady."""
+"""Relative range of a series below which its variation is rounding error: it counts as steady."""
 
 
 @dataclass(frozen=True)
-class Cycle:
-    """An error that comes back with an angle."""
+class PeriodicError:
+    """A systematic error that repeats with every turn of an angle."""
 
     angle: Samples = field(repr=False)
-    """The angle on every frame, rad, (n,): the error is the same one turn of it later; NaN where unknown."""
+    """The angle on every frame, rad, (n,); the error has the period 2 pi in it; NaN where unknown."""
     amplitude: float
-    """How large such errors usually are, in the unit of the series; what the series shows beyond it counts too."""
+    """Expected amplitude, in the unit of the series; a larger one seen in the series is added."""
 
 
 @dataclass(frozen=True)
 class Rate:
-    """The mean rate of a series over a stretch, in the unit of the series per second."""
+    """The mean rate of a series, in its unit per second."""
 
     value: float
-    """Mean rate; NaN where it cannot be told."""
+    """Mean rate; NaN with fewer than two frames."""
     low: float
-    """Lower end of the 95 % interval; NaN where there are too few frames for one."""
+    """Lower end of the confidence interval; NaN with two frames."""
     high: float
-    """Upper end."""
+    """Upper end of the confidence interval."""
     frames: int
     """Frames that were used."""
     outliers: int
-    """Frames that were left out because they lie far from their neighbours."""
+    """Outliers, which were left out."""
     steady: bool
-    """Whether the rate is the same all along, as far as can be seen."""
-    memory: float
-    """Correlation time of the errors, s: the likeliest one; 0 for white noise."""
+    """Whether no significant change of the rate was detected."""
+    correlation_time: float
+    """Most likely correlation time of the errors, s; 0 for white noise."""
     residual: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
-    """The series less the fitted line, (n,); NaN where it was not measured or left out."""
+    """Residuals of the fit, (n,); NaN where not measured or an outlier."""
 
     @property
     def measured(self) -> bool:
@@ -79,34 +83,34 @@ class Rate:
         return bool(np.isfinite(self.value))
 
 
-_NOTHING = Rate(np.nan, np.nan, np.nan, 0, 0, steady=True, memory=0.0)
-"""A rate of a series without two frames."""
+_NOTHING = Rate(np.nan, np.nan, np.nan, 0, 0, steady=True, correlation_time=0.0)
+"""The rate of a series of fewer than two frames."""
 
 
 def rate_of(
     time: Samples,
     values: Samples,
     error: Samples | None = None,
-    cycles: Sequence[Cycle] = (),
+    periodic: Sequence[PeriodicError] = (),
     level: float = 0.95,
     *,
     read: np.ndarray | None = None,
-    bent: bool = False,
+    unsteady: bool = False,
 ) -> Rate:
-    """Mean rate of a series and its interval.
+    """Mean rate of a series and its confidence interval.
 
     Args:
-        time: true times, s, (n,), increasing; gaps are welcome.
+        time: times, s, (n,), increasing; gaps are allowed.
         values: the series, unwrapped where it is an angle, (n,); NaN where it was not measured.
         error: standard error of each frame, (n,); only their ratios are used.
-        cycles: errors that come back with an angle.
+        periodic: periodic errors.
         level: confidence level.
-        read: frames that were read by hand, truth values, (n,): they are left out only beyond six of their own errors,
-            which also widen the interval of a few readings that agree by chance.
-        bent: whether it is known that the rate changes.
+        read: mask of the frames read by hand, (n,). They are outliers only beyond six of their own standard errors,
+            which also enter the interval of a few readings that lie on a line by chance.
+        unsteady: whether the rate is known to change.
 
     Returns:
-        The slope; where the rate is seen to change, the mean from end to end.
+        The slope; where the rate changes, the mean rate from end to end.
     """
     known = np.isfinite(values) & np.isfinite(time)
     outlier = outlying_frames(time, values, None if read is None or error is None else np.where(read, error, np.nan))
@@ -125,17 +129,17 @@ def rate_of(
         found = (value / half, low / half, high / half)
         line = np.polynomial.polynomial.polyfit(s, y, 1)
         residual = _residual(values, used, y - line[0] - line[1] * s)
-        return Rate(*found, count, int(outlier.sum()), steady=True, memory=0.0, residual=residual)
-    angles = [(np.where(np.isfinite(c.angle), c.angle, 0.0)[used], c.amplitude) for c in cycles]
+        return Rate(*found, count, int(outlier.sum()), steady=True, correlation_time=0.0, residual=residual)
+    angles = [(np.where(np.isfinite(c.angle), c.angle, 0.0)[used], c.amplitude) for c in periodic]
     blocks = _Blocks.of(s, y, weights, angles)
-    bend = bent or _bend(blocks)
-    columns = 4 if bend else 2
-    # From end to end, (p(1) - p(-1))/2: Legendre polynomials of odd degree count.
+    changes = unsteady or _rate_changes(blocks)
+    columns = 4 if changes else 2
+    # The mean rate is (p(1) - p(-1))/2, to which Legendre polynomials of odd degree contribute.
     fitted = _averaged(blocks, columns, level, np.array([0.0, 1.0, 0.0, 1.0])[:columns])
     line = np.polynomial.legendre.legval(s, fitted.line)
     residual = _residual(values, used, y - line)
     low, high = fitted.low, fitted.high
-    if bend:  # what a cubic misses of a start or a stop
+    if changes:  # lack of fit of a cubic at a start or a stop
         off = abs(_from_end_to_end(s, y) - fitted.value)
         low, high = fitted.value - np.hypot(fitted.value - low, off), fitted.value + np.hypot(high - fitted.value, off)
     return Rate(
@@ -144,14 +148,14 @@ def rate_of(
         float(high) / half,
         count,
         int(outlier.sum()),
-        not bend,
-        fitted.memory * half,
+        not changes,
+        fitted.correlation_time * half,
         residual,
     )
 
 
 def mean_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float, float, float]:
-    """Mean of a series over a stretch, with its interval; the same errors as for a rate.
+    """Mean of a series and its confidence interval, with the noise model of `rate_of` without periodic errors.
 
     Args:
         time: true times, s, (n,).
@@ -174,7 +178,7 @@ def _residual(values: Samples, used: np.ndarray, inside: Samples) -> Samples:
 
 
 def _weights(error: Samples | None, used: np.ndarray) -> Samples:
-    """Weights of the frames: an error that is claimed to be tiny or huge is not believed beyond a factor of three."""
+    """Inverse variances of the frames; standard errors are clipped to a factor of three about their median."""
     if error is None:
         return np.ones(int(used.sum()))
     here = np.where(np.isfinite(error) & (error > 0), error, np.nan)[used]
@@ -191,9 +195,9 @@ def _from_end_to_end(s: Samples, y: Samples) -> float:
 
 
 def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | None) -> tuple[float, float, float]:
-    """Slope of a handful of readings with independent errors.
+    """Slope of a few readings with independent errors, with its confidence interval.
 
-    Three readings may lie on a line by chance: where an eye's errors are known, they count as one more residual.
+    Three readings may lie on a line by chance: known standard errors of the readings add one degree of freedom.
     """
     design = np.stack([np.ones_like(s), s], axis=1) * np.sqrt(weights)[:, None]
     inverse = np.linalg.inv(design.T @ design)
@@ -210,23 +214,23 @@ def _few(s: Samples, y: Samples, weights: Samples, level: float, eye: Samples | 
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Averages over neighbouring frames."""
+    """Block averages of a series, and the noise model's fixed parts."""
 
     s: Samples
-    """Time from -1 to 1."""
+    """Time, scaled to -1 to 1, (m,)."""
     y: Samples
     design: Samples
     """Legendre polynomials of degree 0 to 3, (m, 4)."""
     white: Samples
-    """Variance of white noise, 1 in the mean."""
+    """Variance of white noise in each block, 1 in the mean, (m,)."""
     returning: Samples
-    """Covariance of errors that come back with an angle, in units of `variance`, (m, m)."""
+    """Covariance of the periodic errors in units of `variance`, (m, m)."""
     variance: float
-    """Variance of what is left of a line and all that returns."""
+    """Residual variance of a straight line with all periodic errors."""
 
     @classmethod
     def of(cls, s: Samples, y: Samples, weights: Samples, angles: list[tuple[Samples, float]]) -> _Blocks:
-        """Average frames to blocks of about the same number of frames, none across a wide gap."""
+        """Average frames into blocks of about equal numbers of frames; no block spans a wide gap."""
         label = _labels(s)
         count = int(label[-1]) + 1
         total: Samples = np.bincount(label, weights, count).astype(np.float64)
@@ -249,7 +253,7 @@ class _Blocks:
 
 
 def _labels(s: Samples) -> np.ndarray:
-    """Number of the block of each frame."""
+    """Index of the block of each frame."""
     if s.size <= _MOST_BLOCKS:
         return np.arange(s.size)
     edges = np.floor(np.arange(s.size) * (_MOST_BLOCKS / s.size)).astype(np.int64)
@@ -258,7 +262,7 @@ def _labels(s: Samples) -> np.ndarray:
 
 
 def _first_fit(line: Samples, waves: list[Samples], total: Samples, height: Samples) -> tuple[list[Samples], float]:
-    """Ordinary least squares with everything: amplitudes of what returns, and the variance of what is left."""
+    """Ordinary least squares of a line and all periodic errors: their amplitudes and the residual variance."""
     root = np.sqrt(total / total.mean())
     design = np.concatenate([line, *waves], axis=1) * root[:, None]
     beta = np.linalg.lstsq(design, height * root, rcond=1e-8)[0]
@@ -269,58 +273,58 @@ def _first_fit(line: Samples, waves: list[Samples], total: Samples, height: Samp
 
 @dataclass(frozen=True)
 class _Fit:
+    """An estimate averaged over all noises."""
+
     value: float
     low: float
     high: float
     line: Samples
-    memory: float
+    correlation_time: float
 
 
 class _Noise(NamedTuple):
-    """A noise to be tried."""
+    """A noise model on the grid."""
 
     share: float
-    """Share of the part with a memory."""
-    memory: float
-    """Its time, in half stretches."""
-    alike: Samples
-    """Correlation of that part, (m, m)."""
+    """Share of the correlated part in the variance."""
+    time: float
+    """Its correlation time, in half lengths of the series."""
+    correlation: Samples
+    """Its correlation matrix, (m, m)."""
     size: float
-    """Variance of what comes back with an angle over what is usual."""
+    """Variance of the periodic errors over the expected one."""
 
 
-def _noises(
-    blocks: _Blocks, shares: Sequence[float], memories: Samples, sizes: Sequence[float] = (1.0,)
-) -> list[_Noise]:
-    """All shares and memories, and white noise, for all sizes of what comes back; one if nothing does."""
-    apart = np.abs(blocks.s[:, None] - blocks.s[None, :])
-    alike = [np.exp(-apart / memory) for memory in memories]
-    parts = [(share, float(m), a) for share in shares for m, a in zip(memories, alike, strict=True)]
-    parts.append((0.0, 0.0, np.zeros_like(apart)))
+def _noises(blocks: _Blocks, shares: Sequence[float], times: Samples, sizes: Sequence[float] = (1.0,)) -> list[_Noise]:
+    """The grid of noise models: shares by correlation times, and white noise; each with all `sizes`."""
+    lag = np.abs(blocks.s[:, None] - blocks.s[None, :])
+    correlations = [np.exp(-lag / time) for time in times]
+    parts = [(share, float(m), a) for share in shares for m, a in zip(times, correlations, strict=True)]
+    parts.append((0.0, 0.0, np.zeros_like(lag)))
     return [_Noise(*part, size) for size in (sizes if blocks.returning.any() else (1.0,)) for part in parts]
 
 
 class _Solved(NamedTuple):
-    """Generalised least squares with one noise."""
+    """The generalised least squares estimate for one noise model."""
 
     likelihood: float
     """Restricted log likelihood."""
     fit: float
-    """Log likelihood, by which different columns may be compared."""
+    """Log likelihood, which may be compared between design matrices."""
     beta: Samples
     """Coefficients."""
     covariance: Samples
-    """Their covariance."""
+    """Covariance of the coefficients."""
 
 
 def _solved(blocks: _Blocks, columns: int, noise: _Noise) -> _Solved:
-    """Generalised least squares with one noise."""
+    """Generalised least squares with one noise model and the first columns of the design matrix."""
     from scipy.linalg.lapack import dpotrf, dpotrs
 
-    covariance = noise.share * noise.alike + noise.size * blocks.returning
+    covariance = noise.share * noise.correlation + noise.size * blocks.returning
     covariance.flat[:: blocks.s.size + 1] += (1.0 - noise.share) * blocks.white + 1e-7
     factor, failed = dpotrf(covariance, lower=1, overwrite_a=1)
-    if failed:  # by rounding, where the series has next to no noise
+    if failed:  # rounding, where the series is almost free of noise
         return _Solved(-np.inf, -np.inf, np.zeros(columns), np.eye(columns))
     design = blocks.design[:, :columns]
     both, _ = dpotrs(factor, np.concatenate([design, blocks.y[:, None]], axis=1), lower=1)
@@ -337,13 +341,13 @@ def _solved(blocks: _Blocks, columns: int, noise: _Noise) -> _Solved:
 
 
 def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _Fit:
-    """A combination of the coefficients, averaged over all noises."""
+    """The linear combination `along` of the coefficients, averaged over the noise models by their likelihood."""
     from scipy.optimize import brentq
 
-    noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _MEMORIES), _SIZES)
+    noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _TIMES), _SIZES)
     solved = [_solved(blocks, columns, noise) for noise in noises]
     likelihoods = np.array([item.likelihood for item in solved])
-    likelihoods[[noise.share == 0.0 for noise in noises]] += np.log(_WHITE * len(_SHARES) * _MEMORIES)
+    likelihoods[[noise.share == 0.0 for noise in noises]] += np.log(_WHITE * len(_SHARES) * _TIMES)
     weights = np.exp(likelihoods - likelihoods.max())
     weights /= weights.sum()
     centres = np.array([along @ item.beta for item in solved])
@@ -361,23 +365,22 @@ def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _F
     line = np.sum(weights[:, None] * np.array([item.beta for item in solved]), axis=0)
     best = noises[int(np.argmax(weights))]
     tail = 0.5 * (1.0 - level)
-    return _Fit(value, quantile(tail), quantile(1.0 - tail), line, best.memory)
+    return _Fit(value, quantile(tail), quantile(1.0 - tail), line, best.time)
 
 
-def _bend(blocks: _Blocks) -> bool:
-    """Whether the rate changes along the stretch, beyond doubt and by more than a tenth.
+def _rate_changes(blocks: _Blocks) -> bool:
+    """Whether the rate changes significantly and by more than a tenth.
 
-    A bent line has to explain the series far better than a straight one with errors of whatever memory (likelihood
-    ratio of both at their best noise).
+    Likelihood ratio test of a cubic against a straight line, each with its most likely noise model.
     """
     count = blocks.s.size
     if count < 24 or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False
     noises = _noises(blocks, _SHARES[1::2], np.geomspace(2.0 / count, 2.0, 5))
-    straight, bent = ([_solved(blocks, columns, noise) for noise in noises] for columns in (2, 4))
-    gain = 2.0 * (max(item.fit for item in bent) - max(item.fit for item in straight))
+    straight, cubic = ([_solved(blocks, columns, noise) for noise in noises] for columns in (2, 4))
+    gain = 2.0 * (max(item.fit for item in cubic) - max(item.fit for item in straight))
     if gain < -2.0 * math.log(_UNSTEADY_P):  # chi-squared with two degrees of freedom: exp(-gain/2)
         return False
-    beta = max(bent, key=lambda item: item.fit).beta
+    beta = max(cubic, key=lambda item: item.fit).beta
     slope = np.polynomial.legendre.legval(np.linspace(-1, 1, 41), np.polynomial.legendre.legder(beta))
     return bool(np.ptp(slope) > _UNSTEADY_SHARE * abs(beta[1] + beta[3]))

@@ -1,4 +1,4 @@
-"""The time series of a trial as labelled arrays: our own, and in the layout of the `movement` project."""
+"""The time series of a trial as labelled arrays: in spirillum's layout, and in that of the `movement` project."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _RESIDUAL_UNITS = ("m", "rad", "rad", "rad")
 
 
 def series_of(trial: Trial, robot: Robot) -> Labelled:
-    """What was seen on every frame and how far it lies from the fitted lines; SI, rates in rad/s.
+    """Pose, angles, standard errors and residuals on every frame; SI units, rates in rad/s.
 
     Args:
         trial: the trial.
@@ -96,9 +96,9 @@ def series_of(trial: Trial, robot: Robot) -> Labelled:
 
 
 def movement_of(trial: Trial, robot: Robot) -> Labelled:
-    """The robot as an individual with two points, in pixels, as the `movement` project lays poses out.
+    """The track as a poses data set of the `movement` project: one individual with two keypoints, in pixels.
 
-    Dimensions time, space, keypoints, individuals; variables `position` and `confidence`; u is its x, v its y.
+    Dimensions are time, space, keypoints and individuals; variables `position` and `confidence`; x is u, y is v.
 
     Args:
         trial: the trial.

@@ -1,4 +1,4 @@
-"""Over trials: means with Student's t, what all trials share, and trials that do not fit in."""
+"""Statistics over trials: means with Student's t intervals, the common uncertainty of the scale, and outliers."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ class Summary:
     """Means over trials."""
 
     quantities: Mapping[str, Measured]
-    """By the names of `MEASURED`."""
+    """Means by the names of `MEASURED`."""
     counts: Mapping[str, int]
-    """Number of trials of each mean."""
+    """Number of trials that entered each mean."""
     trials: int
-    """All trials."""
+    """Number of all trials."""
     scale_uncertainty: float
-    """Relative standard uncertainty of lengths, which all trials share."""
+    """Relative standard uncertainty of lengths, common to all trials."""
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON."""
@@ -40,12 +40,12 @@ class Summary:
 
 
 def summary_of(trials: Sequence[Trial]) -> Summary:
-    """Means over trials with Student's t; the scale, which they share, is added whole to lengths.
+    """Means over trials with Student's t intervals; that of a single trial is its own.
 
-    With one trial it is that trial's own interval.
+    The uncertainty of the scale is common to all trials: averaging does not reduce it.
 
     Args:
-        trials: at least one.
+        trials: one or more.
     """
     shared = max((trial.track.scale.relative_uncertainty for trial in trials), default=0.0)
     quantities, counts = {}, {}
@@ -66,7 +66,7 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     reach = mean.half_width
     if name in _LENGTHS:
         reach = math.hypot(reach, _NORMAL * shared * mean.value)
-    if name in WOBBLES:  # what tracking adds to them is common to all trials
+    if name in WOBBLES:  # the error of tracking is common to all trials
         reach = max(reach, float(np.mean([item.high - item.value for item in measured])))
     low = mean.value - reach
     if name in WOBBLES:
@@ -75,8 +75,8 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
 
 
 def compared(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials, none dropped; an outlier among them, or a copy of another one, carries a flag."""
-    found = [_told_apart(trial, trials[:place]) for place, trial in enumerate(trials)]
+    """All trials, with flags on outliers (Grubbs' test) and on copies of another trial."""
+    found = [_copy_flagged(trial, trials[:place]) for place, trial in enumerate(trials)]
     for name in RATE_NAMES:
         worst = outlying_trial([trial.quantities[name].value for trial in trials])
         if worst is None:
@@ -89,8 +89,8 @@ def compared(trials: Sequence[Trial]) -> list[Trial]:
     return found
 
 
-def _told_apart(trial: Trial, others: Sequence[Trial]) -> Trial:
-    """The trial; flagged if it shows frame by frame what another one does."""
+def _copy_flagged(trial: Trial, others: Sequence[Trial]) -> Trial:
+    """The trial, flagged if its track equals that of another one."""
     x = trial.track.position[:, 0]
     twin = next((other for other in others if np.array_equal(other.track.position[:, 0], x, equal_nan=True)), None)
     if twin is None or not np.isfinite(x).any():

@@ -1,4 +1,4 @@
-"""From the track of one video to its speed, its rates and its wobble, each with a 95 % interval."""
+"""Velocity, rotation rates and wobble of one track, each with a 95 % confidence interval."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.outliers import outlying_frames
-from spirillum.measurement.rates import Cycle, Rate, mean_of, rate_of
+from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.robot.robot import Robot
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
@@ -31,53 +31,56 @@ __all__ = [
 ]
 
 LEVEL = 0.95
-"""Level of all intervals."""
+"""Confidence level of all intervals."""
 RATE_NAMES = (*SEEN, "motor_rotation_rate")
-"""What is measured by a slope."""
+"""Quantities that are slopes of a series."""
 WOBBLES = (
     "lateral_wobble_at_tail_rate",
     "lateral_wobble_at_body_rate",
     "heading_wobble_at_tail_rate",
     "heading_wobble_at_body_rate",
 )
-"""Amplitudes of the motion across, and of the heading, that come back with tail or body."""
+"""Amplitudes of lateral motion and heading at the rotation rates of tail and body."""
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
-"""All that a trial measures, and a summary over trials."""
+"""All quantities of a trial, and of a summary over trials."""
 _NORMAL = 1.959964
 _PIXEL_ERROR = 0.03
-"""Least usual size of errors of the position that come back with an angle or with each pixel, pixels."""
-_HELD = 0.12
-"""Standard error of a lateral amplitude, relative: edges of the glass that stand still beside the body hold it back.
+"""Least expected amplitude of periodic errors of the position, by an angle or by the pixel grid, pixels."""
+_AMPLITUDE_ERROR = 0.12
+"""Relative standard error of a lateral amplitude: static edges of the glass beside the body bias it towards zero.
 
-On rendered films from the side, with the body within some pixels of the tube's edge, 12 to 20 % were missing."""
+On rendered films from the side, with the body within a few pixels of the tube's edge, the bias was 12 to 20 %."""
 _STRIPE_ERROR = math.radians(0.2)
-"""Usual size of errors of the body's angle that come back with every stripe, rad."""
+"""Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
 _PHASE_ERROR = math.radians(1.0)
-"""Usual size of errors of the tail's phase that come back once or twice a turn, rad."""
-_SLOW_PIXELS = 0.01
-"""Error of the position from end to end that slow changes of light and perspective may leave, pixels."""
-_SLOW_BARE = 0.1
-"""Slow error of the place of a body without stripes, pixels: its nose alone places it; to 0.12 on rendered films."""
-_SLOW_ANGLE = math.radians(0.1)
-"""Slow error of an angle, rad; at least the standard error of a frame, which glare makes slow."""
-_PLACE = 0.15
-"""Standard error of a place itself, which does not matter to a speed, pixels: of outline, light and lens."""
-_HEADING = math.radians(0.2)
-"""Systematic error of the heading, rad, of a body that is `_LONG` pixels long."""
+"""Least expected amplitude of errors of the tail's phase that repeat once or twice a turn, rad."""
+_DRIFT_PIXELS = 0.01
+"""Drift of the position error from end to end, by light and perspective, pixels."""
+_DRIFT_BARE = 0.1
+"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered films."""
+_DRIFT_ANGLE = math.radians(0.1)
+"""Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
+_POSITION_ERROR = 0.15
+"""Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
+_HEADING_ERROR = math.radians(0.2)
+"""Systematic standard error of the heading of a body that is `_LONG` pixels long, rad."""
 _LONG = 100.0
 _FEW_TURNS = 2.0
+"""Fewest turns over which a wobble is fitted."""
 _DEGREE = 5
+"""Degree of the polynomial that smooths an angle."""
 _FEWEST = 12
+"""Fewest frames for that polynomial."""
 _UNSTEADY = 0.5
-"""rad, root mean square."""
+"""Largest root mean square residual of that polynomial, rad."""
 _TOO_FEW = "it was read on too few frames"
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A number with its 95 % interval, SI; NaN where it was not measured.
+    """A quantity with its 95 % interval, SI; NaN where it was not measured.
 
-    The reason says why there is no number, or no interval.
+    The reason states why the value or the interval is missing.
     """
 
     value: float
@@ -87,7 +90,7 @@ class Measured:
     reason: str = ""
 
     def to_dict(self, **more: Any) -> dict[str, Any]:
-        """As JSON: with its interval; null where it was not measured, or without an interval, and then a reason."""
+        """As JSON: value and interval, or null and a reason."""
         if not math.isfinite(self.value):
             return quantity(None, self.unit, reason=self.reason or "it was not seen", **more)
         if not math.isfinite(self.low):
@@ -97,28 +100,28 @@ class Measured:
 
     @classmethod
     def missing(cls, unit: str, reason: str) -> Measured:
-        """What was not measured."""
+        """A quantity that was not measured."""
         return cls(math.nan, math.nan, math.nan, unit, reason)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One video, measured."""
+    """The measurement of one video."""
 
     track: Track = field(repr=False)
-    """What was seen on every frame."""
+    """Pose, body angle and tail phase on every frame."""
     quantities: Mapping[str, Measured]
-    """By the names of `MEASURED`."""
+    """Measured quantities by the names of `MEASURED`."""
     fits: Mapping[str, Rate] = field(repr=False)
-    """The fitted lines by the names of `RATE_NAMES`, also of those that a flag spoils."""
+    """Fitted lines by the names of `RATE_NAMES`, including those that a flag invalidates."""
     flags: tuple[Flag, ...]
-    """What to know about it."""
+    """Warnings about the trial."""
     name: str = ""
-    """Its name among the trials: that of its files."""
+    """Name of the trial and of its files."""
 
     @property
     def synthetic(self) -> bool:
-        """Whether the video says of itself that it is synthetic."""
+        """Whether the metadata of the video declare it synthetic."""
         return any(flag.name == SYNTHETIC for flag in self.flags)
 
     @property
@@ -154,10 +157,10 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     """Measure one track.
 
     Args:
-        track: what was seen on every frame.
+        track: the track.
         robot: the robot, for its stripes.
         name: name of the trial.
-        read: frames that were corrected by hand, truth values, (n,); all are where the track was read by hand alone.
+        read: mask of the frames corrected by hand, (n,); ignored for a track of manual readings alone.
     """
     by_hand = any(flag.name == BY_HAND for flag in track.flags)
     if by_hand:
@@ -166,10 +169,10 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     flags = flags_of(fits, track, robot)
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
-    quantities |= {name: _widened(fits[name], "rad/s", *_slow_angles(track, name)) for name in rates}
+    quantities |= {name: _with_errors(fits[name], "rad/s", *_drifts(track, name)) for name in rates}
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
-    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _PLACE * pixel)
-    quantities["heading"] = _mean(track, track.heading, "rad", _HEADING * _LONG * pixel / robot.body.length)
+    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _POSITION_ERROR * pixel)
+    quantities["heading"] = _mean(track, track.heading, "rad", _HEADING_ERROR * _LONG * pixel / robot.body.length)
     quantities |= _wobbles(track, robot)
     if not by_hand:
         quantities = {name: _with_interval(item) for name, item in quantities.items()}
@@ -177,7 +180,7 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
 
 
 def _with_interval(item: Measured) -> Measured:
-    """No number of a camera stands without an interval; two readings by hand may."""
+    """A quantity without an interval, replaced by a missing one."""
     if math.isfinite(item.low) or not math.isfinite(item.value):
         return item
     return Measured.missing(item.unit, _TOO_FEW)
@@ -191,16 +194,22 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
     around = max(len(stripes), 1)
     repeats = round(2 * np.pi / pattern_period(stripes)) if stripes else 1
     of_x = []
-    if math.isfinite(pixel):  # readings in millimetres know of no pixels
+    if math.isfinite(pixel):  # manual readings in millimetres have no pixel grid
         angles = (_smooth(time, 2 * np.pi * x / pixel), tail, body, around * body)
-        of_x = [Cycle(angle, _usual(track.position_error, _PIXEL_ERROR * pixel)) for angle in angles if _turns(angle)]
+        of_x = [
+            PeriodicError(angle, _expected(track.position_error, _PIXEL_ERROR * pixel))
+            for angle in angles
+            if _turns(angle)
+        ]
     of_body = [
-        Cycle(multiple * body, _usual(track.body_angle_error, _STRIPE_ERROR))
+        PeriodicError(multiple * body, _expected(track.body_angle_error, _STRIPE_ERROR))
         for multiple in sorted({1, repeats, 2 * repeats, 3 * repeats, around})
         if _turns(body)
     ]
     of_tail = [
-        Cycle(multiple * tail, _usual(track.tail_phase_error, _PHASE_ERROR)) for multiple in (1, 2) if _turns(tail)
+        PeriodicError(multiple * tail, _expected(track.tail_phase_error, _PHASE_ERROR))
+        for multiple in (1, 2)
+        if _turns(tail)
     ]
     difference = track.tail_phase - track.body_angle
     error = np.hypot(track.tail_phase_error, track.body_angle_error)
@@ -208,19 +217,19 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
         rate_of(time, track.body_angle, track.body_angle_error, of_body, read=read),
         rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
     )
-    bent = not all(rate.steady for rate in of_both)
+    unsteady = not all(rate.steady for rate in of_both)
     return {
         "forward_velocity": rate_of(time, x, track.position_error, of_x, read=read),
         "body_rotation_rate": of_both[0],
         "tail_rotation_rate": of_both[1],
-        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read, bent=bent),
+        "motor_rotation_rate": rate_of(time, difference, error, [*of_body, *of_tail], read=read, unsteady=unsteady),
     }
 
 
 def _smooth(time: Samples, angle: Samples) -> Samples:
-    """An angle without its own noise, which would else explain itself; straight over what was not measured.
+    """A smoothed angle: a regressor with its own noise would explain that noise.
 
-    A polynomial of low degree; where the angle is too unsteady for one, the angle as it was seen.
+    A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
     """
     known = np.isfinite(angle) & ~outlying_frames(time, angle)
     if known.sum() < _FEWEST:
@@ -234,8 +243,8 @@ def _smooth(time: Samples, angle: Samples) -> Samples:
     return np.asarray(np.interp(time, time[known], angle[known]))
 
 
-def _usual(error: Samples, least: float) -> float:
-    """Usual size of errors that come back: a picture whose frames are worse to read is worse in this too."""
+def _expected(error: Samples, least: float) -> float:
+    """Expected amplitude of a periodic error: the median standard error of the frames, at least `least`."""
     known = error[np.isfinite(error)]
     return max(float(np.median(known)), least) if known.size else least
 
@@ -244,8 +253,8 @@ def _turns(angle: Samples) -> bool:
     return angle.size > 0 and float(np.ptp(angle)) > 0
 
 
-def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
-    """A rate whose interval holds standard errors beside that of the fit."""
+def _with_errors(rate: Rate, unit: str, *errors: float) -> Measured:
+    """A rate whose interval includes further standard errors, added in quadrature."""
     if not rate.measured:
         return Measured.missing(unit, _TOO_FEW if rate.frames else "it was not read on any frame")
     if not math.isfinite(rate.low):
@@ -255,76 +264,77 @@ def _widened(rate: Rate, unit: str, *errors: float) -> Measured:
     return Measured(rate.value, low, rate.value + math.hypot(rate.high - rate.value, reach), unit)
 
 
-def _slow(track: Track, error: float) -> float:
-    """Standard error of a rate from an error that grows from one end to the other."""
+def _drift(track: Track, error: float) -> float:
+    """Standard error of a rate by an error that drifts over the length of the track."""
     return error / float(np.ptp(track.time)) if track.time.size > 1 else 0.0
 
 
-def _slow_angles(track: Track, name: str) -> list[float]:
-    """Standard errors of a rotation rate from slow errors of the angles that it comes from, rad/s."""
+def _drifts(track: Track, name: str) -> list[float]:
+    """Standard errors of a rotation rate by drifts of its angles, rad/s."""
     errors = {"body_rotation_rate": (track.body_angle_error,), "tail_rotation_rate": (track.tail_phase_error,)}
     both = (track.body_angle_error, track.tail_phase_error)
-    read = any(flag.name == BY_HAND for flag in track.flags)  # errors of readings by eye are independent
-    return [_slow(track, _SLOW_ANGLE if read else _usual(error, _SLOW_ANGLE)) for error in errors.get(name, both)]
+    read = any(flag.name == BY_HAND for flag in track.flags)  # errors of manual readings are independent
+    return [_drift(track, _DRIFT_ANGLE if read else _expected(error, _DRIFT_ANGLE)) for error in errors.get(name, both)]
 
 
 def _velocity(rate: Rate, track: Track) -> Measured:
-    """A velocity: the interval holds the scale's uncertainty too."""
+    """The forward velocity; its interval includes the uncertainty of the scale."""
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name == "no-stripes" for flag in track.flags)
-    return _widened(rate, "m/s", _slow(track, (_SLOW_BARE if bare else _SLOW_PIXELS) * pixel), scale)
+    return _with_errors(rate, "m/s", _drift(track, (_DRIFT_BARE if bare else _DRIFT_PIXELS) * pixel), scale)
 
 
-def _mean(track: Track, values: Samples, unit: str, lasting: float) -> Measured:
-    """A mean, whose interval holds a standard error that lasts all along."""
+def _mean(track: Track, values: Samples, unit: str, systematic: float) -> Measured:
+    """A mean, whose interval includes a systematic standard error."""
     value, low, high = mean_of(track.time, values)
     if not math.isfinite(value):
         return Measured.missing(unit, "it was not seen")
     if not math.isfinite(low):
         return Measured(value, low, high, unit, "few readings do not tell how their errors hang together")
     shared = track.scale.relative_uncertainty * abs(value) if unit == "m" else 0.0
-    reach = _NORMAL * math.hypot(shared, lasting)
+    reach = _NORMAL * math.hypot(shared, systematic)
     return Measured(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach), unit)
 
 
 def _wobbles(track: Track, robot: Robot) -> dict[str, Measured]:
-    """Least squares at the angle of tail or body itself, so that an unsteady rate does not smear the amplitude."""
+    """Amplitudes by least squares in the measured angle of tail or body, which an unsteady rate does not smear."""
     found = {}
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     half = 0.5 * robot.body.length
     for part, angle in (("tail", track.tail_phase), ("body", track.body_angle)):
         size, error = _amplitude(track.time, track.position[:, 1], angle)
         turned, turned_error = _amplitude(track.time, track.heading, angle)
-        added = math.hypot(_PIXEL_ERROR * pixel, _HELD * size if math.isfinite(size) else 0.0)
+        added = math.hypot(_PIXEL_ERROR * pixel, _AMPLITUDE_ERROR * size if math.isfinite(size) else 0.0)
         found[f"lateral_wobble_at_{part}_rate"] = _wobble(size, math.hypot(error, added), "m", part)
         found[f"heading_wobble_at_{part}_rate"] = _wobble(turned, math.hypot(turned_error, added / half), "rad", part)
     return {name: found[name] for name in WOBBLES}
 
 
 def _wobble(size: float, error: float, unit: str, part: str) -> Measured:
-    """An amplitude with its interval."""
+    """An amplitude with its 95 % interval."""
     if not math.isfinite(size):
         return Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
     return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
 
 
 def _amplitude(time: Samples, values: Samples, angle: Samples) -> tuple[float, float]:
-    """Amplitude of what comes back with an angle, and its standard error; NaN where it turned too little."""
+    """Amplitude of a series' first harmonic in an angle, and its standard error; NaN below `_FEW_TURNS` turns."""
     known = np.isfinite(values) & np.isfinite(angle)
     if known.sum() < 12 or np.ptp(angle[known]) < 2 * np.pi * _FEW_TURNS:
         return math.nan, math.nan
     s = (time[known] - time[known].mean()) / np.ptp(time[known])
     design = np.stack([np.ones_like(s), s, s**2, np.cos(angle[known]), np.sin(angle[known])], axis=1)
     beta = np.linalg.lstsq(design, values[known], rcond=None)[0]
-    left = values[known] - design @ beta
-    again = float(np.clip(left[1:] @ left[:-1] / max(left @ left, 1e-300), 0.0, 0.99))
-    effective = max(known.sum() * (1 - again) / (1 + again) - 5, 1.0)
-    return float(np.hypot(beta[3], beta[4])), math.sqrt(2.0 * float(left.var()) / effective)
+    residual = values[known] - design @ beta
+    lag_one = residual[1:] @ residual[:-1] / max(residual @ residual, 1e-300)
+    autocorrelation = float(np.clip(lag_one, 0.0, 0.99))
+    effective = max(known.sum() * (1 - autocorrelation) / (1 + autocorrelation) - 5, 1.0)
+    return float(np.hypot(beta[3], beta[4])), math.sqrt(2.0 * float(residual.var()) / effective)
 
 
 def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dict[str, Measured]:
-    """Null what a flag spoils, and what follows from it; the first flag is the reason."""
+    """The quantities without those that a flag invalidates, directly or by derivation; the first flag is the reason."""
     found, spoiled = dict(quantities), set[str]()
     for flag in flags:
         names = set(flag.spoils)
@@ -337,7 +347,7 @@ def _spoiled(quantities: Mapping[str, Measured], flags: tuple[Flag, ...]) -> dic
             if f"{part}_rotation_rate" in flag.spoils
         }
         if names >= {*RATE_NAMES}:
-            names |= set(MEASURED)  # there is no confident number beside what cannot be believed at all
+            names |= set(MEASURED)  # no rate is valid, so that nothing else is either
         for name in (names & set(found)) - spoiled:
             found[name] = Measured.missing(found[name].unit, flag.sentence)
         spoiled |= names

@@ -98,7 +98,3 @@ def _check_signs(path: str | Path, item: Observation, robot: Robot) -> None:
 
 def _column(rows: Sequence[Observed | None], name: str, item: int) -> PerRobot:
     return np.array([np.nan if row is None else getattr(row, name)[item] for row in rows])
-
-
-def _trials(row: Observed | None) -> int:
-    return 0 if row is None else max(getattr(row, name).trials for name in _NAMES)

@@ -1,4 +1,4 @@
-"""The camera of a video: which part of the picture counts, what is looked at first, and the scale."""
+"""Calibration of a video's camera: region of interest, sample frames and scale."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from spirillum.vision.video.frames import Frame, Video, open_video
 __all__ = ["bounds_of", "opened", "samples_of", "scale_of", "sight_of"]
 
 _SAMPLES = 24
-"""Frames from which scale and looks are learnt."""
+"""Frames from which scale and appearance are learnt."""
 _GOLDEN = 0.618034
+"""Step of the low-discrepancy sequence that spreads them."""
 _UNKNOWN = 10.0
-"""How much of a film of unknown length is learnt from, s."""
+"""Duration from which is learnt where that of the film is unknown, s."""
 
 
 def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = None) -> tuple[Sight, Video]:
-    """Only the camera and the scale of a video.
+    """Calibrate the camera and the scale of a video without following the robot.
 
     Args:
-        video: the film or folder.
+        video: the film, or a folder of images.
         setup: its setup.
-        folder: folder of the setup file, where a checkerboard's pictures lie.
+        folder: folder of the setup file, to which the checkerboard's folder is relative.
 
     Raises:
         InputError: if the video cannot be read, or no ruler is found in it.
@@ -40,15 +41,15 @@ def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = N
 
 
 def opened(video: str | Path | Video, setup: Setup) -> Video:
-    """The video of a path; what is open already stays so."""
+    """Open a video; one that is open is returned unchanged."""
     return video if isinstance(video, Video) else open_video(video, setup.camera.frames_per_second)
 
 
 def samples_of(video: Video, setup: Setup) -> list[Frame]:
-    """Some frames, spread unevenly over what is to be measured: else all could show the robot at the same angles.
+    """Frames at uneven intervals over the measured part, so that they do not alias with the rotation.
 
     Raises:
-        InputError: if it begins after the video's end, or nothing can be decoded.
+        InputError: if `setup.start` is after the end of the video, or no frame can be decoded.
     """
     end = setup.end
     if video.duration:
@@ -66,10 +67,10 @@ def samples_of(video: Video, setup: Setup) -> list[Frame]:
 
 
 def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:
-    """Part of the picture to look at: left, top, right, bottom.
+    """Region of interest in the picture: left, top, right, bottom, pixels.
 
     Raises:
-        InputError: if it is not in the picture.
+        InputError: if it exceeds the picture.
     """
     width, height = video.size
     region = setup.region
@@ -85,10 +86,10 @@ def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:
 
 
 def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) -> Sight:
-    """The camera of a video, from what stands still in it, (h, w, 3).
+    """The calibrated camera of a video, from its static background `still`, (h, w, 3).
 
     Raises:
-        InputError: if a ruler is wanted and not found.
+        InputError: if the setup has a ruler and none is found.
     """
     board = setup.camera.checkerboard
     lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size)

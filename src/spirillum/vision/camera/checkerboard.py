@@ -1,4 +1,4 @@
-"""The lens, from pictures of a checkerboard in air."""
+"""Lens calibration from pictures of a checkerboard in air."""
 
 from __future__ import annotations
 
@@ -14,44 +14,47 @@ from spirillum.vision.setup import Checkerboard
 __all__ = ["Lens", "lens_of"]
 
 _FEWEST = 3
+"""Fewest pictures with a detected board."""
 _PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
-_LARGEST_MISS = 2.0
-"""Largest root mean square distance of corners from the fit, pixels."""
+_POOR_FIT = 2.0
+"""Largest root mean square reprojection error, pixels."""
 
 
 class Lens(NamedTuple):
-    """A lens with radial distortion: distances r from the line of sight become r (1 + k1 r^2 + k2 r^4)."""
+    """A lens with radial distortion: a distance r from the optical axis becomes r (1 + k1 r^2 + k2 r^4)."""
 
     focal: float
     """Focal length, pixels."""
     focal_error: float
-    """Its standard error, pixels."""
+    """Standard error of the focal length, pixels."""
     centre: tuple[float, float]
-    """Pixel of the line of sight."""
+    """Principal point, pixels."""
     k1: float
+    """Radial distortion of second order."""
     k2: float
+    """Radial distortion of fourth order."""
     residual: float
-    """Root mean square distance of the corners from the fit, pixels."""
+    """Root mean square reprojection error of the corners, pixels."""
     pictures: int
-    """Number of pictures in which the board was found."""
+    """Number of pictures in which the board was detected."""
 
 
 def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int]) -> Lens:
     """Calibrate a lens by OpenCV's pinhole model with square pixels and radial distortion.
 
     Args:
-        board: the checkerboard; its `images` is a folder beside the setup file.
+        board: the checkerboard; its `images` is a folder relative to that of the setup file.
         folder: folder of the setup file.
-        size: width and height of the video's pictures, which those of the board must have too.
+        size: width and height of the video and of the calibration pictures, pixels.
 
     Raises:
-        InputError: if the folder or the board cannot be found, in at least three pictures, or nothing fits them.
+        InputError: if the folder is missing, fewer than three pictures show the board, or the fit is poor.
     """
     cv2 = required("cv2", "a checkerboard", "video")
-    place = folder / board.images
-    if not place.is_dir():
+    images = folder / board.images
+    if not images.is_dir():
         raise InputError(f"camera.checkerboard.images = {board.images!r} is no folder; allowed: a folder of pictures")
-    names = sorted(entry for entry in place.iterdir() if entry.suffix.lower() in _PICTURES)
+    names = sorted(entry for entry in images.iterdir() if entry.suffix.lower() in _PICTURES)
     pattern, found = (board.columns, board.rows), []
     for name in names:
         grey = cv2.imdecode(np.fromfile(name, dtype=np.uint8), cv2.IMREAD_GRAYSCALE) if name.stat().st_size else None
@@ -68,24 +71,24 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int]) -> Lens:
     if len(found) < _FEWEST:
         raise InputError(
             f"camera.checkerboard: a board of {board.columns} x {board.rows} inner corners was found in {len(found)} "
-            f"of {len(names)} pictures of {place}; allowed: at least {_FEWEST}, with the board tilted differently"
+            f"of {len(names)} pictures of {images}; allowed: at least {_FEWEST}, with the board tilted differently"
         )
     grid = np.zeros((board.columns * board.rows, 3), dtype=np.float32)
     grid[:, :2] = np.mgrid[0 : board.columns, 0 : board.rows].T.reshape(-1, 2) * board.square
     first = np.array([[size[0], 0.0, 0.5 * (size[0] - 1)], [0.0, size[0], 0.5 * (size[1] - 1)], [0.0, 0.0, 1.0]])
     flags = cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K3 | cv2.CALIB_USE_INTRINSIC_GUESS
     try:
-        residual, matrix, bend, _, _, errors, *_ = cv2.calibrateCameraExtended(
+        residual, matrix, distortion, _, _, errors, *_ = cv2.calibrateCameraExtended(
             [grid] * len(found), found, size, first, None, flags=flags
         )
     except cv2.error as error:
-        raise InputError(f"camera.checkerboard: no camera fits the pictures of {place} ({error.err})") from error
-    bend = np.ravel(bend)
-    focal, focal_error = float(matrix[0, 0]), float(np.ravel(errors)[:2].max())  # one of both is held
-    if not (np.isfinite(focal) and focal_error < 0.1 * focal and residual < _LARGEST_MISS):
+        raise InputError(f"camera.checkerboard: no camera fits the pictures of {images} ({error.err})") from error
+    distortion = np.ravel(distortion)
+    focal, focal_error = float(matrix[0, 0]), float(np.ravel(errors)[:2].max())  # one of the two is fixed
+    if not (np.isfinite(focal) and focal_error < 0.1 * focal and residual < _POOR_FIT):
         raise InputError(
             f"camera.checkerboard: the fit leaves {residual:.2g} pixels and a focal length of {focal:.4g} +- "
-            f"{focal_error:.2g} pixels; allowed: under {_LARGEST_MISS:g} pixels and 10 %, of boards tilted differently"
+            f"{focal_error:.2g} pixels; allowed: under {_POOR_FIT:g} pixels and 10 %, of boards tilted differently"
         )
     centre = float(matrix[0, 2]), float(matrix[1, 2])
-    return Lens(focal, focal_error, centre, float(bend[0]), float(bend[1]), float(residual), len(found))
+    return Lens(focal, focal_error, centre, float(distortion[0]), float(distortion[1]), float(residual), len(found))

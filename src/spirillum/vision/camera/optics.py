@@ -1,4 +1,4 @@
-"""Where a point in the tank appears in the picture, and what point a pixel shows."""
+"""Projection of points in the tank into the picture, and its inverse at a given height."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ __all__ = ["BodyPose", "Optics", "optics_of", "placed", "places_seen_by", "seen"
 
 
 class BodyPose(NamedTuple):
-    """Where the body's mid-length is in the camera's frame, at the height of the robot's axis."""
+    """Pose of the body's mid-length in the camera's frame, at the height of the robot's axis."""
 
     x: float
-    """m, from below the lens."""
+    """Position along the channel from below the lens, m."""
     y: float
-    """m."""
+    """Lateral position from below the lens, m."""
     heading: float
     """Angle of the motor axis to the x axis about +z, rad."""
 
 
 @dataclass(frozen=True)
 class Optics:
-    """A camera with a pinhole lens above a flat surface that refracts.
+    """A pinhole camera with radial distortion above a flat refracting surface.
 
     The frame has x along the channel towards the nose, z from the reference plane towards the camera, y = z x x; the
-    lens stands at (0, 0, height). Pixels (u right, v down) have their centres at whole numbers. Without tilts the
-    camera looks along -z with x to the right, or to the left for `leftward`. It is turned by `rotation` about its line
-    of sight, then by `tilt_y` about y, then by `tilt_x` about x.
+    lens is at (0, 0, height). Pixels (u right, v down) have their centres at integer coordinates. Without tilts the
+    camera looks along -z with x to the right, or to the left for `leftward`. It is rotated by `rotation` about its
+    optical axis, then by `tilt_y` about y, then by `tilt_x` about x.
     """
 
     size: tuple[int, int]
@@ -48,27 +48,27 @@ class Optics:
     axis_height: float
     """Height of the robot's axis above the reference plane, m."""
     surface: float | None = None
-    """Height of the surface, m; None: nothing refracts."""
+    """Height of the surface above the reference plane, m; None: no refraction."""
     index: float = 1.0
     """Refractive index below the surface over that above."""
     centre: tuple[float, float] | None = None
-    """Pixel of the line of sight; None: the middle of the picture."""
+    """Principal point, pixels; None: the centre of the picture."""
     tilt_x: float = 0.0
-    """rad."""
+    """Tilt about x, rad."""
     tilt_y: float = 0.0
-    """rad."""
+    """Tilt about y, rad."""
     rotation: float = 0.0
-    """rad."""
+    """Rotation about the optical axis, rad."""
     k1: float = 0.0
-    """Radial distortion: distances r = tan(angle) from the line of sight become r (1 + k1 r^2 + k2 r^4)."""
+    """Radial distortion: r, the tangent of the angle to the optical axis, becomes r (1 + k1 r^2 + k2 r^4)."""
     k2: float = 0.0
-    """Radial distortion of the next order, see `k1`."""
+    """Radial distortion of fourth order."""
     leftward: bool = False
     """Whether x points to the left in the picture."""
 
     @cached_property
     def numbers(self) -> Samples:
-        """Everything as one row for the compiled loops."""
+        """Parameters for the compiled loops, (17,): focal, u, v, k1, k2, height, surface, index, rotation matrix."""
         turn = self.rotation + (np.pi if self.leftward else 0.0)
         (c_x, s_x), (c_y, s_y), (c_z, s_z) = ((np.cos(a), np.sin(a)) for a in (self.tilt_x, self.tilt_y, turn))
         about_x = np.array([[1.0, 0.0, 0.0], [0.0, c_x, -s_x], [0.0, s_x, c_x]])
@@ -83,18 +83,18 @@ class Optics:
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Middle of the picture, pixels."""
+        """Centre of the picture, pixels."""
         return 0.5 * (self.size[0] - 1.0), 0.5 * (self.size[1] - 1.0)
 
     def pixels(self, points: Samples) -> Samples:
-        """Pixels (k, 2) at which points (k, 3), m, appear; NaN behind the camera."""
+        """Project points (k, 3), m, to pixels (k, 2); NaN behind the camera."""
         points = np.ascontiguousarray(points, dtype=float)
         found = np.empty((len(points), 2))
         pixels_of_points(points, self.numbers, found)
         return found
 
     def points(self, pixels: Samples, height: float) -> Samples:
-        """Points (k, 3), m, at a height that pixels (k, 2) show; NaN where a line of sight does not get there."""
+        """Points (k, 3), m, at a height on the rays of pixels (k, 2); NaN where a ray does not reach the height."""
         pixels = np.ascontiguousarray(pixels, dtype=float)
         found = np.empty((len(pixels), 3))
         points_of_pixels(pixels, float(height), self.numbers, found)
@@ -102,18 +102,18 @@ class Optics:
 
     @cached_property
     def origin(self) -> Samples:
-        """What the middle of the picture shows at the height of the axis: the origin of a track, m, (3,)."""
+        """Point at the height of the axis on the ray of the picture's centre: the origin of a track, m, (3,)."""
         return np.asarray(self.points(np.array([self.middle]), self.axis_height)[0])
 
     @cached_property
     def length_per_pixel(self) -> float:
-        """Length along x that a pixel shows at the height of the axis in the middle of the picture, m."""
+        """Length per pixel along x, at the height of the axis in the centre of the picture, m."""
         step = 1e-3 * self.height
         ends = self.origin + np.array([[-step, 0.0, 0.0], [step, 0.0, 0.0]])
         return float(2.0 * step / np.linalg.norm(np.diff(self.pixels(ends), axis=0)))
 
     def moved(self, changes: Mapping[str, float]) -> Self:
-        """A copy with other numbers."""
+        """A copy with changed parameters."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
 
@@ -137,7 +137,7 @@ def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
 
 
 def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
-    """Points (k, 3) of the body's frame in the camera's frame, m."""
+    """Transform points (k, 3) from the body's to the camera's frame, m."""
     cos, sin = np.cos(pose.heading), np.sin(pose.heading)
     turned: Samples = points @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
     turned += np.array([pose.x, pose.y, axis_height])
@@ -145,11 +145,11 @@ def placed(points: Samples, pose: BodyPose, axis_height: float) -> Samples:
 
 
 def seen(points: Samples, pose: BodyPose, optics: Optics) -> Samples:
-    """Pixels (k, 2) of points (k, 3) of the body's frame, m."""
+    """Project points (k, 3) in the body's frame, m, to pixels (k, 2)."""
     return optics.pixels(placed(points, pose, optics.axis_height))
 
 
 def places_seen_by(one: Optics, other: Optics, places: Samples) -> Samples:
-    """Places (n, 2) that one camera shows where another one shows these, (n, 2), all at the height of the axis, m."""
+    """Positions (n, 2) by camera `one` at the pixels where camera `other` shows `places` (n, 2), at axis height, m."""
     points = np.column_stack([places, np.full(len(places), other.axis_height)])
     return np.asarray(one.points(other.pixels(points), one.axis_height)[:, :2])

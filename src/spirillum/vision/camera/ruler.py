@@ -1,4 +1,4 @@
-"""Lines of a ruler in a picture: where they are, to a small part of a pixel."""
+"""Subpixel detection of a ruler's lines in a picture, by the phase of their fundamental wave."""
 
 from __future__ import annotations
 
@@ -12,48 +12,48 @@ from spirillum.extras import required
 __all__ = ["Lines", "lines_in", "still_picture"]
 
 _SHORTEST = 3.0
-"""Shortest distance of lines that a picture resolves, pixels."""
+"""Shortest resolved distance of lines, pixels."""
 _FEWEST = 8
 """Fewest lines of a ruler."""
 _WINDOW = 1.5
-"""Width (standard deviation) of the window in which a phase is found, over the lines' distance."""
+"""Standard deviation along the rows of the window of a local phase, over the lines' distance."""
 _ROWS = 2.0
-"""Standard deviation of that window across the rows, pixels."""
+"""Standard deviation of the window of a local phase across the rows, pixels."""
 _COHERENT = 0.35
-"""Least share of a place's contrast that is in the ruler's wave."""
+"""Least coherence: amplitude of the ruler's wave over the local contrast."""
 _STRONG = 0.6
-"""Least strength of that wave over that in the middle of the strips: at their ends slanted lines look shifted."""
+"""Least amplitude of the wave over that inside the strips: at their ends the phase of slanted lines is biased."""
 _CLEAR = 8.0
-"""Least height of the ruler's peak in the spectrum over what is usual beside it."""
+"""Least height of the ruler's spectral peak over the local median of the spectrum."""
 _CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-"""Weights of red, green and blue with which a ruler is looked for: brightness, then single colours."""
+"""Channels in which a ruler is searched, as weights of red, green and blue: brightness, then single colours."""
 _BAND = 16
-"""Rows of pictures that are sorted at once."""
+"""Rows sorted at once, so that they stay in the cache."""
 
 
 class Lines(NamedTuple):
-    """Places in the ruler's strips, and how many lines of the ruler each of them lies from the strip's first."""
+    """Points in the ruler's strips with their unwrapped phase in lines."""
 
     pixels: Samples
-    """(n, 2)."""
+    """Pixels (u, v) of the points, (n, 2)."""
     number: Samples
-    """Lines from an arbitrary origin of the place's own strip, rising with u, (n,)."""
+    """Phase in lines from an arbitrary origin of each strip, rising with u, (n,)."""
     strip: np.ndarray
-    """Which strip each place belongs to, (n,)."""
+    """Label of each point's strip, (n,)."""
     distance: float
     """Distance of neighbouring lines, pixels."""
 
     @property
     def lines(self) -> int:
-        """Number of lines that were seen, of the strip with most of them."""
+        """Number of lines in the longest strip."""
         spans = [np.unique(np.round(self.number[self.strip == k])).size for k in np.unique(self.strip)]
         return int(max(spans))
 
 
 def still_picture(images: list[np.ndarray]) -> Samples:
-    """What stands still in pictures: the mean of the middle half of each pixel's values, 8-bit scale, (h, w, 3)."""
+    """Static background of pictures: the interquartile mean of each pixel, 0 to 255, (h, w, 3)."""
     pairs, quarter, still = _sorting(len(images)), len(images) // 4, np.empty(images[0].shape)
-    for low in range(0, len(still), _BAND):  # what is sorted at once stays near the processor
+    for low in range(0, len(still), _BAND):
         band = [image[low : low + _BAND] for image in images]
         for a, b in pairs:
             band[a], band[b] = np.minimum(band[a], band[b]), np.maximum(band[a], band[b])
@@ -63,7 +63,7 @@ def still_picture(images: list[np.ndarray]) -> Samples:
 
 
 def _sorting(count: int) -> list[tuple[int, int]]:
-    """Pairs of places that, put in order one after the other, sort so many values: Batcher's odd-even merge sort.
+    """Comparators of a sorting network for `count` values: Batcher's odd-even merge sort.
 
     K. E. Batcher, Sorting networks and their applications, AFIPS Spring Joint Computer Conference 32:307, 1968.
     """
@@ -80,14 +80,14 @@ def _sorting(count: int) -> list[tuple[int, int]]:
 
 
 def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | None:
-    """The ruler's places in a still picture; None if no ruler is found.
+    """Detect a ruler in a static picture; None if there is none.
 
-    Around each place the phase of the lines' fundamental wave is taken in a Gaussian window, which knows no pixels; it
-    is unwrapped from the middle of each strip outwards.
+    The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
+    unwrapped from the middle of each strip outwards.
 
     Args:
-        picture: 8-bit scale, (h, w, 3).
-        bounds: first and last-but-one column and row to look at: left, top, right, bottom.
+        picture: 0 to 255, (h, w, 3).
+        bounds: region of interest: left, top, right, bottom; the last two are exclusive.
     """
     left, top, right, bottom = bounds
     colours = picture[top:bottom, left:right].astype(np.float32)
@@ -99,7 +99,7 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | Non
 
 
 def _lines_of(part: Samples, left: int, top: int) -> Lines | None:
-    """The ruler's places in a part of a picture that begins at some column and row, (h, w)."""
+    """Detect a ruler in one channel of a region, (h, w), whose corner is at column `left` and row `top`."""
     cv2 = required("cv2", "measuring a video", "video")
     flat = part / np.maximum(cv2.GaussianBlur(part, (0, 0), 15.0), 1.0) - 1.0
     flat = np.clip(flat, -0.6, 0.6)
@@ -145,13 +145,13 @@ def _lines_of(part: Samples, left: int, top: int) -> Lines | None:
 
 
 def _frequency(flat: Samples) -> float | None:
-    """Lines per pixel of the clearest wave along the rows that goes through a good part of them."""
+    """Spatial frequency of the clearest wave along the rows, lines per pixel; None without a clear peak."""
     width = flat.shape[1]
     length = 4 * 1 << int(np.ceil(np.log2(width)))
     spectrum = np.fft.rfft(flat[::2] * np.hanning(width).astype(flat.dtype), length, axis=1)
     power = spectrum.real**2 + spectrum.imag**2
     frequency = np.fft.rfftfreq(length)
-    # a ruler's wave runs through the whole width: its peak is as narrow as the width allows, and stands out of a row
+    # A ruler's wave spans the whole width, so that its peak holds a large share of a row's power.
     share = power / np.maximum(power[:, frequency > 1.0 / width].sum(axis=1, keepdims=True), 1e-9)
     score = np.sum(share**2 * np.sqrt(power), axis=0)
     level = np.sum(power, axis=0)
@@ -167,10 +167,10 @@ def _frequency(flat: Samples) -> float | None:
 
 
 def _unwrapped(u: Samples, v: Samples, turns: Samples, distance: float) -> tuple[Samples, np.ndarray]:
-    """Phases in turns without jumps, and which of them fit their neighbours: a surface grows from the middle out."""
+    """Unwrap phases, in turns, by a polynomial surface grown from the middle out; with a mask of the inliers."""
     middle_u, middle_v = np.median(u), np.median(v)
-    reach = max(float(np.ptp(u)), float(np.ptp(v)), 1.0)
-    a, b = (u - middle_u) / reach, (v - middle_v) / reach
+    extent = max(float(np.ptp(u)), float(np.ptp(v)), 1.0)
+    a, b = (u - middle_u) / extent, (v - middle_v) / extent
     far = np.hypot(u - middle_u, 3.0 * (v - middle_v))
     number, sure = turns.copy(), np.zeros(turns.size, dtype=bool)
     radius = max(4.0 * distance, float(np.quantile(far, min(1.0, 30.0 / far.size))))

@@ -1,4 +1,4 @@
-"""How large lengths are in the picture: the camera is fitted to the ruler, and its uncertainty is propagated."""
+"""Scale of lengths: the camera is fitted to the ruler, and the uncertainty is propagated."""
 
 from __future__ import annotations
 
@@ -19,43 +19,44 @@ from spirillum.vision.setup import Setup
 
 __all__ = ["Scale", "Sight", "fitted_camera", "given_camera", "with_source"]
 
-_EXPECTED_TILT = 0.1
+_PRIOR_TILT = 0.1
 """Prior standard deviation of the camera's tilts, rad."""
-_EXPECTED_BEND = 0.1
-"""Prior standard deviation of the lens's k1, where no checkerboard tells."""
+_PRIOR_K1 = 0.1
+"""Prior standard deviation of the lens's k1, without a checkerboard."""
 _LINE_ERROR = 0.1
-"""Distance of lines from the fit beyond which they count less, pixels."""
-_TOGETHER = 12.0
-"""Places of a ruler that share one window, and so one error."""
+"""Standard error of a line's position, pixels."""
+_CORRELATED = 12.0
+"""Points of a ruler with correlated errors, as they share a window."""
 _FOCAL = (0.2, 20.0)
 """Plausible focal lengths over the picture's width."""
 _MODEL = 3e-4
-"""Standard uncertainty of lengths when all numbers are exact, relative: an ideal lens, a body exactly as its file says.
+"""Relative standard uncertainty of lengths by the models of lens and body, with an exact setup.
 
-Assumed; on rendered films with exact numbers speeds came out within 0.02 % of the truth."""
+Assumed; on rendered films with an exact setup, errors of the speed are below 0.02 %."""
 _STEP = 1e-3
+"""Relative step of numerical derivatives."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """How large a length at the height of the robot's axis is in the picture."""
+    """Scale of lengths at the height of the robot's axis, with its uncertainty."""
 
     length_per_pixel: float
-    """m per pixel at the height of the robot's axis, in the middle of the picture."""
+    """Length per pixel at the height of the robot's axis, in the centre of the picture, m."""
     relative_uncertainty: float
-    """Standard uncertainty of all lengths, relative: heights, index, spacing and how well the lines were found."""
+    """Relative standard uncertainty of all lengths, by heights, index, spacing and the fit of the lines."""
     sources: dict[str, float]
-    """Its parts by name, such as `robot.axis_height`, relative; they add up in squares."""
+    """Contributions to it by source, such as `robot.axis_height`; they add in quadrature."""
     markers: int
-    """Number of lines of the ruler that were found; 0 where the scale was given."""
+    """Number of detected lines of the ruler; 0 where the scale was given."""
     residual: float
-    """Root mean square distance of the lines from where the fit has them, pixels; NaN without a ruler."""
+    """Root mean square residual of the lines, pixels; NaN without a ruler."""
     apparent_size: float = math.nan
-    """Size of the body in the picture over that of its file at this scale; NaN where it was not looked at."""
+    """Apparent size of the body over that of its file at this scale; NaN where not measured."""
 
 
 class Sight(NamedTuple):
-    """A camera, and what it says of lengths."""
+    """A calibrated camera with its scale and warnings."""
 
     optics: Optics
     scale: Scale
@@ -68,7 +69,7 @@ def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) 
     Args:
         setup: the setup.
         size: width and height of the picture, pixels.
-        lens: what pictures of a checkerboard have told.
+        lens: lens calibrated with a checkerboard.
     """
     wanted = setup.markers.length_per_pixel
     assert wanted is not None  # noqa: S101 - the setup has seen to it
@@ -80,26 +81,26 @@ def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) 
 
 
 def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens | None = None) -> Sight:
-    """The camera that sees the ruler's lines where they were found: focal length, tilts, rotation.
+    """Fit focal length, tilts, rotation and distortion of the camera to the ruler's lines.
 
-    The uncertainty of lengths at the height of the axis has a part for each uncertain number of the setup, found by
-    fitting again with that number changed, and one for the fit itself.
+    The uncertainty of lengths at the height of the axis has a contribution of the fit, and one of each uncertain number
+    of the setup, by finite differences of the fit.
 
     Args:
         setup: the setup.
         size: width and height of the picture, pixels.
-        lines: what was found of the ruler.
-        lens: what pictures of a checkerboard have told.
+        lines: detected lines of the ruler.
+        lens: lens calibrated with a checkerboard.
 
     Raises:
-        InputError: if no plausible camera sees the ruler so.
+        InputError: if the fitted focal length is implausible.
     """
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101 - the setup has seen to it
     assert height is not None  # noqa: S101
     start = _with_lens(optics_of(setup, size, float(size[0])), lens)
     start = start.moved({"focal": _first_focal(start, lines, spacing, height)})
-    fit = _Fit(lines, bend=lens is None and float(np.ptp(lines.pixels[:, 0])) > 0.6 * size[0])
+    fit = _Fit(lines, distorted=lens is None and float(np.ptp(lines.pixels[:, 0])) > 0.6 * size[0])
     optics, residual, own = fit.run(start, spacing, height)
     ratio = optics.focal / size[0]
     if not _FOCAL[0] <= ratio <= _FOCAL[1]:
@@ -125,19 +126,19 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
 
 
 def with_source(scale: Scale, name: str, share: float) -> Scale:
-    """A scale that is less certain for one more reason.
+    """The scale with one more contribution to its uncertainty.
 
     Args:
         scale: the scale.
-        name: of the reason.
-        share: its part of the uncertainty, relative.
+        name: name of the source.
+        share: its relative standard uncertainty.
     """
     sources = {**scale.sources, name: share}
     return replace(scale, sources=sources, relative_uncertainty=_total(sources))
 
 
 def _total(sources: dict[str, float]) -> float:
-    """Relative uncertainty of independent parts together."""
+    """Independent relative uncertainties, added in quadrature."""
     return float(np.sqrt(sum(part**2 for part in sources.values())))
 
 
@@ -152,23 +153,23 @@ def _fields(optics: Optics) -> dict:  # type: ignore[type-arg]
 
 
 def _first_focal(optics: Optics, lines: Lines, spacing: float, height: float) -> float:
-    """Focal length of an upright camera that shows the lines at their distance, in the middle of the picture."""
+    """Initial focal length: that of an upright camera with the measured distance of lines in the centre."""
     points = np.array([[-0.5 * spacing, 0.0, height], [0.5 * spacing, 0.0, height]])
     seen = optics.pixels(points)
     return optics.focal * lines.distance / float(np.hypot(*(seen[1] - seen[0])))
 
 
 class _Fit:
-    """Least squares of the camera's numbers and of one offset for each strip."""
+    """Robust least squares fit of the camera's parameters, with a free offset of each strip."""
 
-    def __init__(self, lines: Lines, *, bend: bool) -> None:
+    def __init__(self, lines: Lines, *, distorted: bool) -> None:
         self.lines = lines
         self.names = (
-            ("focal", "tilt_x", "tilt_y", "rotation", "k1") if bend else ("focal", "tilt_x", "tilt_y", "rotation")
+            ("focal", "tilt_x", "tilt_y", "rotation", "k1") if distorted else ("focal", "tilt_x", "tilt_y", "rotation")
         )
         _, self.strip = np.unique(lines.strip, return_inverse=True)
         self.strips = int(self.strip.max()) + 1
-        self.scale = _LINE_ERROR * np.sqrt(_TOGETHER)
+        self.scale = _LINE_ERROR * np.sqrt(_CORRELATED)
 
     def _optics(self, numbers: Samples, start: Optics) -> Optics:
         changes = dict(zip(self.names, numbers.tolist(), strict=True))
@@ -177,8 +178,8 @@ class _Fit:
             {name: value if name == "focal" else getattr(start, name) + value for name, value in changes.items()}
         )
 
-    def _misses(self, numbers: Samples, start: Optics, spacing: float, height: float) -> Samples:
-        """How far each place is from where the camera would have it, pixels."""
+    def _residuals(self, numbers: Samples, start: Optics, spacing: float, height: float) -> Samples:
+        """Residual of each point of the ruler, pixels, (n,)."""
         x = self._optics(numbers, start).points(self.lines.pixels, height)[:, 0] / spacing
         x = np.nan_to_num(-x if start.leftward else x, nan=1e3)
         gap = x - self.lines.number
@@ -186,39 +187,41 @@ class _Fit:
         return np.asarray((gap - offsets[self.strip]) * self.lines.distance)
 
     def run(self, start: Optics, spacing: float, height: float) -> tuple[Optics, float, float]:
-        """The camera, the lines' root mean square distance, pixels, and the relative error of its scale."""
+        """The fitted camera, the root mean square residual, pixels, and the relative standard error of its scale."""
         from scipy.optimize import least_squares
 
-        expected = np.array([_EXPECTED_TILT, _EXPECTED_TILT, 10.0, _EXPECTED_BEND])[: len(self.names) - 1]
-        held = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]
+        prior_width = np.array([_PRIOR_TILT, _PRIOR_TILT, 10.0, _PRIOR_K1])[: len(self.names) - 1]
+        start_values = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]
 
         def cost(numbers: Samples) -> Samples:
-            misses = self._misses(numbers, start, spacing, height) / self.scale
-            small = np.clip(misses, -3.0 / np.sqrt(_TOGETHER), 3.0 / np.sqrt(_TOGETHER))
-            beyond = misses - small  # Huber's: what lies far counts linearly
-            weighed = small + np.sign(beyond) * (np.sqrt(small**2 + 2 * np.abs(small) * np.abs(beyond)) - np.abs(small))
-            return np.concatenate([weighed, (numbers[1:] + held) / expected])
+            residuals = self._residuals(numbers, start, spacing, height) / self.scale
+            small = np.clip(residuals, -3.0 / np.sqrt(_CORRELATED), 3.0 / np.sqrt(_CORRELATED))
+            beyond = residuals - small  # Huber's loss, linear for outliers
+            weighted = small + np.sign(beyond) * (
+                np.sqrt(small**2 + 2 * np.abs(small) * np.abs(beyond)) - np.abs(small)
+            )
+            return np.concatenate([weighted, (numbers[1:] + start_values) / prior_width])
 
         found = least_squares(
             cost, np.zeros(len(self.names)), x_scale=np.array([0.1, 0.02, 0.02, 0.02, 0.02][: len(self.names)])
         )
         optics = self._optics(found.x, start)
-        misses = self._misses(found.x, start, spacing, height)
-        typical = float(mad_scale(misses))
-        kept = np.abs(misses) <= max(4.0 * typical, 1e-9)
-        residual = float(np.sqrt(np.mean(misses[kept] ** 2)))
-        scatter = np.linalg.pinv(found.jac.T @ found.jac) * (residual / _LINE_ERROR) ** 2
+        residuals = self._residuals(found.x, start, spacing, height)
+        typical = float(mad_scale(residuals))
+        kept = np.abs(residuals) <= max(4.0 * typical, 1e-9)
+        residual = float(np.sqrt(np.mean(residuals[kept] ** 2)))
+        covariance = np.linalg.pinv(found.jac.T @ found.jac) * (residual / _LINE_ERROR) ** 2
         slopes = np.zeros(len(self.names))
         for k in range(len(self.names)):
             step = np.zeros(len(self.names))
             step[k] = 1e-4
             more, less = (self._optics(found.x + sign * step, start).length_per_pixel for sign in (1.0, -1.0))
             slopes[k] = np.log(more / less) / 2e-4
-        return optics, residual, float(np.sqrt(max(float(slopes @ scatter @ slopes), 0.0)))
+        return optics, residual, float(np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)))
 
 
 def _uncertain(setup: Setup) -> dict[str, float]:
-    """Relative standard uncertainty of each number behind the scale; heights relative to the camera's."""
+    """Relative standard uncertainty of each number of the setup; heights relative to that of the camera."""
     markers, tank, camera = setup.markers, setup.tank, setup.camera
     found = {"camera.height": camera.height_uncertainty / camera.height}
     if markers.spacing is not None:
@@ -232,7 +235,7 @@ def _uncertain(setup: Setup) -> dict[str, float]:
 
 
 def _changed(fit: _Fit, optics: Optics, setup: Setup, name: str, step: float) -> float:
-    """Length per pixel with one number of the setup changed by a small step of its own scale."""
+    """Length per pixel after a refit with one number of the setup changed by a relative step."""
     spacing, height = setup.markers.spacing, setup.markers.height
     assert spacing is not None  # noqa: S101
     assert height is not None  # noqa: S101

@@ -1,4 +1,4 @@
-"""The body's place on a frame, to a small part of a pixel, from all of its edges at once."""
+"""Pose of the body on a frame, to subpixel accuracy, by a robust fit to all of its edges."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ __all__ = ["BodyFinder", "Placed", "grey_part"]
 
 
 class Placed(NamedTuple):
-    """Where the body is on a frame."""
+    """Pose of the body on a frame, with its quality of fit."""
 
     pose: BodyPose
     error: BodyPose
-    """Standard errors, m and rad."""
+    """Standard errors, m and rad; NaN where the fit failed."""
     share: float
-    """Share of the edges that fit, 0 to 1."""
+    """Inlier share of the edges in view, 0 to 1."""
     inside: float
-    """Share of the edges that lie in the picture."""
+    """Share of the edges that lie in the picture, 0 to 1."""
 
     @property
     def known(self) -> bool:
-        """Whether it was seen well enough to count."""
+        """Whether the fit succeeded."""
         return bool(np.isfinite(self.error.x))
 
 
 class BodyFinder:
-    """A robot's body in front of a camera; learns what its edges look like, then places it frame by frame."""
+    """Fits the pose of a body frame by frame, with templates of its edges that it learns from the video."""
 
     def __init__(self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int]) -> None:
-        """Compute where its edges appear.
+        """Compute the apparent contour of the body.
 
         Args:
             robot: the robot.
@@ -50,27 +50,30 @@ class BodyFinder:
         self.contour: Contour = contour_of(robot, optics)
         self.half = OUTLINE.half_profile
         self.offsets = np.arange(-self.half, self.half + 1, dtype=float)
-        self._usual: Samples | None = None
-        self._slopes: Samples = np.empty((0, 0))
+        self._template: Samples | None = None
+        self._derivative: Samples = np.empty((0, 0))
         self._strength: Samples = np.empty(0)
-        self._steep: Samples = np.empty(0)
-        self._offset = np.zeros(len(self.contour.group))
-        self._trust = self.contour.floor.copy()
+        self._steepness: Samples = np.empty(0)
+        self._bias = np.zeros(len(self.contour.group))
+        self._scatter = self.contour.floor.copy()
         self.margin = int(self.half + 4 * OUTLINE.blur + 4)
         middle = self.contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
         spacing = float(np.median(np.hypot(*np.diff(middle, axis=0).T)))
-        self._together = max(1.0, OUTLINE.noise_correlation / max(spacing, 0.1))
+        self._correlation = max(1.0, OUTLINE.noise_correlation / max(spacing, 0.1))
 
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
-        """Learn the edges' looks from frames with about known places; the places again, better.
+        """Learn the edges' templates from frames with approximately known poses, and refine these poses.
 
         Args:
             images: 8-bit RGB, (h, w, 3) each.
-            poses: where the body is on most of them, to a pixel or so.
-            times: when they were taken, s, (n,).
+            poses: initial poses, good to about a pixel on most frames.
+            times: times of the frames, s, (n,).
+
+        Returns:
+            The refined poses.
         """
         poses = _smooth(list(poses), times)
-        self._offset, self._trust = np.zeros(len(self.contour.group)), self.contour.floor.copy()
+        self._bias, self._scatter = np.zeros(len(self.contour.group)), self.contour.floor.copy()
         found: list[Placed] = []
         parts = [self._part(image, pose) for image, pose in zip(images, poses, strict=True)]
         for turn in range(OUTLINE.learning_rounds):
@@ -78,37 +81,37 @@ class BodyFinder:
             for part, pose in zip(parts, poses, strict=True):
                 pixels, normals, _, _ = self.contour.places(pose, self.optics)
                 stack.append(self._profiles(part, pixels, normals))
-            self._take_looks(np.stack(stack))
+            self._learn_profiles(np.stack(stack))
             found = [self._place(part, pose) for part, pose in zip(parts, poses, strict=True)]
             if turn >= OUTLINE.smoothed_rounds:
-                self._take_trust(parts, found)
+                self._learn_biases(parts, found)
             poses = [new.pose if new.known else old for new, old in zip(found, poses, strict=True)]
             if turn < OUTLINE.smoothed_rounds:
                 poses = _smooth(poses, times)
         return found
 
     def steepness(self, offsets: Samples) -> tuple[Samples, Samples]:
-        """How steep each edge's brightness usually is along its normal, and how much each edge tells.
+        """Squared gradient of each edge's template along its normal, and weights of the edges.
 
         Args:
             offsets: pixels outward from the outline, (m,).
 
         Returns:
-            Shares of the edge's whole, (n, m), and weights of the edges, (n,), 0 for those that are not trusted.
+            Squared gradients, normalised to a sum of 1 for each edge, (n, m), and weights, (n,), 0 for unstable edges.
         """
-        assert self._usual is not None  # noqa: S101 - learnt first
+        assert self._template is not None  # noqa: S101 - learnt first
         from scipy.interpolate import CubicSpline
 
-        steep = CubicSpline(self.offsets, self._usual, axis=1)(offsets, 1) ** 2
-        weight = np.where(self._trust < OUTLINE.trusted_error, np.minimum(self._strength, OUTLINE.strength_cap), 0.0)
+        steep = CubicSpline(self.offsets, self._template, axis=1)(offsets, 1) ** 2
+        weight = np.where(self._scatter < OUTLINE.trusted_error, np.minimum(self._strength, OUTLINE.strength_cap), 0.0)
         return steep / np.maximum(steep.sum(axis=1, keepdims=True), 1e-300), weight
 
     def place(self, image: np.ndarray, guess: BodyPose) -> Placed:
-        """The body on a frame, near a guess; errors are NaN where it is not seen well enough.
+        """Fit the pose of the body near a guess.
 
         Args:
             image: 8-bit RGB, (h, w, 3).
-            guess: where it should be, to about two pixels.
+            guess: initial pose, good to about two pixels.
         """
         return self._place(self._part(image, guess), guess)
 
@@ -127,67 +130,69 @@ class BodyFinder:
         profiles_across(part[0], part[1], pixels, normals, self.offsets, out)
         return out
 
-    def _take_looks(self, stack: Samples) -> None:
-        """What each edge is usually like: the strongest pattern in its frames, and in its neighbours'."""
+    def _learn_profiles(self, stack: Samples) -> None:
+        """Learn each edge's template: the first principal component of its profiles and those of its neighbours."""
         k = self.offsets
         tilt = np.sum(stack * k, axis=2, keepdims=True) / np.sum(k**2)
         bare = stack - stack.mean(axis=2, keepdims=True) - tilt * k
         bare = np.nan_to_num(bare, nan=0.0)
         count = bare.shape[1]
-        usual = np.zeros((count, k.size))
+        template = np.zeros((count, k.size))
         products = np.einsum("fik,fil->ikl", bare, bare)
         for index, name in enumerate(GROUPS):
             inside = np.flatnonzero(self.contour.group == index)
             for place, point in enumerate(inside):
-                if name in ("rear", "seal"):  # stripes pass there: all of the edge looks like one step, up or down
+                if name in ("rear", "seal"):  # stripes pass: one template for the edge, of either sign
                     together = inside
                     if place:
-                        usual[point] = usual[inside[0]]
+                        template[point] = template[inside[0]]
                         continue
                 else:
                     together = inside[max(0, place - OUTLINE.neighbours) : place + OUTLINE.neighbours + 1]
-                usual[point] = np.linalg.eigh(products[together].sum(axis=0))[1][:, -1]
-        self._usual = usual
-        self._slopes = np.gradient(usual, axis=1)
-        self._steep = np.sqrt(np.sum(self._slopes**2, axis=1))
-        strength = np.sqrt(np.mean(np.einsum("fik,ik->fi", bare, usual) ** 2, axis=0))
+                template[point] = np.linalg.eigh(products[together].sum(axis=0))[1][:, -1]
+        self._template = template
+        self._derivative = np.gradient(template, axis=1)
+        self._steepness = np.sqrt(np.sum(self._derivative**2, axis=1))
+        strength = np.sqrt(np.mean(np.einsum("fik,ik->fi", bare, template) ** 2, axis=0))
         self._strength = strength
 
-    def _take_trust(self, parts: list[tuple[Samples, Samples]], found: list[Placed]) -> None:
-        """Where each edge lies on average against all others, and how well it keeps to that: glare moves an edge."""
-        rest = []
+    def _learn_biases(self, parts: list[tuple[Samples, Samples]], found: list[Placed]) -> None:
+        """Learn the bias of each edge and the scatter about it, as glare shifts edges."""
+        residuals = []
         for part, one in zip(parts, found, strict=True):
             if one.known:
                 pixels, normals, _, _ = self.contour.places(one.pose, self.optics)
                 shifts, known, _ = self._shifts(part, pixels, normals)
-                rest.append(np.where(known, shifts, np.nan))
-        if len(rest) < 6:
+                residuals.append(np.where(known, shifts, np.nan))
+        if len(residuals) < 6:
             return
-        stack = np.array(rest)
+        stack = np.array(residuals)
         seen = np.isfinite(stack).sum(axis=0)
-        enough = seen >= 0.4 * len(rest)
+        enough = seen >= 0.4 * len(residuals)
         stack[:, ~enough] = 0.0
         middle = np.nanmedian(stack, axis=0)
         spread = mad_scale(stack - middle, axis=0)
-        self._offset = np.where(enough, self._offset + np.clip(middle, -1.0, 1.0), self._offset)
-        self._trust = np.where(enough, np.hypot(self.contour.floor, spread), 0.5)
+        self._bias = np.where(enough, self._bias + np.clip(middle, -1.0, 1.0), self._bias)
+        self._scatter = np.where(enough, np.hypot(self.contour.floor, spread), 0.5)
 
     def _shifts(
         self, part: tuple[Samples, Samples], pixels: Samples, normals: Samples
     ) -> tuple[Samples, np.ndarray, Samples]:
-        """How far each edge has moved, whether that can be told, and its variance; pixels."""
-        assert self._usual is not None  # noqa: S101 - learnt first
+        """Displacement of each edge along its normal, pixels, its validity, and its variance."""
+        assert self._template is not None  # noqa: S101 - learnt first
         count = len(pixels)
         shifts, strengths, misses = np.empty(count), np.empty(count), np.empty(count)
         profiles = self._profiles(part, pixels, normals)
-        shifts_of_profiles(profiles, self._usual, self._slopes, shifts, strengths, misses)
+        shifts_of_profiles(profiles, self._template, self._derivative, shifts, strengths, misses)
         known = (
             np.isfinite(shifts)
             & (np.abs(shifts) < OUTLINE.largest_shift)
             & (np.abs(strengths) > OUTLINE.least_strength * self._strength)
         )
-        variance = (np.maximum(misses, OUTLINE.rounding_noise) / np.maximum(np.abs(strengths) * self._steep, 1e-9)) ** 2
-        return shifts - self._offset, known, np.where(known, variance + self._trust**2, np.inf)
+        variance = (
+            np.maximum(misses, OUTLINE.rounding_noise) / np.maximum(np.abs(strengths) * self._steepness, 1e-9)
+        ) ** 2
+        return shifts - self._bias, known, np.where(known, variance + self._scatter**2, np.inf)
 
     def _place(self, part: tuple[Samples, Samples], guess: BodyPose) -> Placed:
         count = len(self.contour.group)
@@ -208,10 +213,10 @@ class BodyFinder:
         share = np.count_nonzero(inside) / count
         found = BodyPose(*pose.tolist())
         try:
-            scatter = np.linalg.inv(slopes.T @ (used[:, None] * slopes)) * max(level, 0.5) ** 2 * self._together
-        except np.linalg.LinAlgError:  # edges of one direction only
+            covariance = np.linalg.inv(slopes.T @ (used[:, None] * slopes)) * max(level, 0.5) ** 2 * self._correlation
+        except np.linalg.LinAlgError:  # all edges are parallel
             return Placed(found, lost.error, fitting, share)
-        errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(scatter), 0.0)).tolist())
+        errors = BodyPose(*np.sqrt(np.maximum(np.diagonal(covariance), 0.0)).tolist())
         if (
             fitting < OUTLINE.least_share
             or not 0.0 < errors.x < OUTLINE.largest_error * self.optics.length_per_pixel
@@ -222,7 +227,7 @@ class BodyFinder:
 
 
 def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:
-    """Blurred brightness of a part (left, top, right, bottom) of a picture, 8-bit scale."""
+    """Blurred brightness of a part (left, top, right, bottom) of a picture, 0 to 255."""
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(image[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
@@ -230,7 +235,7 @@ def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float)
 
 
 def _smooth(poses: list[BodyPose], times: Samples) -> list[BodyPose]:
-    """Places that follow a straight and steady way where they are far from it (Theil and Sen's, of each coordinate)."""
+    """Poses with outliers replaced by the Theil-Sen line of each coordinate."""
     if len(poses) < 4:
         return poses
     numbers = np.array(poses)

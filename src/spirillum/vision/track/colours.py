@@ -1,4 +1,4 @@
-"""Classes of colour: what the lamp and the camera make of the named colours of the stripes."""
+"""Colour classes: how the named colours of the stripes appear under the lamp and in the camera."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 _MANY = 6
-"""More classes than this are matched to names by the least total distance alone."""
+"""Most classes for which all assignments of names are tried; more are assigned by the least total distance."""
 
 
 def named_colours(names: Sequence[str]) -> Samples:
@@ -31,7 +31,7 @@ def named_colours(names: Sequence[str]) -> Samples:
 
 
 def pattern_period(stripes: Sequence[str]) -> float:
-    """Smallest angle by which the stripes can be turned so that they look the same, rad."""
+    """Period of the stripes: the smallest rotation that maps the pattern to itself, rad."""
     count = len(stripes)
     for step in range(1, count + 1):
         if count % step == 0 and all(stripes[k] == stripes[(k + step) % count] for k in range(count)):
@@ -40,17 +40,16 @@ def pattern_period(stripes: Sequence[str]) -> float:
 
 
 def _opponent(colours: Samples) -> Samples:
-    """Colours as brightness, which lamps change, and two differences, which they change less."""
+    """Opponent colours: brightness, with a small weight as it depends on the lamp, and two differences."""
     red, green, blue = colours[..., 0], colours[..., 1], colours[..., 2]
     return np.stack([0.35 * (red + green + blue) / 3.0, red - green, 0.5 * (red + green) - blue], axis=-1)
 
 
 def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Samples, Samples]:
-    """Colours of the named classes in a picture.
+    """Colours of the named classes in a picture, by k-means with a prior.
 
-    Starts from the named colours under a lamp that gives the samples' mean, then moves each class to the mean of the
-    samples that are nearest to it (k-means), held by its start where few samples are. Glare, which is white whatever
-    is below it, has a class of its own, so that it does not become a stripe's colour.
+    The initial colours are the named ones under a lamp that reproduces the samples' mean; they are the prior of classes
+    with few samples. Glare is white and has a class of its own, so that it does not shift the colour of a stripe.
 
     Args:
         samples: colours of pixels of the stripes, (m, 3).
@@ -63,7 +62,7 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
     named = named_colours(names)
     glary = np.zeros(len(samples), dtype=bool) if "white" in names else _glary(samples)
     lamp = np.clip(samples[~glary].mean(axis=0) / named.mean(axis=0), 0.2, 5.0)
-    lamp = np.mean(lamp) * (lamp / np.mean(lamp)) ** 0.5  # not all stripes show: believe half of the tint
+    lamp = np.mean(lamp) * (lamp / np.mean(lamp)) ** 0.5  # not all stripes are in view: half of the tint is taken
     start = named * lamp
     palette = start.copy()
     glare = np.full((0 if "white" in names else 1, 3), COLOURS.glare)
@@ -85,7 +84,7 @@ def without_glare(profiles: Samples, palettes: tuple[Samples, Samples, Samples])
 
     Args:
         profiles: colours, (..., 3).
-        palettes: what `colour_classes` found.
+        palettes: result of `colour_classes`.
     """
     palette, _, glare = palettes
     nearest = _nearest(np.nan_to_num(profiles), np.concatenate([palette, glare]))
@@ -93,7 +92,7 @@ def without_glare(profiles: Samples, palettes: tuple[Samples, Samples, Samples])
 
 
 def _glary(samples: Samples) -> np.ndarray:
-    """Which samples are bright without a colour; none if all are."""
+    """Mask of bright samples without colour; empty if all samples are so."""
     brightest, least = samples.max(axis=1), samples.min(axis=1)
     found = (least > COLOURS.pale * brightest) & (brightest > np.median(brightest))
     return np.asarray(found if not found.all() else np.zeros(len(samples), dtype=bool))
@@ -112,17 +111,17 @@ def order_seen(
     stripes: Sequence[str],
     names: Sequence[str],
 ) -> tuple[Samples, str]:
-    """Check the order of the stripes by which colours are seen side by side.
+    """Check the order of the stripes by the adjacent pairs of colours in view.
 
     Args:
         profiles: colours along the angle about the axis, from +z towards -y, for some frames, (f, n, 3).
         angles: these angles, rad, (n,).
-        palettes: what `colour_classes` found.
-        stripes: names in the order given.
-        names: distinct names, one a class.
+        palettes: result of `colour_classes`.
+        stripes: names in the stated order.
+        names: distinct names, one per class.
 
     Returns:
-        The classes' colours by the names that fit them best, and `given`, `reversed`, `other` or `unseen`.
+        The classes' colours in the best-fitting order of names, and `given`, `reversed`, `other` or `unseen`.
     """
     palette, start, glare = palettes
     count = len(names)
@@ -136,7 +135,7 @@ def order_seen(
     cost = np.sqrt(np.sum((_opponent(palette)[:, None] - _opponent(start)) ** 2, axis=-1))  # cluster, name
 
     def share(assigned: np.ndarray, allowed: np.ndarray) -> float:
-        """Share of the seen neighbours that are allowed, with cluster i named assigned[i]."""
+        """Share of the observed adjacent pairs that are allowed, with cluster i named assigned[i]."""
         return float(seen[allowed[np.ix_(assigned, assigned)]].sum() / seen.sum())
 
     if count <= _MANY:
@@ -158,11 +157,11 @@ def order_seen(
 
 
 def named_rightly(palette: Samples, start: Samples) -> bool:
-    """Whether no other assignment of names fits the classes' colours clearly better.
+    """Whether no other assignment of names to classes fits their colours clearly better.
 
     Args:
         palette: colours of the classes, (classes, 3).
-        start: named colours under this lamp, (classes, 3).
+        start: named colours under the lamp, (classes, 3).
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -172,20 +171,20 @@ def named_rightly(palette: Samples, start: Samples) -> bool:
 
 
 def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:
-    """Colours by name, from colours by cluster."""
+    """Colours in the order of names, from colours in the order of clusters."""
     by_name = np.empty_like(palette)
     by_name[assigned] = palette
     return by_name
 
 
 def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samples, Samples], stated: float) -> float:
-    """Usual width of stripes that are seen whole, rad; NaN where hardly any is.
+    """Median width of the stripes that are fully in view, rad; NaN for too few of them.
 
     Args:
-        profiles: colours along the angle, for some frames, (f, n, 3); NaN where none is seen.
-        angles: these angles, rad, (n,).
-        palettes: what `colour_classes` found.
-        stated: their width as it is stated, rad; what is far narrower is the blurred edge of two colours.
+        profiles: colours along the angle, for some frames, (f, n, 3); NaN where not in view.
+        angles: angles of the samples, rad, (n,).
+        palettes: result of `colour_classes`.
+        stated: stated width, rad; far narrower runs are blurred edges between two colours.
     """
     palette, _, glare = palettes
     step, widths = float(angles[1] - angles[0]), []
@@ -205,7 +204,7 @@ def width_seen(profiles: Samples, angles: Samples, palettes: tuple[Samples, Samp
 
 
 def _runs(profile: Samples, palette: Samples, glare: Samples) -> list[np.ndarray]:
-    """Classes along the angle, split where they change; -1 where there is glare or nothing."""
+    """Runs of one class along the angle; -1 for glare and missing samples."""
     good = np.isfinite(profile).all(axis=1)
     classes = np.where(good, _nearest(np.nan_to_num(profile), np.concatenate([palette, glare])), -1)
     classes = np.where(classes < len(palette), classes, -1)
@@ -213,7 +212,7 @@ def _runs(profile: Samples, palette: Samples, glare: Samples) -> list[np.ndarray
 
 
 def _neighbours(profiles: Samples, angles: Samples, palette: Samples, glare: Samples, width: float) -> Samples:
-    """How often a class is seen next to another one, towards larger angles, (classes, classes)."""
+    """Counts of adjacent pairs of classes, towards larger angles, (classes, classes)."""
     seen = np.zeros((len(palette), len(palette)))
     step = float(angles[1] - angles[0])
     for profile in profiles:

@@ -1,8 +1,8 @@
-"""Where a body's edges appear: its silhouette, and where its seal begins, on the plane through its axis.
+"""Apparent contour of a body: its silhouette and the front edge of its seal, projected onto the plane through its axis.
 
-A line of sight that touches the body goes on to the horizontal plane through the motor axis. Where it meets that plane,
-in the frame of the body, depends only on where the lens stands in that frame: not on tilts, focal length or lens. So
-the apparent edges are computed once, exactly, for some places of the lens, and interpolated by polynomials.
+A line of sight tangent to the body is continued to the horizontal plane through the motor axis. In the body's frame,
+the intersection depends on the position of the lens only, not on tilts, focal length or distortion. The contour is
+therefore computed exactly for a grid of lens positions and interpolated by Chebyshev polynomials.
 """
 
 from __future__ import annotations
@@ -23,41 +23,43 @@ from spirillum.vision.track.constants import CONTOUR
 __all__ = ["GROUPS", "Contour", "contour_of"]
 
 GROUPS = ("front", "rear", "left", "right", "seal")
-"""Kinds of edges: front and rear end, the sides at +y and -y, and where the seal begins."""
+"""Groups of edges: front and rear end, the sides at +y and -y, and the front edge of the seal."""
 
 _ORDERS = 7, 4
-"""Orders of the polynomials along and across."""
+"""Orders of the polynomials in the lens's x and y."""
 _NODES = 8, 5
+"""Interpolation nodes in x and y."""
 _AROUND, _PER_TURN = 128, 144
-"""Points around the axis, and along an arc that goes all the way round, from which a silhouette is made."""
+"""Points around the axis, and along a full circle of a profile's arc, from which a silhouette is computed."""
 
 
 @dataclass(frozen=True)
 class Contour:
-    """Apparent edge points of a body as functions of the lens's place in the body's frame."""
+    """Apparent edge points of a body as functions of the lens's position in the body's frame."""
 
     group: np.ndarray = field(repr=False)
     """Index into `GROUPS` of each point, (n,)."""
     normals: Samples = field(repr=False)
-    """Outward directions on the plane in the body's frame, about at right angles to the edge, (n, 2)."""
+    """Approximate outward normals in the plane, in the body's frame, (n, 2)."""
     floor: Samples = field(repr=False)
-    """What places of points are never known better than, pixels: looks change, most where stripes pass, (n,)."""
+    """Least standard error of each point, pixels, (n,): edge profiles vary, most where stripes pass."""
     _factors: Samples = field(repr=False)
-    """Polynomials of the points, and of those of a flat end's lower rim, (a, b, 4, n)."""
+    """Chebyshev coefficients of the points with the upper and with the lower rims of flat ends, (a, b, 4, n)."""
     _reach: Samples = field(repr=False)
+    """Largest distances of the lens along and across, m, (2,)."""
 
     def points(self, pose: BodyPose) -> Samples:
-        """The edge points on the plane through the axis, in the body's frame, m, (n, 2)."""
+        """Edge points in the plane through the axis, in the body's frame, m, (n, 2)."""
         out = np.empty((len(self.group), 2))
         edge_points(np.array(pose, dtype=float), self._factors, self.normals, self._reach, out)
         return out
 
     def places(self, pose: BodyPose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
-        """Where the edges are in the picture.
+        """Project the edges into the picture.
 
         Returns:
-            pixels (n, 2), unit normals in the picture (n, 2), pixels per m along them (n,), and the change of the
-            distance along each normal with (x, y, heading), pixels per m and per rad (n, 3).
+            Pixels (n, 2), unit normals in the picture (n, 2), pixels per m along them (n,), and the Jacobian of the
+            displacement along each normal by (x, y, heading), pixels per m and per rad (n, 3).
         """
         count = len(self.group)
         pixels, directions, size, slopes = (
@@ -82,7 +84,7 @@ class Contour:
 
 
 def contour_of(robot: Robot, optics: Optics) -> Contour:
-    """The apparent edges of a robot's body.
+    """Compute the apparent contour of a robot's body.
 
     Args:
         robot: the robot.
@@ -120,7 +122,7 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
                 for flat, stations, outward in ((_flat(outline, 0), wide, 1.0), (_flat(outline, -1), behind, -1.0)):
                     if flat is None:
                         parts.append(np.stack([_chain(hulls["body"], stations, outward, 1), stations], axis=1))
-                    else:  # where stripes end is seen from above, also when the flat end itself is in view
+                    else:  # stripes end at the upper rim, also when the flat end is in view
                         upper = 1.0 if striped and outward < 0.0 else sign
                         parts.append(_rim(flat, stations, upper, on_plane, a, b))
                 for outward in (1.0, -1.0):
@@ -137,7 +139,7 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     factors = np.linalg.lstsq(basis, found.reshape(len(basis), -1), rcond=None)[0]
     factors = np.ascontiguousarray(factors).reshape(*(order + 1 for order in _ORDERS), 4, count)
     group = np.repeat([GROUPS.index(name) for name, _ in kinds], [size for _, size in kinds])
-    # The near and the far rim of a flat end without stripes look alike, and move otherwise.
+    # The near and the far rim of a flat end without stripes are easily confused, and move differently.
     rear = "rear" if striped or _flat(outline, -1) is None else "bare_rear"
     trusted = [getattr(CONTOUR, name) for name in ("front", rear, *[kind for _, kind, _ in sides] * 2, "seal")]
     floor = np.repeat(trusted, [size for _, size in kinds])
@@ -146,7 +148,7 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
 
 
 def _reach(robot: Robot, optics: Optics) -> tuple[float, float]:
-    """How far from the body the lens can stand, along and across, m."""
+    """Largest distance of the lens from the body, along and across, m."""
     width, height = optics.size
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
     view = np.nanmax(np.abs(optics.points(corners, optics.axis_height)[:, :2]), axis=0)
@@ -155,7 +157,7 @@ def _reach(robot: Robot, optics: Optics) -> tuple[float, float]:
 
 
 def _surface(outline: Outline) -> Samples:
-    """Points all over a solid of revolution, (k, 3), m."""
+    """Points on the surface of a solid of revolution, m, (k, 3)."""
     pieces = []
     for piece in outline.pieces:
         turn = 0.0 if isinstance(piece, Line) else abs(piece.angles[1] - piece.angles[0])
@@ -167,7 +169,7 @@ def _surface(outline: Outline) -> Samples:
 
 
 def _flat(outline: Outline, end: int) -> tuple[float, float] | None:
-    """Place along the axis and radius of a flat end's sharp rim; None if the end is round."""
+    """Axial position and radius of a flat end's sharp rim, m; None if the end is round."""
     piece = outline.pieces[end]
     if isinstance(piece, Line) and piece.start[0] == piece.end[0] and outline.corners and outline.corners[end]:
         return piece.start[0], max(piece.start[1], piece.end[1])
@@ -175,7 +177,7 @@ def _flat(outline: Outline, end: int) -> tuple[float, float] | None:
 
 
 def _rim(flat: tuple[float, float], stations: Samples, sign: float, on_plane, a: float, b: float) -> Samples:  # type: ignore[no-untyped-def]
-    """A sharp rim above (sign 1) or below the axis."""
+    """The half of a sharp rim above (sign 1) or below (-1) the axis, projected, m, (n, 2)."""
     height = np.sqrt(flat[1] ** 2 - stations**2)
     return np.asarray(on_plane(np.stack([np.full(stations.size, flat[0]), stations, sign * height], axis=1), a, b))
 
@@ -198,14 +200,14 @@ def _sides(robot: Robot, outlines: dict[str, Outline], spacing: float) -> list[t
 
 
 def _stations(low: float, high: float, spacing: float) -> Samples:
-    """Places along a stretch, not closer than a pixel nor more than sixty."""
+    """At most about sixty positions from `low` to `high`, at least `spacing` apart."""
     if high <= low:
         return np.empty(0)
     return np.arange(low, high, max(spacing, (high - low) / 60))
 
 
 def _straight(outline: Outline) -> tuple[float, float]:
-    """Between which x a solid's sides run straight, or about so."""
+    """Range of x in which the sides of a solid are straight; without such, its middle half."""
     widest = (
         max(max(piece.start[1], piece.end[1]) for piece in outline.pieces if isinstance(piece, Line))
         if any(isinstance(piece, Line) for piece in outline.pieces)
@@ -219,7 +221,7 @@ def _straight(outline: Outline) -> tuple[float, float]:
 
 
 def _seal(robot: Robot, radius: float, spacing: float) -> Samples:
-    """The visible front edge of the seal, (k, 3), m."""
+    """The visible front edge of the seal, m, (k, 3)."""
     if robot.seal is None or not robot.seal.stripes:
         return np.empty((0, 3))
     place = np.arange(-CONTOUR.seal_arc, CONTOUR.seal_arc, spacing / radius)
@@ -234,7 +236,7 @@ def _hull(points: Samples) -> Samples:
 
 
 def _chain(hull: Samples, stations: Samples, outward: float, along: int) -> Samples:
-    """Outermost coordinate of a convex polygon at stations of the other coordinate (`along`: 0 for x, 1 for y)."""
+    """Outermost coordinate of a convex polygon at stations of the other one (`along`: 0 for x, 1 for y)."""
     other = 1 - along
     ends = int(np.argmin(hull[:, along])), int(np.argmax(hull[:, along]))
     walks = []
@@ -247,7 +249,7 @@ def _chain(hull: Samples, stations: Samples, outward: float, along: int) -> Samp
 
 
 def _normals(points: Samples, group: np.ndarray) -> Samples:
-    """Directions at right angles to the edges, outward; for the seal forward."""
+    """Outward normals of the edges; forward for the seal."""
     normals = np.zeros_like(points)
     for index, outward in enumerate(((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 0.0))):
         inside = group == index

@@ -1,7 +1,7 @@
-"""Films whose times do not fit what they show.
+"""Detection of films whose time stamps contradict the motion.
 
-Where a piece is missing though the times go on evenly, place, body and tail jump on the same frame. Where the times
-jump though nothing is missing, they go on as if no time had passed.
+Where a part of the film is missing but time stamps continue evenly, position, body and tail jump on the same frame.
+Where time stamps jump but nothing is missing, the motion continues as if no time had passed.
 """
 
 from __future__ import annotations
@@ -16,23 +16,20 @@ from spirillum.arrays import Samples
 from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUTS
+from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["cuts_in", "jumps_of_time"]
 
 
-def cuts_in(
-    time: Samples, x: Samples, body_angle: Samples, tail_phase: Samples, length_per_pixel: float
-) -> tuple[Flag, ...]:
-    """Moments at which two of place, body and tail jump together, as in no liquid this viscous.
+def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
+    """Flag a frame on which two of position, body and tail jump together, which viscous fluid does not allow.
 
     Args:
-        time: s, (n,).
-        x: place along the channel, m, (n,); NaN where it is not known, as below.
-        body_angle: unwrapped, rad, (n,).
-        tail_phase: unwrapped, rad, (n,).
-        length_per_pixel: m.
+        motion: the robot's motion.
+        length_per_pixel: length per pixel, m.
     """
+    time, x, body_angle, tail_phase = motion
     if time.size < 2:
         return ()
     usual = float(np.median(np.diff(time)))
@@ -49,19 +46,15 @@ def cuts_in(
     return ()
 
 
-def jumps_of_time(
-    time: Samples, x: Samples, body_angle: Samples, tail_phase: Samples, length_per_pixel: float, period: float
-) -> tuple[Flag, ...]:
-    """A jump of the time stamps over which place, body and tail go on as if no time had passed.
+def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tuple[Flag, ...]:
+    """Flag a jump of the time stamps over which the motion continues as if no time had passed.
 
     Args:
-        time: s, (n,).
-        x: place along the channel, m, (n,); NaN where it is not known, as below.
-        body_angle: unwrapped, rad, (n,).
-        tail_phase: unwrapped, rad, (n,).
-        length_per_pixel: m.
-        period: of the stripes, rad.
+        motion: the robot's motion.
+        length_per_pixel: length per pixel, m.
+        period: period of the stripes, rad.
     """
+    time, x, body_angle, tail_phase = motion
     if time.size < 2:
         return ()
     steps = np.diff(time)
@@ -74,7 +67,7 @@ def jumps_of_time(
         (body_angle, CUTS.angle, period),
         (tail_phase, CUTS.angle, 2.0 * math.pi),
     )
-    true, even = ([_miss(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
+    true, even = ([_mismatch(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
     if sum(one > 1.0 for one in true) < 2 or not max(even) < CUTS.meeting:
         return ()
     sentence = (
@@ -84,11 +77,10 @@ def jumps_of_time(
     return (Flag("times-do-not-fit", sentence, EVERYTHING),)
 
 
-def _miss(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
-    """How far two lines miss each other in the middle of a gap after frame `gap`, over what says that they do.
+def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
+    """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle.
 
-    That is `least` where they end half a frame before and after it, and more the farther they have to go; whole
-    periods are not known.
+    It is normalised by the threshold `least`, enlarged by the standard error of the extrapolation.
     """
     middle, far, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, []
     for part in (slice(None, gap + 1), slice(gap + 1, None)):
@@ -104,7 +96,7 @@ def _miss(time: Samples, values: Samples, gap: int, least: float, period: float)
 
 
 def _jump(time: Samples, values: Samples, least: float, usual: float) -> float | None:
-    """When a series jumps most, s; None if it nowhere does."""
+    """Time of the largest significant jump of a series, s; None if there is none."""
     known = np.isfinite(values)
     t, v = time[known], values[known]
     if t.size < 4 * CUTS.window:
@@ -118,7 +110,7 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> float |
     before, after = slice(None, splits.size), slice(CUTS.window, CUTS.window + splits.size)
     far = [splits - middle_t[part] for part in (before, after)]
     reached = [middle_v[part] + slopes[part] * away for part, away in zip((before, after), far, strict=True)]
-    # In units of what two lines miss each other by that end half a frame before and after the split.
+    # In units of the standard error of the mismatch of lines that end half a frame before and after the split.
     unsure = sum(1.0 / CUTS.window + away**2 / squares[part] for part, away in zip((before, after), far, strict=True))
     steps = (reached[1] - reached[0]) / np.sqrt(unsure / np.min(unsure))
     longest = sliding_window_view(np.diff(t), 2 * CUTS.window - 1).max(axis=1)[: splits.size]
@@ -131,7 +123,7 @@ def _jump(time: Samples, values: Samples, least: float, usual: float) -> float |
 
 
 def _even(time: Samples, t: Samples, usual: float) -> np.ndarray:
-    """Splits of the known frames at `t` about which the times of all frames go on evenly, (len(t) - 2 CUTS.window,)."""
+    """Mask of the splits of the known frames `t` without a gap in all frames' times, (len(t) - 2 CUTS.window,)."""
     gaps = np.concatenate([[0], np.cumsum(np.diff(time) > CUTS.gap * usual)])
     place = np.searchsorted(time, t)
     return np.asarray(gaps[place[2 * CUTS.window - 1 : -1]] == gaps[place[: -2 * CUTS.window]])

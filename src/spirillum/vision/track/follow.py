@@ -1,4 +1,4 @@
-"""From a video and its setup to a track: scale, looks, then one frame after the other."""
+"""From a video and its setup to a track: calibrate the scale, learn the robot's appearance, then follow it."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.first_look import Start, on_the_way
 from spirillum.vision.track.identity import Introduced, introduced
+from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.search import candidates, refined
 from spirillum.vision.track.size import doubted
 from spirillum.vision.track.steadiness import camera_flags
@@ -35,23 +36,23 @@ __all__ = ["Seen", "Watcher", "follow", "scale_of"]
 
 
 class Seen(NamedTuple):
-    """What was seen on one frame, for whoever draws it."""
+    """The observation on one frame, for drawing."""
 
     time: float
-    """s."""
+    """Time of the frame, s."""
     pose: BodyPose | None
-    """Where the body is in the camera's frame; None where it was not seen."""
+    """Pose of the body in the camera's frame; None where it was not detected."""
     body_angle: float
-    """rad, modulo the stripes' period; NaN where it could not be read."""
+    """Rotation angle of the body, rad, modulo the stripes' period; NaN where unreadable."""
     tail_phase: float
-    """rad, modulo 2 pi; NaN where it could not be read."""
+    """Phase of the tail, rad, modulo 2 pi; NaN where unreadable."""
     optics: Optics
     """The camera."""
 
 
 @dataclass
-class _Row:
-    """What is kept of the frames."""
+class _Record:
+    """Observations on all frames so far."""
 
     time: list[float] = field(default_factory=list)
     index: list[int] = field(default_factory=list)
@@ -61,7 +62,7 @@ class _Row:
 
 
 Watcher = Callable[[int, np.ndarray, Seen], None]
-"""Called with a frame's number, its picture (8-bit RGB) and what was seen on it."""
+"""Called with a frame's number, its picture (8-bit RGB) and its observation."""
 
 
 def follow(
@@ -77,11 +78,11 @@ def follow(
 
     Args:
         video: the film, or a folder of images.
-        setup: what the experimenter knows.
+        setup: camera, tank, markers and robot of the experiment.
         robot: the robot in front of the camera.
-        folder: folder of the setup file, where a checkerboard's pictures lie; unset: the present one.
-        progress: called with the number of frames done and of all, where that is known.
-        on_frame: called with each frame's number, its picture (8-bit RGB) and what was seen on it.
+        folder: folder of the setup file, to which the checkerboard's folder is relative; unset: the working directory.
+        progress: called with the number of frames done and of all frames, None where unknown.
+        on_frame: called with each frame's number, its picture (8-bit RGB) and its observation.
 
     Raises:
         InputError: if the video cannot be read, or neither ruler nor robot is found in it.
@@ -94,46 +95,46 @@ def follow(
     bounds = bounds_of(setup, video)
     known = introduced(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
     start, stripes, wire = known.start, known.stripes, known.wire
-    body, rows = start.body, _Row()
-    aside = ThreadPoolExecutor(1)  # ends while the frames are followed
+    body, record = start.body, _Record()
+    aside = ThreadPoolExecutor(1)  # runs while the frames are followed
     moved = aside.submit(camera_flags, frames, start, ruled=setup.markers.spacing is not None)
     aside.shutdown(wait=False)
     total = video.count
     for frame in video.frames(setup.start, setup.end):
-        found = _placed(body, frame, _guess(rows, frame.time), start)
-        if not found.known and len(rows.time) % FOLLOWING.search_interval == 0:
-            found = _searched(body, frame.image, still, start, found)
+        found = _placed(body, frame, _guess(record, frame.time), start)
+        if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
+            found = _found_again(body, frame.image, still, start, found)
         read = (np.nan, np.nan), (np.nan, np.nan)
         if found.known:
             read = stripes.read(frame.image, found.pose), wire.read(frame.image, found.pose)
-        rows.time.append(frame.time)
-        rows.index.append(frame.index)
-        rows.placed.append(found)
-        rows.roll.append(read[0])
-        rows.tail.append(read[1])
+        record.time.append(frame.time)
+        record.index.append(frame.index)
+        record.placed.append(found)
+        record.roll.append(read[0])
+        record.tail.append(read[1])
         if on_frame is not None:
             pose = found.pose if found.known else None
             on_frame(frame.index, frame.image, Seen(frame.time, pose, read[0][0], read[1][0], body.optics))
         if progress is not None:
-            progress(len(rows.time), total)
+            progress(len(record.time), total)
     every = (*video.flags, *sight.flags, *moved.result(), *known.flags, *start.flags, *stripes.flags, *wire.flags)
-    return _track(video, setup, sight, known, rows, every)
+    return _track(video, setup, sight, known, record, every)
 
 
-def _guess(rows: _Row, time: float) -> BodyPose | None:
-    """Where the body should be, from the frames before; None where it was not seen on the last one."""
+def _guess(record: _Record, time: float) -> BodyPose | None:
+    """Pose predicted from the last frames; None where the body was not detected on the last one."""
     last = [
         (at, one.pose)
-        for at, one in zip(rows.time[-FOLLOWING.memory :], rows.placed[-FOLLOWING.memory :], strict=True)
+        for at, one in zip(record.time[-FOLLOWING.memory :], record.placed[-FOLLOWING.memory :], strict=True)
         if one.known
     ]
-    if len(last) < 2 or not rows.placed[-1].known:
+    if len(last) < 2 or not record.placed[-1].known:
         return None
     return on_the_way(last, time)
 
 
 def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start) -> Placed:
-    """The body near a guess, or else where it should be; not seen if it would have jumped."""
+    """Place the body near a predicted pose, else on the initial path; a jump counts as not detected."""
     found, far = None, FOLLOWING.largest_jump * body.optics.length_per_pixel
     if guess is not None:
         found = body.place(frame.image, guess)
@@ -146,8 +147,8 @@ def _placed(body: BodyFinder, frame: Frame, guess: BodyPose | None, start: Start
     return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
 
 
-def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
-    """The body anywhere in a picture."""
+def _found_again(body: BodyFinder, image: np.ndarray, still: Samples, start: Start, lost: Placed) -> Placed:
+    """Search the whole picture for the body; `lost` if it is not found."""
     for candidate in candidates(image, still, body)[:2]:
         better = refined(image, still, body, candidate)
         if start.as_clear(better.score):
@@ -157,26 +158,27 @@ def _searched(body: BodyFinder, image: np.ndarray, still: Samples, start: Start,
     return lost
 
 
-def _track(video: Video, setup: Setup, sight: Sight, known: Introduced, rows: _Row, flags: tuple[Flag, ...]) -> Track:
-    body, time = known.start.body, np.array(rows.time)
-    seen = np.array([one.known for one in rows.placed])
-    pose = np.where(seen[:, None], np.array([one.pose for one in rows.placed]), np.nan)
-    errors = np.array([one.error for one in rows.placed])
-    roll, tail = np.array(rows.roll), np.array(rows.tail)
-    optics = body.optics  # shows the body as large as it looks; lengths are those of the stated scale
-    seen_flags = sight_flags(time, pose, errors, rows.placed, optics, setup)
-    cut = cut_off(rows.placed)
+def _track(
+    video: Video, setup: Setup, sight: Sight, known: Introduced, record: _Record, flags: tuple[Flag, ...]
+) -> Track:
+    body, time = known.start.body, np.array(record.time)
+    seen = np.array([one.known for one in record.placed])
+    pose = np.where(seen[:, None], np.array([one.pose for one in record.placed]), np.nan)
+    errors = np.array([one.error for one in record.placed])
+    roll, tail = np.array(record.roll), np.array(record.tail)
+    optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
+    seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
+    cut = cut_off(record.placed)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     scale, size_flags = doubted(sight.scale, body, known.size)
     hand = known.wire.handedness()
-    motion = time, body_angle, tail_phase, position[:, 0], body.robot
-    odd = (*nothing_moves(*motion), *contradictions(*motion, hand))
-    series = time, position[:, 0], body_angle, tail_phase, optics.length_per_pixel
-    cuts = (*cuts_in(*series), *jumps_of_time(*series, known.stripes.period))
-    frame, gap_flags = gaps_of(time, np.array(rows.index, dtype=float))
+    motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
+    odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
+    cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
+    frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
     return Track(
         time=time,
         frame=frame,

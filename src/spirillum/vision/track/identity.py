@@ -1,4 +1,4 @@
-"""Whether what was found is the robot: its stripes or its tail have to say so."""
+"""Identification of the robot: its stripes or its tail have to match the detected object."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ __all__ = ["Introduced", "introduced"]
 
 
 class Introduced(NamedTuple):
-    """What was taken for the robot, and readers that know what its stripes and tail look like."""
+    """The detected object, with readers that have learnt the appearance of its stripes and tail."""
 
     start: Start
     stripes: Stripes
     wire: TailWave
     size: float
-    """How large it looks, over what its file says at the stated scale."""
+    """Apparent size over the size of the robot file at the stated scale."""
     robot: bool
-    """Whether stripes or tail say that it is the robot; both where it looks too large or small, or is not clear."""
+    """Whether stripes or tail match the robot; both have to where size or contrast are unexpected."""
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """That it may be something else, or that there is another one."""
+        """Warnings on another object, or on a second robot."""
         flags = []
         if not self.robot:
             sentence = (
@@ -48,7 +48,7 @@ class Introduced(NamedTuple):
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals
-        if rivals and np.mean([self._like_it(image, pose) for image, pose in rivals]) > IDENTITY.least_share:
+        if rivals and np.mean([self._matches(image, pose) for image, pose in rivals]) > IDENTITY.least_share:
             sentence = (
                 f"more than one robot is in view (on {len(rivals)} of the frames looked at): it is not known which is "
                 "meant, so that nothing is given; a [region] around one of them in the setup would say"
@@ -56,27 +56,27 @@ class Introduced(NamedTuple):
             flags.append(Flag("two-robots", sentence, EVERYTHING))
         return tuple(flags)
 
-    def _like_it(self, image: np.ndarray, pose: BodyPose) -> bool:
-        """Whether stripes or tail like the robot's are seen at a place."""
+    def _matches(self, image: np.ndarray, pose: BodyPose) -> bool:
+        """Whether stripes or tail match the robot at a pose."""
         return bool(np.isfinite(self.stripes.read(image, pose)[0])) or self.wire.reads(image, pose)
 
 
 def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Introduced:
-    """Find the robot as large as it should be; if that is not the robot, of any size, which takes some seconds.
+    """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds.
 
     Args:
         name: name of the video.
         setup: the setup.
         stated: the robot's body at the stated scale.
         frames: frames spread over the video.
-        still: what stands still in them, (h, w, 3).
+        still: static background of the frames, (h, w, 3).
 
     Raises:
-        InputError: if nothing like it is found.
+        InputError: if no object resembles the robot.
     """
     found: Introduced | InputError
     try:
-        found = _looked(name, setup, stated, frames, still, 1.0)
+        found = _identified(name, setup, stated, frames, still, 1.0)
         if found.robot:
             return found
     except InputError as error:
@@ -84,7 +84,7 @@ def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame],
     size = another_size(stated, [frame.image for frame in frames], still)
     if size is not None:
         with suppress(InputError):
-            other = _looked(name, setup, resized(stated, size), frames, still, size)
+            other = _identified(name, setup, resized(stated, size), frames, still, size)
             if other.robot:
                 return other
     if isinstance(found, InputError):
@@ -92,12 +92,14 @@ def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame],
     return found
 
 
-def _looked(name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float) -> Introduced:
+def _identified(
+    name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float
+) -> Introduced:
     start = first_look(name, body, frames, still)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
-    with ThreadPoolExecutor(2) as pool:  # the compiled loops run side by side
+    with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL
         list(pool.map(lambda reader: reader.learn(start.seen), (stripes, wire)))
-    if wire.readable > IDENTITY.sure_share:  # the tail is at the end where it should be
+    if wire.readable > IDENTITY.sure_share:  # the tail is at the expected end
         start = replace(start, flags=())
     read = float(np.mean([np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]))
     striped = stripes.fits and read > IDENTITY.least_share

@@ -1,9 +1,9 @@
-"""How large the body looks against its file at the stated scale: a second scale, beside that of the ruler.
+"""Apparent size of the body over that of its file at the stated scale: an independent check of the ruler.
 
-A wrong spacing, height or robot file makes the body look too large or too small. Its apparent size is where the
-brightness of its edges changes most, against where its outline has them; far from the stated one, the size at which
-the body stands out most clearly. Rates do not depend on lengths, so that the robot is followed at its apparent size;
-lengths are those of the stated scale, and doubted.
+A wrong spacing, height or robot file makes the body appear too large or too small. The apparent size is fitted by
+matching the outline to the steepest brightness gradients; far from 1, by the size at which the body is detected most
+clearly. The robot is followed at its apparent size, as rates do not depend on lengths. Lengths are those of the stated
+scale, with a larger uncertainty.
 """
 
 from __future__ import annotations
@@ -28,41 +28,42 @@ __all__ = ["LENGTHS", "OutlineFit", "another_size", "clearness", "doubted", "out
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
-"""Sizes that are tried over the stated one; those between are found from the edges."""
+"""Candidate sizes over the stated one; sizes in between are fitted to the edges."""
 _FINE = 8
-"""Samples of the edges' steepness in a pixel."""
+"""Samples of the edges' gradient profile per pixel."""
 _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002)
-"""Reach of size, place (pixels) and heading (rad) in each round of the search."""
+"""Half ranges of size, position (pixels) and heading (rad) in each round of the grid search."""
 _COUNTS = 13, 9, 5
+"""Grid points of each parameter in each round."""
 
 LENGTHS = ("forward_velocity", "lateral_position", "lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
 """Quantities that are proportional to the scale."""
 
 
 def clearness(found: Sequence[Sequence[Candidate]]) -> float:
-    """How clearly something stands out as a robot does: score of the best place over the third best, the usual one.
+    """Clearness of a detection: median score of the best candidate over that of the third best, which is clutter.
 
     Args:
-        found: the likeliest places on some frames.
+        found: candidates on some frames, best first.
     """
     return float(np.median([some[0].score / max(some[2].score, 1e-9) if len(some) > 2 else 0.0 for some in found]))
 
 
-def _likeness(found: Sequence[Sequence[Candidate]]) -> float:
-    """How much like a robot that is: a part of one may stand out as clearly, but has fainter edges."""
+def _resemblance(found: Sequence[Sequence[Candidate]]) -> float:
+    """Clearness times the median score: a part of a robot may be as clear, but has fainter edges."""
     return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
 
 
 def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> float | None:
-    """The size, from half to twice the stated one, at which something looks most like the robot.
+    """The size, from half to twice the stated one, at which an object resembles the robot most.
 
     Args:
         body: the robot's body at the stated scale.
         images: some frames, 8-bit RGB, (h, w, 3) each.
-        still: what stands still in them, (h, w, 3).
+        still: static background of the frames, (h, w, 3).
 
     Returns:
-        The size over the stated one; None if nothing stands out as a robot does.
+        The size over the stated one; None if no detection is clear.
     """
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, SIZE.looked_at).round().astype(int))]
 
@@ -70,15 +71,15 @@ def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples)
         other = resized(body, float(size))
         return [close_places(image, still, other) for image in few]
 
-    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
         tried = list(pool.map(at, _SIZES))
-    alike = [_likeness(places) if clearness(places) > SIZE.clearness else 0.0 for places in tried]
-    best = int(np.argmax(alike))
-    return float(_SIZES[best]) if alike[best] > 0.0 else None
+    resemblance = [_resemblance(places) if clearness(places) > SIZE.clearness else 0.0 for places in tried]
+    best = int(np.argmax(resemblance))
+    return float(_SIZES[best]) if resemblance[best] > 0.0 else None
 
 
 def resized(body: BodyFinder, size: float) -> BodyFinder:
-    """A finder of this body in front of a camera that shows everything larger; it has not learnt yet.
+    """An untrained finder of a body under a camera with a larger magnification.
 
     Args:
         body: the body.
@@ -88,33 +89,33 @@ def resized(body: BodyFinder, size: float) -> BodyFinder:
 
 
 class OutlineFit(NamedTuple):
-    """How the outline lies against what was taken for it."""
+    """Misfit of an outline against the edges in the picture."""
 
     size: float
-    """Its size over that of the robot's file."""
+    """Apparent size over that of the robot file."""
     move: BodyPose
-    """What has to be added to the body's places, m and rad."""
+    """Correction to be added to the pose, m and rad."""
 
     @property
     def resizes(self) -> bool:
-        """Whether it is of another size, beyond what light and glare do to edges."""
+        """Whether the size differs from 1 beyond the bias of shading and glare."""
         return bool(abs(self.size - 1.0) > SIZE.tolerance[0])
 
     def fits(self, pixel: float) -> bool:
-        """Whether it lies as it was taken, to what light and glare do to edges; `pixel` is the length of one, m."""
+        """Whether size and pose are correct within the bias of shading and glare; `pixel`: m per pixel."""
         off = np.abs([self.size - 1.0, self.move.x / pixel, self.move.y / pixel, self.move.heading])
         return bool(np.all(off <= SIZE.tolerance))
 
 
 def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
-    """Where the outline of a body that has learnt lies, and how large it is, within 8 %, 3 pixels and 3 degrees.
+    """Size and pose correction of the outline, by a grid search within 8 %, 3 pixels and 3 degrees.
 
-    Of all sizes and places, the one is taken at which the steepest brightness lies on most of the outline, each kind of
-    edge alike: glare and shades have edges too, which agree on no size.
+    Maximises the mean squared gradient along the outline, with equal weights of the groups of edges. Edges of glare and
+    shadows agree on no size, so that they do not bias the maximum.
 
     Args:
-        body: the body.
-        pose: where it was taken to be.
+        body: the body, after learning.
+        pose: pose of the body.
     """
     pixels, normals, _, slopes = body.contour.places(pose, body.optics)
     middle = body.optics.pixels(np.array([[pose.x, pose.y, body.optics.axis_height]]))
@@ -131,14 +132,14 @@ def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
         tried = np.stack([grid.ravel() for grid in np.meshgrid(*grids, indexing="ij")], axis=1)
         scores = np.empty(len(tried))
         sums_along(steep, design * _FINE, float(body.half * _FINE), tried, scores)
-        if not best.any():  # the stated size is believed before all others
+        if not best.any():  # prior for the stated size
             scores[np.abs(tried[:, 0]) <= SIZE.stated_range] *= SIZE.stated_preference
         best = tried[int(np.argmax(scores))]
     return OutlineFit(1.0 + float(best[0]), BodyPose(*(best[1:] * units).tolist()))
 
 
 def _blurred(steep: Samples) -> Samples:
-    """Steepness with the width to which edges are one."""
+    """Gradient profiles, smoothed over the width within which edges count as coincident."""
     sigma = _FINE * SIZE.edge_width
     far = int(np.ceil(4.0 * sigma))
     bell = np.exp(-0.5 * (np.arange(-far, far + 1) / sigma) ** 2)
@@ -147,12 +148,12 @@ def _blurred(steep: Samples) -> Samples:
 
 
 def doubted(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, tuple[Flag, ...]]:
-    """A scale that the apparent size of the body contradicts, with what follows from it.
+    """The scale with its apparent size, a larger uncertainty and a flag where the size contradicts it.
 
     Args:
-        scale: by the ruler.
+        scale: the scale by the ruler.
         body: the body.
-        size: its apparent size over that of its file.
+        size: its apparent size over that of the robot file.
     """
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel

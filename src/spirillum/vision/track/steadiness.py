@@ -1,4 +1,4 @@
-"""Whether camera and ruler stayed where they were: a camera that moves looks like a robot that moves."""
+"""Detection of a moved camera or ruler, which would bias the velocity."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from spirillum.vision.video.frames import Frame
 __all__ = ["camera_flags", "shift_between"]
 
 _STEPS, _STILL = 8, 0.01
-"""Steps of least squares at most, and the change, pixels, at which they end."""
+"""Most Gauss-Newton steps, and the step below which they end, pixels."""
 _THREADS = 2
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
-    """A camera or tank that was moved along the channel during the film.
+    """Flag a camera or tank that moved along the channel during the film.
 
     Args:
-        frames: frames spread over the video, in the order of time.
-        start: what the first look at them has told.
+        frames: frames spread over the video, in order of time.
+        start: result of the first look at them.
         ruled: whether a ruler is in the picture.
     """
     parts = [
@@ -63,7 +63,7 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
 
 
 def _rows_of(start: Start) -> tuple[int, int]:
-    """Rows of the picture in which the robot is seen at any time."""
+    """First and last row of the picture that the robot ever covers."""
     body = start.body
     wide = max(0.5 * body.robot.body.diameter, body.robot.tail.amplitude) + body.robot.tail.wire_diameter
     sides = np.array([[0.0, -wide, 0.0], [0.0, wide, 0.0]])
@@ -73,19 +73,23 @@ def _rows_of(start: Start) -> tuple[int, int]:
 
 
 def shift_between(one: Samples, other: Samples) -> float:
-    """How far a picture lies to the right of another one, pixels, whatever else moves in it.
+    """Shift of a picture to the right of another one, pixels, robust to objects that move in it.
 
-    Of all shifts at which both correlate, the one is taken at which most of the edges fit, by robust least squares.
+    Peaks of the normalised cross-correlation are refined by robust Gauss-Newton image alignment; the shift with the
+    least median residual is taken, or the one nearest to 0 if it fits about as well.
 
     Args:
-        one: the first picture, free of slow changes of brightness, (h, w).
-        other: the second one.
+        one: the first picture, high-pass filtered, (h, w).
+        other: the second picture, (h, w).
     """
     cv2 = required("cv2", "measuring a video", "video")
     inside = slice(STEADINESS.reach, -STEADINESS.reach), slice(STEADINESS.reach, -STEADINESS.reach)
-    alike = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
-    peaks = np.argwhere((alike >= cv2.dilate(alike, np.ones((3, 3)))) & (alike > alike.max() - STEADINESS.peak_range))
-    peaks = peaks[np.argsort(-alike[tuple(peaks.T)])[: STEADINESS.most_peaks]].tolist()
+    correlation = cv2.matchTemplate(other, np.ascontiguousarray(one[inside]), cv2.TM_CCOEFF_NORMED)
+    peaks = np.argwhere(
+        (correlation >= cv2.dilate(correlation, np.ones((3, 3))))
+        & (correlation > correlation.max() - STEADINESS.peak_range)
+    )
+    peaks = peaks[np.argsort(-correlation[tuple(peaks.T)])[: STEADINESS.most_peaks]].tolist()
     slope_u, slope_v = (0.5 * cv2.Sobel(one, cv2.CV_32F, *order, ksize=1)[inside] for order in ((1, 0), (0, 1)))
     steep = np.hypot(slope_u, slope_v)
     edge = steep > np.quantile(steep, STEADINESS.smooth_share)
@@ -93,25 +97,25 @@ def shift_between(one: Samples, other: Samples) -> float:
     found = []
     for row, column in [*peaks, [STEADINESS.reach, STEADINESS.reach]]:
         shift = np.array([column, row], dtype=float) - STEADINESS.reach
-        rest = np.zeros(0)
+        residual = np.zeros(0)
         for _ in range(_STEPS):
             back = np.array([[1.0, 0.0, -shift[0]], [0.0, 1.0, -shift[1]]])
             moved = cv2.warpAffine(other, back, other.shape[::-1], flags=cv2.INTER_CUBIC)
-            rest = moved[inside][edge] - there
-            scale = 3.0 * float(mad_scale(rest)) + 1e-3
-            weight = np.clip(1.0 - (rest / scale) ** 2, 0.0, None) ** 2
+            residual = moved[inside][edge] - there
+            scale = 3.0 * float(mad_scale(residual)) + 1e-3
+            weight = np.clip(1.0 - (residual / scale) ** 2, 0.0, None) ** 2
             normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(2)
-            step = np.clip(np.linalg.solve(normal, slopes.T @ (weight * rest)), -1.0, 1.0)
+            step = np.clip(np.linalg.solve(normal, slopes.T @ (weight * residual)), -1.0, 1.0)
             shift -= step
             if np.abs(step).max() < _STILL:
                 break
-        found.append((float(np.median(np.abs(rest))), float(shift[0])))
+        found.append((float(np.median(np.abs(residual))), float(shift[0])))
     best, near = min(found), min(found, key=lambda one: abs(one[1]))
     return best[1] if best[0] < STEADINESS.clearly_better * near[0] else near[1]
 
 
 def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, int]) -> Samples:
-    """Brightness over that of the surroundings; none where the robot is."""
+    """High-pass filtered brightness; 0 in the rows of the robot."""
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     grey = cv2.cvtColor(still[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
@@ -122,7 +126,7 @@ def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, in
 
 
 def _by_lines(one: Lines, other: Lines, rough: float) -> float:
-    """The shift by the phase of the ruler's lines; which line is which is told by a rough shift."""
+    """The shift by the phase of the ruler's lines, pixels; the rough shift resolves its multiple of the distance."""
     at = {(u, v): number for (u, v), number in zip(one.pixels.tolist(), one.number.tolist(), strict=True)}
     pairs = zip(other.pixels.tolist(), other.number.tolist(), strict=True)
     turns = np.array([number - at[u, v] for (u, v), number in pairs if (u, v) in at])

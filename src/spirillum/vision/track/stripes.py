@@ -1,4 +1,4 @@
-"""How far the body has turned, from the stripes on its seal."""
+"""Rotation angle of the body, from the stripes on its seal."""
 
 from __future__ import annotations
 
@@ -29,33 +29,33 @@ __all__ = ["Stripes"]
 _ROWS = 16
 """Samples along the axis."""
 _BLURRED = 2
-"""Of how many frames one is asked for the blur."""
-_HUMPS = 15
-"""Humps of what shines along the angle."""
+"""Stride of the frames on which the blur is fitted."""
+_HATS = 15
+"""Hat functions in which the sheen is expanded along the angle."""
 
 
 @dataclass
-class _Look:
-    """What the stripes look like in this video."""
+class _Appearance:
+    """Appearance of the stripes in this video."""
 
     palette: Samples
     """Colour of each class, (classes, 3)."""
     shade: Samples
-    """Brightness of a colour at each angle in each channel, and what shines there whatever the colour, (n, 6)."""
+    """Shading factor and additive sheen at each angle, in each channel, (n, 6)."""
     blur: float
-    """Standard deviation, pixels."""
+    """Standard deviation of the blur, pixels."""
     residual: float
-    """Typical residual of a channel, of 255."""
+    """Median residual of a channel, of 255."""
     trust: Samples
-    """Weight of each angle: less where frames differ from what is expected, as under a highlight, (n,)."""
+    """Weight of each angle, (n,); small where residuals are large, as under a highlight."""
 
 
 class Stripes:
-    """Reads the angle by which the body has turned about +x, modulo the period of its stripes.
+    """Reads the rotation angle of the body about +x, modulo the period of its stripes.
 
-    The picture is sampled on the surface of the seal where the optics show it, averaged along the axis without the
-    brightest and darkest quarters, and compared with the stripes at every angle. Colours, shading and blur are those
-    of the video: `learn` finds them, starting from the named colours.
+    The picture is sampled on the projected surface of the seal and averaged along the axis over the interquartile
+    range. The resulting colour profile is fitted by the stripes at every angle. `learn` finds colours, shading and blur
+    in the video, starting from the named colours.
     """
 
     def __init__(self, robot: Robot, setup: Setup, optics: Optics) -> None:
@@ -64,7 +64,7 @@ class Stripes:
         self.names = tuple(dict.fromkeys(self.stripes))
         self.period = pattern_period(self.stripes) if self.stripes else 2.0 * np.pi
         self.order = np.array([self.names.index(name) for name in self.stripes], dtype=np.int64)
-        self.look: _Look | None = None
+        self.appearance: _Appearance | None = None
         self.fits = False
         self.flags: tuple[Flag, ...] = ()
         count = 1 + 2 * round(STRIPES.reach / STRIPES.step)
@@ -82,10 +82,10 @@ class Stripes:
         )
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
-        """Find colours, shading and blur of the stripes in some frames of the video.
+        """Learn colours, shading and blur of the stripes from some frames of the video.
 
         Args:
-            samples: pictures, 8-bit RGB (h, w, 3), and where the body is in each.
+            samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body in each.
         """
         if len(self.names) < 2 or self.robot.seal is None:
             sentence = "the robot has no stripes, so that its body's rotation cannot be seen; it is not given"
@@ -105,19 +105,19 @@ class Stripes:
         seen_steep = np.where(steep[..., None], profiles, np.nan)
         palette, verdict = order_seen(seen_steep, self.angles, palettes, self.stripes, self.names)
         clear = without_glare(profiles, (palette, *palettes[1:]))
-        self.look = self._refined(profiles, clear, scales, palette)
-        least = self._typical_loss(profiles, scales, self.look)
+        self.appearance = self._refined(profiles, clear, scales, palette)
+        least = self._typical_loss(profiles, scales, self.appearance)
         if least > STRIPES.good:
             other = self._refined(profiles, clear, scales, start)
             loss = self._typical_loss(profiles, scales, other)
-            self.look, least = (other, loss) if loss < least else (self.look, least)
-        rightly = named_rightly(self.look.palette, start)
+            self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
+        rightly = named_rightly(self.appearance.palette, start)
         stated = 2.0 * np.pi / len(self.stripes)
         wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:]), stated) / stated
         counted = not abs(np.log(wide)) > STRIPES.width_range
         if least < STRIPES.fits and rightly and counted:
             self.fits = True
-            return  # the order given fits, with the colours that belong to its names
+            return  # the stated order fits, with colours that match the names
         if verdict in ("reversed", "other"):
             how = "in the reversed order" if verdict == "reversed" else "in another order"
             sentence = (
@@ -134,24 +134,22 @@ class Stripes:
         else:
             self.fits = True
 
-    def _typical_loss(self, profiles: Samples, scales: Samples, look: _Look) -> float:
-        """Median loss over that of an even colour."""
-        fits = [self._fit(p, s, look) for p, s in zip(profiles, scales, strict=True)]
+    def _typical_loss(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> float:
+        """Median over the frames of the loss relative to that of a uniform colour."""
+        fits = [self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)]
         return float(np.median([a[2] / a[4] if np.isfinite(a[0]) else 1.0 for a in fits]))
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
-        """Angle by which the body has turned about +x and its standard error, rad; NaN where it cannot be read.
-
-        The angle is modulo `period`.
+        """Rotation angle of the body about +x, modulo `period`, and its standard error, rad; NaN where unreadable.
 
         Args:
             image: the picture, 8-bit RGB (h, w, 3).
-            pose: where the body is in it.
+            pose: pose of the body.
         """
-        if self.look is None:
+        if self.appearance is None:
             return np.nan, np.nan
         profile, scale = self._profile(image, pose)
-        answer = self._fit(profile, scale, self.look)
+        answer = self._fit(profile, scale, self.appearance)
         loss, other, flat = answer[2:5]
         if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
             return np.nan, np.nan
@@ -164,7 +162,7 @@ class Stripes:
         return Flag("stripes-unreadable", sentence, ("body_rotation_rate",))
 
     def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
-        """Colours along the angle, (n, 3), and how many pixels a radian is there, (n,); 0 where it faces away."""
+        """Colour profile along the angle, (n, 3), and pixels per radian, (n,); 0 where the surface faces away."""
         ends = seen(self._surface, pose, self.optics).reshape(2, -1, 2)
         first, last = self._between @ ends[0], self._between @ ends[1]
         along = self._slope @ (0.5 * (ends[0] + ends[1]))
@@ -179,51 +177,55 @@ class Stripes:
         return profile, scale
 
     def _dazzled(self, profile: Samples) -> np.ndarray:
-        """Angles at which wide glare hides every colour, and its halo, (n,)."""
+        """Mask of the angles under wide glare and its halo, (n,)."""
         white = profile.min(axis=1) > STRIPES.white
         if np.count_nonzero(white) < STRIPES.wide_glare:
             return np.zeros(white.shape, dtype=bool)
         return np.asarray(np.convolve(white, np.ones(2 * STRIPES.halo + 1), mode="same") > 0.5)
 
-    def _fit(self, profile: Samples, scale: Samples, look: _Look) -> Samples:
-        """The answer of `stripe_fit`; NaN where too little is in view."""
-        edges = np.diff(look.palette[np.append(self.order, self.order[0])], axis=0)
-        cut = max(STRIPES.cut * look.residual, STRIPES.edge_cut * float(np.median(np.linalg.norm(edges, axis=1))))
+    def _fit(self, profile: Samples, scale: Samples, appearance: _Appearance) -> Samples:
+        """The result of `stripe_fit`; NaN where too little is in view."""
+        edges = np.diff(appearance.palette[np.append(self.order, self.order[0])], axis=0)
+        cut = max(STRIPES.cut * appearance.residual, STRIPES.edge_cut * float(np.median(np.linalg.norm(edges, axis=1))))
         answer, losses = np.full(8, np.nan), np.empty(max(24, round(self.period / np.deg2rad(4.0))))
-        settings = self.period, STRIPES.lamp_tint, cut, 0.3 * look.residual, look.blur
-        known = profile, scale, look.trust, self.angles, look.shade, self.order, look.palette
+        settings = self.period, STRIPES.lamp_tint, cut, 0.3 * appearance.residual, appearance.blur
+        known = profile, scale, appearance.trust, self.angles, appearance.shade, self.order, appearance.palette
         stripe_fit(*known, settings, losses, answer)
         return answer
 
-    def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Look:
-        """Colours, shading and blur with which the stripes fit best; what shines is learnt once the stripes are."""
+    def _refined(self, profiles: Samples, clear: Samples, scales: Samples, palette: Samples) -> _Appearance:
+        """Colours, shading and blur by alternating fits; profiles with glare enter only the last of them."""
         even = np.column_stack([np.ones((self.angles.size, 3)), np.zeros((self.angles.size, 3))])
-        look = _Look(palette, even, 1.0, STRIPES.first_residual, np.ones(self.angles.size))
+        appearance = _Appearance(palette, even, 1.0, STRIPES.first_residual, np.ones(self.angles.size))
         for repeat in range(STRIPES.repeats):
             if repeat in (2, STRIPES.repeats - 1):
                 losses = []
                 for blur in STRIPES.blurs:
-                    trial = _Look(look.palette, look.shade, blur, look.residual, look.trust)
+                    trial = _Appearance(
+                        appearance.palette, appearance.shade, blur, appearance.residual, appearance.trust
+                    )
                     some = zip(profiles[::_BLURRED], scales[::_BLURRED], strict=True)
                     losses.append(np.nansum([self._fit(p, s, trial)[2] for p, s in some]))
-                look.blur = STRIPES.blurs[int(np.argmin(losses))]
-            look = self._relearned(clear if repeat < STRIPES.repeats_without_glare else profiles, scales, look)
-        return look
+                appearance.blur = STRIPES.blurs[int(np.argmin(losses))]
+            appearance = self._relearned(
+                clear if repeat < STRIPES.repeats_without_glare else profiles, scales, appearance
+            )
+        return appearance
 
-    def _relearned(self, profiles: Samples, scales: Samples, look: _Look) -> _Look:
-        """Colours of the classes and shading along the angle, from frames whose angles are known by now."""
+    def _relearned(self, profiles: Samples, scales: Samples, appearance: _Appearance) -> _Appearance:
+        """Colours of the classes and shading along the angle, from the best frames at their fitted angles."""
         width = 2.0 * np.pi / len(self.order)
-        sums, weights = np.zeros_like(look.palette), np.zeros(len(look.palette))
+        sums, weights = np.zeros_like(appearance.palette), np.zeros(len(appearance.palette))
         models, wanted, good_at, residuals, squares = [], [], [], [], []
-        fits = [self._fit(p, s, look) for p, s in zip(profiles, scales, strict=True)]
+        fits = [self._fit(p, s, appearance) for p, s in zip(profiles, scales, strict=True)]
         losses = np.array([a[2] / a[4] if np.isfinite(a[0]) else np.inf for a in fits])
         best = np.argsort(losses)[: max(3, int(0.8 * np.isfinite(losses).sum()))]
-        shade, sheen = look.shade[:, :3], look.shade[:, 3:]
+        shade, sheen = appearance.shade[:, :3], appearance.shade[:, 3:]
         for which in best[np.isfinite(losses[best])]:
             profile, scale, answer = profiles[which], scales[which], fits[which]
             model = np.empty_like(shade)
-            blur = np.clip(look.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
-            stripes_at(self.angles, blur, answer[0], self.order, look.palette, model)
+            blur = np.clip(appearance.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
+            stripes_at(self.angles, blur, answer[0], self.order, appearance.palette, model)
             gain = answer[5:8]
             valid = np.isfinite(profile).all(axis=1) & (scale > 0.15 * scale.max())
             level = np.where(valid[:, None], profile, 0.0) / gain
@@ -239,68 +241,68 @@ class Stripes:
             edge = np.abs(place - np.round(place)) * width
             inside = kept & (edge > 2.0 * blur) & (scale > 0.4 * scale.max())
             classes = self.order[np.floor(place).astype(int) % len(self.order)]
-            clear = inside & (sheen.mean(axis=1) < 0.5 * sheen.mean(axis=1).max() + 4.0)  # where little shines
-            for index in range(len(look.palette)):
+            clear = inside & (sheen.mean(axis=1) < 0.5 * sheen.mean(axis=1).max() + 4.0)  # where the sheen is weak
+            for index in range(len(appearance.palette)):
                 mine = clear & (classes == index)
                 sums[index] += np.sum((level[mine] - sheen[mine]) / shade[mine], axis=0)
                 weights[index] += mine.sum()
         if not models:
-            return look
+            return appearance
         enough = weights > 5
-        palette = look.palette.copy()
+        palette = appearance.palette.copy()
         palette[enough] = np.maximum(sums[enough] / weights[enough, None], 0.0)
         light = _light(self.angles, np.array(models), np.array(wanted), np.array(good_at))
         rough = np.sqrt(np.median(np.array(squares), axis=0))
         rough = np.convolve(np.pad(rough, 2, mode="edge"), np.ones(5) / 5.0, mode="valid")
         usual = np.median(rough) + 1.0
         trust = 1.0 / (1.0 + STRIPES.doubt * (rough / usual) ** 2)
-        return _Look(palette, light, look.blur, float(np.median(residuals)), trust / trust.max())
+        return _Appearance(palette, light, appearance.blur, float(np.median(residuals)), trust / trust.max())
 
 
 def _light(angles: Samples, models: Samples, wanted: Samples, kept: np.ndarray) -> Samples:
-    """How the surface is lit along the angle: as a factor of its colour, and what shines on it in white.
+    """Shading factor and sheen along the angle, (n, 6), by regularised linear least squares.
 
-    Both are smooth: a short series and a row of humps, held to even light where little was seen. Colours tell them
-    apart even where the body hardly turned: what shines greys them.
+    The factor is a polynomial, the sheen a sum of hat functions with a prior at zero. Differences of colour separate
+    the two even where the body hardly turned, as the sheen is nearly white.
 
     Args:
         angles: rad, (n,).
-        models: colours of the stripes in some frames, (f, n, 3).
-        wanted: the picture's colours there, (f, n, 3).
-        kept: which of them count, (f, n).
+        models: model colours of the stripes in some frames, (f, n, 3).
+        wanted: observed colours, (f, n, 3).
+        kept: mask of the samples used, (f, n).
     """
     s = angles / STRIPES.reach
     series = np.stack([s**power for power in range(5)], axis=1)
-    centres = np.linspace(-1.0, 1.0, _HUMPS)
-    humps = np.maximum(0.0, 1.0 - np.abs(s[:, None] - centres) / (centres[1] - centres[0]))
-    count = 5 + 4 * _HUMPS  # series, white humps, and what each channel has besides
+    centres = np.linspace(-1.0, 1.0, _HATS)
+    hats = np.maximum(0.0, 1.0 - np.abs(s[:, None] - centres) / (centres[1] - centres[0]))
+    count = 5 + 4 * _HATS  # polynomial, white sheen, and tint of the sheen in each channel
     normal, right = np.zeros((count, count)), np.zeros(count)
     for model, level, good in zip(models, wanted, kept, strict=True):
         for channel in range(3):
             basis = np.zeros((angles.size, count))
             basis[:, :5] = series * model[:, channel : channel + 1] / 100.0
-            basis[:, 5 : 5 + _HUMPS] = humps
-            basis[:, 5 + _HUMPS * (1 + channel) : 5 + _HUMPS * (2 + channel)] = humps
+            basis[:, 5 : 5 + _HATS] = hats
+            basis[:, 5 + _HATS * (1 + channel) : 5 + _HATS * (2 + channel)] = hats
             basis = basis[good]
             normal += basis.T @ basis
             right += basis.T @ level[good, channel]
     share = float(np.sum(kept)) * 3.0 / angles.size
-    held = np.concatenate(
-        [[0.0], np.full(4, 1.0), np.full(_HUMPS, STRIPES.sheen_prior), np.full(3 * _HUMPS, STRIPES.tint_prior)]
+    prior = np.concatenate(
+        [[0.0], np.full(4, 1.0), np.full(_HATS, STRIPES.sheen_prior), np.full(3 * _HATS, STRIPES.tint_prior)]
     )
-    normal += np.diag(held * share + 1e-6)
-    rough = np.diff(np.eye(_HUMPS), 2, axis=0)
+    normal += np.diag(prior * share + 1e-6)
+    rough = np.diff(np.eye(_HATS), 2, axis=0)
     normal[5:, 5:] += STRIPES.roughness_prior * share * np.kron(np.eye(4), rough.T @ rough)
     found = np.linalg.solve(normal, right)
     shade = np.clip(series @ found[:5] / 100.0, 0.2, 3.0)
-    white, *tints = found[5:].reshape(4, _HUMPS)
-    sheen = np.maximum(np.stack([humps @ (white + tint) for tint in tints], axis=1), 0.0)
+    white, *tints = found[5:].reshape(4, _HATS)
+    sheen = np.maximum(np.stack([hats @ (white + tint) for tint in tints], axis=1), 0.0)
     middle = shade[np.abs(s) < 0.6].mean()
     return np.column_stack([shade / middle] * 3 + [sheen])
 
 
 def _spline(coarse: Samples, fine: Samples) -> tuple[Samples, Samples]:
-    """Matrices that take values at some places to a cubic spline's values and slopes at others."""
+    """Matrices that map values at the coarse nodes to values and slopes of their cubic spline at the fine ones."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(coarse, np.eye(coarse.size))

@@ -1,4 +1,4 @@
-"""The phase of the tail on each frame, from the wire's picture: a travelling wave."""
+"""Phase of the tail on each frame: a travelling wave fitted to the image of the wire."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ __all__ = ["TailWave"]
 
 _TAIL = ("tail_rotation_rate",)
 _COARSE = 13
-"""Places along the tail at which the optics are asked."""
+"""Stations along the tail at which the optics are evaluated."""
 _CONTRASTS = ((-1, -1, -1), (1, 1, 1), (0, 0, -1), (0, 0, 1), (1, 0, -1), (-1, 0, 1), (0, -1, 0), (0, 1, 0))
-"""Weights of red, green and blue that are tried first: a darker, brighter, more yellow, ... wire than its sides."""
+"""First candidates of the contrast, as weights of red, green and blue: a darker, brighter, more yellow, ... wire."""
 _FACTORS = np.arange(0.60, 1.66, 0.03)
-"""Wavelengths that are tried, over that of the robot file."""
+"""Candidate wavelengths, over that of the robot file."""
 _AMPLITUDES = (0.5, 0.63, 0.8, 1.0, 1.25, 1.6, 2.0)
-"""Amplitudes that are tried with them where the tail does not fit, over that of the robot file."""
+"""Candidate amplitudes where the tail does not fit, over that of the robot file."""
 
 
 class _Strip(NamedTuple):
-    """Where the tail is in the picture."""
+    """A grid of pixels along and across the tail."""
 
     middle: Samples
-    """Pixel of the axis in each row, (rows, 2)."""
+    """Pixel of the tail's axis in each row, (rows, 2)."""
     across: Samples
-    """Pixels from one column to the next, (rows, 2)."""
+    """Step from one column to the next, pixels, (rows, 2)."""
     tilt: Samples
-    """How the picture moves along (e) and across (f) and grows (g) with height, (rows, 3)."""
+    """Derivatives with height of the shift along (e) and across (f) and of the magnification (g), (rows, 3)."""
 
 
 class TailWave:
     """Reads the phase phi of the tail in the lab, modulo 2 pi.
 
-    Known are the wave's length, amplitude, taper and hand from the robot; unknown the phase, and a small sideways
-    offset and tilt of the tail. A picture shows which way the wave travels; the hand makes a sense of rotation of it.
-    The hand itself shows too, weakly: what is higher looks larger and further from the middle of the picture.
+    Wavelength, amplitude, taper and handedness are those of the robot; phase, lateral offset and tilt are fitted. The
+    direction in which the wave travels and the handedness determine the sense of rotation. Perspective reveals the
+    handedness weakly: higher points appear larger and further from the centre of the picture.
     """
 
     period = 2.0 * np.pi
@@ -90,10 +90,10 @@ class TailWave:
         self._slope = np.gradient(np.eye(_COARSE), coarse[1] - coarse[0], axis=0, edge_order=2)
 
     def learn(self, samples: Sequence[tuple[np.ndarray, BodyPose]]) -> None:
-        """Find out how the wire differs from what is around it, and whether it is the robot's.
+        """Learn the contrast of the wire to its surroundings, and check its shape against the robot file.
 
         Args:
-            samples: pictures, 8-bit RGB (h, w, 3), and where the body is in each.
+            samples: pictures, 8-bit RGB (h, w, 3), and the pose of the body in each.
         """
         strips = [(image, self._strip(pose)) for image, pose in samples]
         best, chosen = 0.0, None
@@ -111,7 +111,7 @@ class TailWave:
             return
         for _ in range(2):
             self.usual = 0.0
-            self._sharpen(strips)
+            self._refit_contrast(strips)
         fits = np.array([self._fit(image, strip)[0] for image, strip in strips])
         readable = fits[:, 2] > TAIL.least_share
         self.readable = float(np.mean(readable))
@@ -120,11 +120,11 @@ class TailWave:
             self._flags = [self._unseen()]
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
-        """Phase of the tail and its standard error, rad; NaN where it cannot be read.
+        """Phase of the tail and its standard error, rad; NaN where it is unreadable.
 
         Args:
             image: the picture, 8-bit RGB (h, w, 3).
-            pose: where the body is in it.
+            pose: pose of the body.
         """
         found, hand = self._reading(image, pose)
         if hand is not None:
@@ -132,11 +132,11 @@ class TailWave:
         return found
 
     def reads(self, image: np.ndarray, pose: BodyPose) -> bool:
-        """Whether a tail like the robot's is there; nothing is kept of it."""
+        """Whether a tail like the robot's is found at a pose; does not change the state of the reader."""
         return bool(np.isfinite(self._reading(image, pose)[0][0]))
 
     def _reading(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float] | None]:
-        """Phase and its error, and what is said of the hand."""
+        """Phase with its standard error, and the frame's evidence on handedness; None without evidence."""
         nothing = (np.nan, np.nan), None
         if self.contrast is None:
             return nothing
@@ -148,7 +148,7 @@ class TailWave:
 
     @property
     def flags(self) -> tuple[Flag, ...]:
-        """What was odd, including the hand that the frames read so far show."""
+        """Warnings, including that on the handedness seen on the frames read so far."""
         flags = list(self._flags)
         if self.handedness() == -1:
             hand = self.robot.tail.handedness
@@ -160,13 +160,13 @@ class TailWave:
         return tuple(flags)
 
     def handedness(self) -> int:
-        """1 where perspective shows the hand of the robot file, -1 where the other one, 0 where it does not show."""
+        """Handedness by perspective: 1 as in the robot file, -1 the opposite one, 0 undecided."""
         if len(self._hand) < 20:
             return 0
         top, bottom = np.array(self._hand).T
         misfit = top.sum() / bottom.sum()
-        rest = top - misfit * bottom
-        blocks = np.array_split(rest, min(12, rest.size // 5))  # frames near each other err alike
+        residual = top - misfit * bottom
+        blocks = np.array_split(residual, min(12, residual.size // 5))  # errors of neighbouring frames are correlated
         sums = np.array([block.sum() for block in blocks])
         error = np.sqrt(np.sum(sums**2)) / bottom.sum()
         if abs(misfit + 1.0) < max(4.0 * error, 0.35):
@@ -204,7 +204,7 @@ class TailWave:
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
-        """How far the best phase stands out, in units of what the strip has elsewhere."""
+        """Contrast of the best phase against the others, over the root mean square ridge of the strip."""
         ridge = self._ridge(image, strip, contrast)
         scores = self._scores(ridge, strip, self.wave)
         if not np.isfinite(scores).all():
@@ -212,7 +212,7 @@ class TailWave:
         return float((scores.max() - np.median(scores)) / (np.sqrt(np.nanmean(ridge**2)) + 0.5))
 
     def _fit(self, image: np.ndarray, strip: _Strip) -> tuple[Samples, float]:
-        """The answer of `wave_fit` and the best score of another phase over the best one."""
+        """The result of `wave_fit`, and the best score of a distant phase over the best one."""
         answer = np.full(10, np.nan)
         answer[2] = 0.0
         if self.contrast is None:
@@ -230,7 +230,7 @@ class TailWave:
         return answer, float(scores[apart].max() / scores[best])
 
     def _curve(self, strip: _Strip, answer: Samples) -> Samples:
-        """Pixels of the fitted wire, (rows, 2), to first order in the height."""
+        """Pixels of the fitted wire, (rows, 2), to first order in height."""
         wave = self.wave
         r = wave[3] * (1.0 - np.exp(-(wave[2] if wave[2] > 0 else 1e12) * self.xi))
         a = wave[0] * self.xi + wave[1] + answer[0]
@@ -241,8 +241,8 @@ class TailWave:
         along = np.gradient(strip.middle, self.xi, axis=0)
         return np.asarray(strip.middle + sideways[:, None] * strip.across + (e * z)[:, None] * along)
 
-    def _sharpen(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> None:
-        """The contrast of the wire to what is on both sides of it, in the colours that tell them apart best."""
+    def _refit_contrast(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> None:
+        """Refit the contrast: the linear discriminant of the wire's colours against those of both its sides."""
         steps, spreads, peaks = [], [], []
         for image, strip in strips:
             answer, rival = self._fit(image, strip)
@@ -274,12 +274,12 @@ class TailWave:
         self.usual = 0.5 * float(np.median(peaks)) if peaks else 0.0
 
     def _check_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]], fits: Samples, readable: float) -> None:
-        """Compare other wavelengths and amplitudes with those of the robot file."""
+        """Flag a wavelength or amplitude that fits better than that of the robot file."""
         if self.contrast is None:
             return
         few = strips[:: max(1, len(strips) // 12)]
         ridges = [(self._ridge(image, strip, self.contrast), strip) for image, strip in few]
-        scores = self._likeness(ridges, 1.0)
+        scores = self._scores_by_wavelength(ridges, 1.0)
         if scores is None:
             return
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
@@ -301,16 +301,16 @@ class TailWave:
                 self._flags.append(Flag("tail-does-not-fit", sentence))
 
     def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> str:
-        """The wavelength and amplitude that look likeliest, in whatever colours, in words; empty if none does."""
+        """The best-fitting wavelength and amplitude over all candidate contrasts, in words; empty if none fits."""
         tail, found = self.robot.tail, []
         for weights in _CONTRASTS:
             contrast = np.array(weights) / np.linalg.norm(weights)
             ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
             ridges = [(ridge / (np.sqrt(np.mean(np.nan_to_num(ridge) ** 2)) + 0.5), strip) for ridge, strip in ridges]
             for amplitude in _AMPLITUDES:
-                likeness = self._likeness(ridges, amplitude)
-                if likeness is not None:
-                    found.append((likeness.max(), _FACTORS[int(np.argmax(likeness))], amplitude))
+                by_wavelength = self._scores_by_wavelength(ridges, amplitude)
+                if by_wavelength is not None:
+                    found.append((by_wavelength.max(), _FACTORS[int(np.argmax(by_wavelength))], amplitude))
         score, wavelength, amplitude = max(found, default=(0.0, 1.0, 1.0))
         if score <= 0.0:
             return ""
@@ -321,8 +321,8 @@ class TailWave:
                 seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
         return f" ({'; '.join(seen)})" if seen else ""
 
-    def _likeness(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
-        """How well waves of `_FACTORS` times the wavelength fit; None where too little of the tail is in view."""
+    def _scores_by_wavelength(self, ridges: Sequence[tuple[Samples, _Strip]], amplitude: float) -> Samples | None:
+        """Scores of waves of `_FACTORS` times the wavelength; None where too little of the tail is in view."""
         found = []
         for ridge, strip in ridges:
             waves = [self.wave * np.array([1.0 / factor, 1.0 / factor, 1.0, amplitude]) for factor in _FACTORS]

@@ -1,13 +1,13 @@
-"""Phase unwrapping: from angles modulo a period to continuous angles, with a watch for aliasing.
+"""Phase unwrapping: from angles modulo a period to continuous angles, with detection of aliasing.
 
-At a constant frame rate, rates that differ by whole periods a frame cannot be told apart (aliasing). The smallest is
-taken. Signs of a faster one are looked for: a step from frame to frame near half a period, steps without order, uneven
-times that contradict it, and a body that turns with its tail instead of against it.
+At a constant frame rate, rates that differ by whole periods per frame are aliases; the smallest one is taken. Aliasing
+is detected by steps near half a period, steps without order, uneven frame times that another alias fits better, and a
+body that turns in the sense of its tail.
 """
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -16,51 +16,27 @@ from spirillum.robot.robot import Robot
 from spirillum.robust import least_squares_line, running_median
 from spirillum.units import show
 from spirillum.vision.flag import Flag
-from spirillum.vision.setup import Setup, stripes_of
-from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.constants import UNWRAPPING
+from spirillum.vision.track.motion import Motion
 
-__all__ = ["Resolvable", "contradictions", "nothing_moves", "nyquist", "unwrapped"]
-
+__all__ = ["contradictions", "nothing_moves", "unwrapped"]
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
 
 
-class Resolvable(NamedTuple):
-    """Largest rates that a camera resolves, rad/s."""
-
-    tail: float
-    """Half a turn of the tail a frame."""
-    body: float
-    """Half a period of the stripes a frame; NaN without stripes."""
-
-
-def nyquist(setup: Setup, robot: Robot, frames_per_second: float) -> Resolvable:
-    """Largest rates of tail and body whose sense a camera resolves, rad/s.
-
-    Args:
-        setup: the setup; its stripes stand before those of the robot.
-        robot: the robot.
-        frames_per_second: 1/s.
-    """
-    stripes = stripes_of(setup, robot)
-    body = 0.5 * pattern_period(stripes) * frames_per_second if len(set(stripes)) > 1 else np.nan
-    return Resolvable(np.pi * frames_per_second, body)
-
-
 def unwrapped(
     time: Samples, angle: Samples, error: Samples, period: float, part: _Part = "body"
 ) -> tuple[Samples, tuple[Flag, ...]]:
-    """Continuous angles, NaN where they are unknown or outliers, and flags.
+    """Continuous angles, NaN where unknown or outliers, and flags.
 
-    Each angle is put into the turn nearest to its prediction from the ones before and their times, over gaps too.
+    Each angle gets the whole periods that bring it nearest to its prediction by an alpha-beta filter, also after gaps.
 
     Args:
         time: time of each frame, s, (n,).
-        angle: angle modulo `period`, rad, NaN where not read, (n,).
-        error: standard error of each, rad, (n,).
-        period: of the angle, rad.
+        angle: angle modulo `period`, rad, (n,); NaN where unreadable.
+        error: standard error of each angle, rad, (n,).
+        period: period of the angle, rad.
         part: `body` or `tail`, for the flags.
     """
     out = np.full(angle.shape, np.nan)
@@ -78,7 +54,7 @@ def unwrapped(
         flags.append(_too_fast(part, rate, dt, period))
     elif (other := _better_alias(t, a, period, dt, rate)) is not None:
         flags.append(_other_rate(part, rate, other))
-    elif order < least and _local_order(t, a, period, dt) < least:  # a start or stop is in order at each time
+    elif order < least and _local_order(t, a, period, dt) < least:  # at a start or stop, steps agree locally
         flags.append(_jumps(part))
     values, doubtful = _followed(t, a, error[known], period, dt)
     if doubtful:
@@ -96,7 +72,7 @@ def unwrapped(
 
 
 def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples) -> Samples:
-    """Mean cosine of the steps' residuals at each rate, 1 at best."""
+    """Mean cosine of the residual phases of the steps at each trial rate, 1 at best."""
     steps, spans = np.diff(a), np.diff(t)
     near = (spans > 0) & (spans < 3.5 * dt)
     turns = (steps[near] - rates[:, None] * spans[near]) / period
@@ -104,7 +80,7 @@ def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples)
 
 
 def _rate(t: Samples, a: Samples, period: float, dt: float) -> tuple[float, float]:
-    """The rate within half a period a frame of the largest mean cosine, and that cosine."""
+    """The rate below half a period per frame with the largest mean cosine, and that cosine."""
     rates = np.linspace(-0.5, 0.5, 241) * period / dt
     length = _resultant(t, a, period, dt, rates)
     best = rates[int(np.argmax(length))]
@@ -114,13 +90,13 @@ def _rate(t: Samples, a: Samples, period: float, dt: float) -> tuple[float, floa
 
 
 def _local_order(t: Samples, a: Samples, period: float, dt: float) -> float:
-    """How well the steps agree within short stretches."""
+    """Median over short windows of the largest mean cosine."""
     starts = range(0, max(1, t.size - 10), 20)
     return float(np.median([_rate(t[k : k + 20], a[k : k + 20], period, dt)[1] for k in starts]))
 
 
 def _better_alias(t: Samples, a: Samples, period: float, dt: float, rate: float) -> float | None:
-    """A rate that is greater by whole periods a frame and that uneven times agree with better."""
+    """An alias of the rate that uneven frame times fit significantly better; None if there is none."""
     others = rate + np.array([-3, -2, -1, 1, 2, 3]) * period / dt
     length = np.array(
         [_resultant(t, a, period, dt, other + np.linspace(-0.02, 0.02, 41) * period / dt).max() for other in others]
@@ -134,7 +110,7 @@ def _better_alias(t: Samples, a: Samples, period: float, dt: float, rate: float)
 def _followed(
     t: Samples, a: Samples, error: Samples, period: float, dt: float
 ) -> tuple[Samples, tuple[float, float] | None]:
-    """Each angle in the turn nearest to its prediction (an alpha-beta filter), NaN for outliers; the first lost gap."""
+    """Unwrapped angles by an alpha-beta filter, NaN for outliers; the first gap over which periods may be lost."""
     values = np.full(a.size, np.nan)
     outliers = 0
     lost = None
@@ -165,7 +141,7 @@ def _followed(
 
 
 def _first_good(t: Samples, a: Samples, period: float, rate: float) -> int:
-    """The first angle that the next ones agree with."""
+    """Index of the first angle that is consistent with the next ones."""
     for k in range(min(20, a.size - 3)):
         ahead = a[k] + rate * (t[k + 1 : k + 6] - t[k])
         miss = (a[k + 1 : k + 6] - ahead) / period
@@ -175,7 +151,7 @@ def _first_good(t: Samples, a: Samples, period: float, rate: float) -> int:
 
 
 def _leaps(t: Samples, values: Samples, dt: float) -> int:
-    """Steps from reading to reading that are far from those around them."""
+    """Number of outliers among the steps between neighbouring angles, against their running median."""
     known = np.isfinite(values)
     steps, spans = np.diff(values[known]), np.diff(t[known])
     if steps.size < UNWRAPPING.leap_window:
@@ -231,7 +207,7 @@ def _other_rate(part: _Part, rate: float, other: float) -> Flag:
 
 
 def _slope(time: Samples, value: Samples) -> tuple[float, float]:
-    """Rate of an angle or place, and how far it went; 0 where unknown."""
+    """Rate of a series by least squares, and its total change; 0 where unknown."""
     known = np.isfinite(value)
     if known.sum() < 4:
         return 0.0, 0.0
@@ -240,18 +216,14 @@ def _slope(time: Samples, value: Samples) -> tuple[float, float]:
     return rate, rate * float(t[-1] - t[0])
 
 
-def nothing_moves(
-    time: Samples, body_angle: Samples, tail_phase: Samples, x: Samples, robot: Robot
-) -> tuple[Flag, ...]:
-    """Something that neither moves nor turns and has no tail: it may be a part of the background.
+def nothing_moves(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
+    """Flag an object that neither moves nor turns and has no tail: it may belong to the background.
 
     Args:
-        time: s, (n,).
-        body_angle: unwrapped, rad, (n,).
-        tail_phase: unwrapped, rad, (n,).
-        x: place along the channel, m, (n,).
+        motion: the robot's motion.
         robot: the robot.
     """
+    time, x, body_angle, tail_phase = motion
     if time.size < UNWRAPPING.fewest_frames:
         return ()
     moved, turned = (abs(_slope(time, values)[1]) for values in (x, body_angle))
@@ -264,24 +236,20 @@ def nothing_moves(
     return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
 
 
-def contradictions(
-    time: Samples, body_angle: Samples, tail_phase: Samples, x: Samples, robot: Robot, hand_seen: int = 0
-) -> tuple[Flag, ...]:
-    """Rates that no free swimmer has: a sign of a rate too fast for the camera, or of a wrong robot file.
+def contradictions(motion: Motion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:
+    """Flag rates that no torque-free swimmer has: signs of aliasing, or of a wrong robot file.
 
-    Without an outer torque the body turns against its tail; a tail that turns forward drives forward, and no further
-    than it would without a body.
+    Without an external torque the body counter-rotates. The tail propels in the sense of its rotation and handedness,
+    and its advance per turn does not exceed that of a tail without body.
 
     Args:
-        time: s, (n,).
-        body_angle: unwrapped, rad, (n,).
-        tail_phase: unwrapped, rad, (n,).
-        x: place along the channel, m, (n,).
+        motion: the robot's motion.
         robot: the robot.
-        hand_seen: `TailWave.handedness()`.
+        hand_seen: handedness by perspective, as of `TailWave.handedness`.
     """
+    time, x, body_angle, tail_phase = motion
     if robot.drive is not None and robot.drive.joint == "fixed":
-        return ()  # body and tail are one: they turn together
+        return ()  # body and tail are one rigid body
     body, body_turned = _slope(time, body_angle)
     tail, tail_turned = _slope(time, tail_phase)
     _, moved = _slope(time, x)
@@ -311,7 +279,7 @@ def contradictions(
 
 
 def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, ...]:
-    """A way that no tail drives which turns as this one seems to."""
+    """Flag a displacement that the measured rotation of the tail cannot produce."""
     turns, what = abs(tail_turned) / (2 * np.pi), "the tail is too fast for this frame rate"
     if abs(tail_turned) > UNWRAPPING.turning and moved * tail_turned * robot.hand < 0:
         why, what = "moves against the sense in which its tail seems to turn", f"{what}, tail.handedness is wrong"
@@ -328,9 +296,9 @@ def _not_driven(moved: float, tail_turned: float, robot: Robot) -> tuple[Flag, .
 
 
 def _largest_advance(robot: Robot) -> float:
-    """Advance of the tail alone in a turn, m: the largest that resistive force theory allows (Gray and Hancock 1955).
+    """Advance of a tail without body per turn, m, by resistive force theory (Gray and Hancock 1955): an upper bound.
 
-    A helix of angle b, tan b = k B_o, which no force acts on, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its
+    A force-free helix of angle b, tan b = k B_o, advances (1 - g) sin^2 b / (g cos^2 b + sin^2 b) of its
     wavelength, with g = c_t/c_n no less than 1/2.
     """
     tail = robot.tail

@@ -1,4 +1,4 @@
-"""What a video shows that whoever uses its numbers has to know: two robots, gaps, a robot that leaves, glare."""
+"""Warnings on visibility: second robots, dropped frames, a robot out of view, hidden edges, wrong direction."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["EVERYTHING", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turn
 
 _THREADS = 2
 EVERYTHING = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
-"""All that a track gives."""
+"""All rates of a track."""
 
 
 def rivals_in(
@@ -29,13 +29,13 @@ def rivals_in(
     found: Sequence[list[Candidate]],
     chosen: Sequence[Candidate | None],
 ) -> list[tuple[np.ndarray, BodyPose]]:
-    """Frames on which another place stands out as the robot's does, and where; none unless it does on most of them.
+    """Frames with a second detection as clear as the robot's, and its pose; empty unless they are frequent.
 
     Args:
         body: the robot's body.
         images: the frames that were searched, 8-bit RGB.
         found: candidates of each frame.
-        chosen: the one that was taken for the robot.
+        chosen: the candidate taken for the robot, None where there is none.
     """
     half, rivals, count = 0.5 * body.robot.body.length, [], 0
     for image, others, one in zip(images, found, chosen, strict=True):
@@ -59,14 +59,14 @@ def turned_flags(
     found: Sequence[list[Candidate]],
     chosen: Sequence[Candidate | None],
 ) -> tuple[Flag, ...]:
-    """A nose at the other end.
+    """Flag a robot whose nose is at the other end.
 
     Args:
         body: the robot's body.
         images: the frames that were searched, 8-bit RGB.
-        still: what stands still in the video.
+        still: static background of the video, (h, w, 3).
         found: candidates of each frame.
-        chosen: the one that was taken for the robot.
+        chosen: the candidate taken for the robot, None where there is none.
     """
     seen = [(image, some[0].score) for image, some, one in zip(images, found, chosen, strict=True) if one is not None]
     turned = _turned(body, seen[:: VISIBILITY.asked], still)
@@ -83,8 +83,8 @@ def turned_flags(
 
 
 def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
-    """How much better a body the other way round fits, usually; of each frame its score as stated is given."""
-    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
+    """Median score ratio of the body turned by 180 degrees; `seen` holds each frame with its score as stated."""
+    with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
         backs = pool.map(
             lambda image: close_places(image, still, body, turn=np.pi),
             [image for image, _ in seen],
@@ -96,16 +96,16 @@ def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: S
 
 
 def _apart(other: Candidate, one: Candidate, half: float) -> bool:
-    """Whether two robots could be at both places without touching."""
+    """Whether two candidates are too far apart to be one robot."""
     return max(abs(other.pose.x - one.pose.x) / 2.0, abs(other.pose.y - one.pose.y)) > half
 
 
 def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
-    """Numbers of the frames as they were recorded, with those that are missing counted.
+    """Frame numbers that count dropped frames, and a flag on these.
 
     Args:
         time: times of the frames, s, (n,).
-        index: their numbers among those that are there, (n,).
+        index: indices of the frames in the file, (n,).
     """
     if time.size < 3:
         return index, ()
@@ -132,7 +132,7 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
 
 
 def cut_off(found: Sequence[Placed]) -> np.ndarray:
-    """Frames that are left out because the robot is partly out of view, if it is in full view often enough, (n,)."""
+    """Mask of the frames left out as the robot is partly out of view, (n,); all False if few show it whole."""
     part = np.array([one.known and one.inside < VISIBILITY.full_view for one in found])
     whole = np.array([one.known and one.inside >= VISIBILITY.full_view for one in found])
     enough = int(whole.sum()) > VISIBILITY.enough * int((part | whole).sum())
@@ -142,13 +142,13 @@ def cut_off(found: Sequence[Placed]) -> np.ndarray:
 def sight_flags(
     time: Samples, pose: Samples, errors: Samples, found: Sequence[Placed], optics: Optics, setup: Setup
 ) -> tuple[Flag, ...]:
-    """A robot that leaves, comes late, is partly out of view, hidden, or swims the other way.
+    """Flag a robot that leaves, enters late, is partly out of view or hidden, or swims backwards.
 
     Args:
         time: times, s, (n,).
-        pose: x, y, heading, NaN where it was not seen, (n, 3).
+        pose: x, y, heading, (n, 3); NaN where not detected.
         errors: their standard errors, (n, 3).
-        found: what was found on each frame.
+        found: fit of the body on each frame.
         optics: the camera.
         setup: the setup.
     """
