@@ -66,16 +66,16 @@ def colour_classes(samples: Samples, names: Sequence[str]) -> tuple[Samples, Sam
     start = named * lamp
     palette = start.copy()
     glare = np.full((0 if "white" in names else 1, 3), COLOURS.glare)
-    held = 0.02 * len(samples) / len(names)
+    prior_weight = 0.02 * len(samples) / len(names)
     for _ in range(12):
         nearest = _nearest(samples, np.concatenate([palette, glare]))
         for index in range(len(names)):
             mine = samples[nearest == index]
             total = mine.sum(axis=0) if len(mine) else np.zeros(3)
-            palette[index] = (total + held * start[index]) / (len(mine) + held)
+            palette[index] = (total + prior_weight * start[index]) / (len(mine) + prior_weight)
         shining = samples[nearest == len(names)]
         if len(glare) and len(shining):
-            glare[0] = (shining.sum(axis=0) + held * COLOURS.glare) / (len(shining) + held)
+            glare[0] = (shining.sum(axis=0) + prior_weight * COLOURS.glare) / (len(shining) + prior_weight)
     return palette, start, glare
 
 

@@ -108,7 +108,7 @@ class OutlineConstants:
     noise_correlation: float = 2.8
     """Length along an edge over which the blurred noise is correlated, pixels."""
     largest_shift: float = 2.5
-    """Largest shift of an edge that one linear step can tell, pixels."""
+    """Largest displacement of an edge within the linear range, pixels."""
     rounding_noise: float = 1.5
     """Least standard deviation of brightness in a compressed film, of 255."""
     iterations: int = 5
@@ -116,7 +116,7 @@ class OutlineConstants:
     learning_rounds: int = 5
     """Rounds of learning, in which mean profiles of the edges and places of the frames are renewed in turn."""
     smoothed_rounds: int = 2
-    """Rounds after which places are still held to a smooth path: a robot neither jumps nor turns at once."""
+    """Rounds after which outlying poses are still replaced by a smooth path."""
     neighbours: int = 2
     """Edge points on either side whose frames are pooled with those of a point to learn its profile."""
     least_strength: float = 0.2
@@ -124,7 +124,7 @@ class OutlineConstants:
     least_share: float = 0.3
     """Share of the edges that have to fit."""
     trusted_error: float = 0.6
-    """Standard deviation of an edge's place above which it says nothing of the body's size, pixels."""
+    """Standard deviation of an edge's position above which it is not used for the body's size, pixels."""
     strength_cap: float = 10.0
     """Contrast from which on all edges weigh the same in the body's size, of 255."""
     largest_error: float = 0.7
@@ -183,7 +183,7 @@ class IdentityConstants:
     """Whether what was found is the robot (`identity`)."""
 
     least_share: float = 0.5
-    """Share of the frames looked at on which stripes or tail have to be read."""
+    """Least share of the sample frames on which stripes or tail are readable."""
     size_tolerance: float = 0.03
     """Relative difference from the stated size beyond which both have to be read: chance makes stripes of many
     things."""
@@ -202,15 +202,15 @@ class SteadinessConstants:
     fewest_frames: int = 3
     """Fewest frames of a stretch."""
     reach: int = 12
-    """Largest shift that is looked for, pixels."""
+    """Largest shift that is searched, pixels."""
     peak_range: float = 0.25
-    """Correlation below the largest one down to which a shift is looked at closely: a ruler correlates at many."""
+    """Range of correlations below the largest one whose peaks are refined: a ruler correlates at many shifts."""
     smooth_share: float = 0.8
-    """Share of the picture that is too smooth to tell a shift."""
+    """Share of the picture with the smallest gradients, which is not used."""
     most_peaks: int = 6
-    """Most shifts that are looked at closely, beside none."""
+    """Most peaks of the correlation that are refined, beside zero shift."""
     clearly_better: float = 0.7
-    """Residual of the edges at a shift over that near none, below which the shift is believed."""
+    """Residual at a shift over that near zero, below which the shift is accepted."""
     rows_beside: int = 6
     """Rows beside the robot that its edges change, pixels."""
     moved: float = 0.2
@@ -265,7 +265,7 @@ class StripeConstants:
     repeats: int = 6
     """Rounds of learning colours, shading and blur."""
     repeats_without_glare: int = 2
-    """First rounds, in which what looks like glare is left out."""
+    """First rounds, in which glare is masked."""
     sheen_prior: float = 0.05
     """Weight of the prior that nothing shines."""
     tint_prior: float = 2.0
@@ -279,7 +279,7 @@ class StripeConstants:
     unreadable: float = 0.6
     """Loss over that of one even colour above which nothing is read."""
     good: float = 0.3
-    """Loss over that of one even colour below which learnt colours are believed without trying the named ones."""
+    """Loss over that of a uniform colour below which the named colours are not tried as initial ones."""
     fits: float = 0.25
     """Loss over that of one even colour from which on the stripes are not those that are stated.
 
@@ -404,7 +404,7 @@ class VisibilityConstants:
     often: float = 0.6
     """Share of the frames on which a second robot has to be seen."""
     asked: int = 3
-    """Every how many frames one is first looked at the other way round."""
+    """Stride of the frames on which the body turned by 180 degrees is tried first."""
     lost: float = 0.03
     """Share of frames without the robot that is said."""
     full_view: float = 0.97
@@ -424,7 +424,7 @@ class FollowingConstants:
     memory: int = 12
     """Frames from which the next place is predicted."""
     largest_jump: float = 4.0
-    """Distance from the predicted place from which on a place is not believed, pixels."""
+    """Largest accepted distance from the predicted position, pixels."""
 
 
 SEARCH = SearchConstants()

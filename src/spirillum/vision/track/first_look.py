@@ -79,7 +79,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
         name: name of the video.
         body: the robot's body, about as large as it looks.
         frames: frames spread over the video.
-        still: what stands still in them, (h, w, 3).
+        still: static background of the frames, (h, w, 3).
 
     Raises:
         InputError: if there is no robot.

@@ -1,4 +1,4 @@
-"""Where in a picture a body may be, when nothing is known of its place yet."""
+"""Detection of the body in a whole picture, without a predicted pose."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ __all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined"]
 
 
 class Candidate(NamedTuple):
-    """A place where a body may be."""
+    """A candidate pose of the body."""
 
     pose: BodyPose
     score: float
-    """How clear its edges are there, over the picture's usual gradient."""
+    """Edge score at the pose, over the mean gradient of the picture."""
 
 
 def candidates(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
-    """The likeliest places of a body in a picture, best first, at least a body's width apart.
+    """Candidate poses of the body by a grid search over the reduced picture, best first, a body's width apart.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
-        still: what stands still in the video, (h, w, 3).
-        body: the robot's body in front of the camera.
-        turn: added to all headings that are tried, rad.
+        still: static background of the video, (h, w, 3).
+        body: the finder of the robot's body.
+        turn: offset of the trial headings, rad.
     """
     contour, optics, bounds = body.contour, body.optics, body.bounds
     left, top, _, bottom = bounds
@@ -65,7 +65,7 @@ def candidates(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: flo
 
 
 def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) -> list[Candidate]:
-    """The best candidates that are not the same one twice."""
+    """The best candidates without near duplicates."""
     far = width * optics.length_per_pixel
     kept: list[Candidate] = []
     for score, pose in sorted(found, key=lambda entry: -entry[0]):
@@ -77,13 +77,13 @@ def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) ->
 
 
 def close_places(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
-    """The three likeliest places, looked at closely, best first.
+    """The three best candidates, refined in the full picture, best first.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
-        still: what stands still in the video, (h, w, 3).
-        body: the robot's body in front of the camera.
-        turn: angle by which the body is turned round, rad.
+        still: static background of the video, (h, w, 3).
+        body: the finder of the robot's body.
+        turn: offset of the trial headings, rad.
     """
     rough = candidates(image, still, body, turn=turn)[:3]
     close = [refined(image, still, body, one) for one in rough]
@@ -91,13 +91,13 @@ def close_places(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: f
 
 
 def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidate) -> Candidate:
-    """A candidate moved to where its edges are clearest in the full picture, to a pixel; scored in grey per pixel.
+    """Refine a candidate to a pixel in the full picture; its score is a gradient, grey values per pixel.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
-        still: what stands still in the video, (h, w, 3).
-        body: the robot's body in front of the camera.
-        start: the candidate.
+        still: static background of the video, (h, w, 3).
+        body: the finder of the robot's body.
+        start: the candidate to be refined.
     """
     contour, optics, bounds = body.contour, body.optics, body.bounds
     first = contour.places(start.pose, optics)[0]
@@ -128,10 +128,10 @@ def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidat
 
 
 def most_likely(found: list[list[Candidate]], size: float) -> list[Candidate | None]:
-    """One candidate of each frame, so that clear edges and short ways from frame to frame are balanced.
+    """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm).
 
     Args:
-        found: candidates of each frame; a frame may have none.
+        found: candidates on each frame; may be empty.
         size: the body's length, m.
     """
     chosen: list[Candidate | None] = [None] * len(found)
@@ -164,9 +164,9 @@ def _slopes(
     *,
     bounded: bool = True,
 ) -> tuple[Samples, Samples, float]:
-    """Brightness gradients of a part of a picture made smaller, cut off where they are rare, and their usual size.
+    """Brightness gradients of a reduced region, bounded at their 95 % quantile, and their mean magnitude.
 
-    Of the gradients, (w, h), the columns lie one after the other.
+    The gradients are transposed, (w, h).
     """
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
