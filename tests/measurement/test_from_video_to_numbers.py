@@ -19,7 +19,7 @@ def film(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path, Path]:
     """The film's truth, its file and its setup: 3 s at 10 frames a second, two of them dropped."""
     import sys
 
-    place = Path(__file__).parents[1] / "tracking" / "flat_pictures.py"
+    place = Path(__file__).parents[1] / "vision" / "flat_pictures.py"
     spec = importlib.util.spec_from_file_location("flat_pictures", place)
     assert spec is not None
     assert spec.loader is not None

@@ -22,10 +22,10 @@ from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.constants import FOLLOWING
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.first_look import Start, on_the_way
-from spirillum.vision.track.identity import Introduced, introduced
+from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.search import candidates, refined
-from spirillum.vision.track.size import doubted
+from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.track.track import Track
 from spirillum.vision.track.unwrapping import contradictions, nothing_moves, unwrapped
@@ -93,7 +93,7 @@ def follow(
     still = still_picture(images)
     sight = sight_of(video, setup, still, folder)
     bounds = bounds_of(setup, video)
-    known = introduced(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
+    known = identify(video.name, setup, BodyFinder(robot, sight.optics, bounds), frames, still)
     start, stripes, wire = known.start, known.stripes, known.wire
     body, record = start.body, _Record()
     aside = ThreadPoolExecutor(1)  # runs while the frames are followed
@@ -159,7 +159,7 @@ def _found_again(body: BodyFinder, image: np.ndarray, still: Samples, start: Sta
 
 
 def _track(
-    video: Video, setup: Setup, sight: Sight, known: Introduced, record: _Record, flags: tuple[Flag, ...]
+    video: Video, setup: Setup, sight: Sight, known: Identified, record: _Record, flags: tuple[Flag, ...]
 ) -> Track:
     body, time = known.start.body, np.array(record.time)
     seen = np.array([one.known for one in record.placed])
@@ -173,7 +173,7 @@ def _track(
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
-    scale, size_flags = doubted(sight.scale, body, known.size)
+    scale, size_flags = checked_scale(sight.scale, body, known.size)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))

@@ -17,16 +17,16 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, SIZE
 from spirillum.vision.track.first_look import Start, first_look
-from spirillum.vision.track.size import LENGTHS, another_size, resized
+from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame
 
-__all__ = ["Introduced", "introduced"]
+__all__ = ["Identified", "identify"]
 
 
-class Introduced(NamedTuple):
+class Identified(NamedTuple):
     """The detected object, with readers that have learnt the appearance of its stripes and tail."""
 
     start: Start
@@ -61,7 +61,7 @@ class Introduced(NamedTuple):
         return bool(np.isfinite(self.stripes.read(image, pose)[0])) or self.wire.reads(image, pose)
 
 
-def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Introduced:
+def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> Identified:
     """Find the robot at its stated size; if that object does not match, at any size, which takes some seconds.
 
     Args:
@@ -74,17 +74,17 @@ def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame],
     Raises:
         InputError: if no object resembles the robot.
     """
-    found: Introduced | InputError
+    found: Identified | InputError
     try:
-        found = _identified(name, setup, stated, frames, still, 1.0)
+        found = _identify_at(name, setup, stated, frames, still, 1.0)
         if found.robot:
             return found
     except InputError as error:
         found = error
-    size = another_size(stated, [frame.image for frame in frames], still)
+    size = best_other_size(stated, [frame.image for frame in frames], still)
     if size is not None:
         with suppress(InputError):
-            other = _identified(name, setup, resized(stated, size), frames, still, size)
+            other = _identify_at(name, setup, resized(stated, size), frames, still, size)
             if other.robot:
                 return other
     if isinstance(found, InputError):
@@ -92,9 +92,9 @@ def introduced(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame],
     return found
 
 
-def _identified(
+def _identify_at(
     name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float
-) -> Introduced:
+) -> Identified:
     start = first_look(name, body, frames, still)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL
@@ -105,7 +105,7 @@ def _identified(
     striped = stripes.fits and read > IDENTITY.least_share
     total = size * start.size
     if abs(np.log(total)) <= IDENTITY.size_tolerance and start.clearness > SIZE.clearness:
-        return Introduced(start, stripes, wire, total, striped or wire.readable > IDENTITY.least_share)
-    return Introduced(
+        return Identified(start, stripes, wire, total, striped or wire.readable > IDENTITY.least_share)
+    return Identified(
         start, stripes, wire, total, wire.readable > IDENTITY.sure_share and (striped or not stripes.stripes)
     )

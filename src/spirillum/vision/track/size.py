@@ -24,7 +24,7 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SIZE
 from spirillum.vision.track.search import Candidate, close_places
 
-__all__ = ["LENGTHS", "OutlineFit", "another_size", "clearness", "doubted", "outline_seen", "resized"]
+__all__ = ["LENGTHS", "OutlineFit", "best_other_size", "checked_scale", "clearness", "outline_seen", "resized"]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
@@ -54,7 +54,7 @@ def _resemblance(found: Sequence[Sequence[Candidate]]) -> float:
     return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
 
 
-def another_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> float | None:
+def best_other_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> float | None:
     """The size, from half to twice the stated one, at which an object resembles the robot most.
 
     Args:
@@ -147,7 +147,7 @@ def _blurred(steep: Samples) -> Samples:
     return np.asarray(around @ (bell / bell.sum()))
 
 
-def doubted(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, tuple[Flag, ...]]:
+def checked_scale(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, tuple[Flag, ...]]:
     """The scale with its apparent size, a larger uncertainty and a flag where the size contradicts it.
 
     Args:
