@@ -7,7 +7,7 @@ between them almost like a solid cylinder: the second nearly doubles the torque 
 
 import numpy as np
 
-from spirillum.fluid.wire.interaction import Resolution, solve
+from spirillum.fluid.wire.interaction import Discretisation, solve
 from spirillum.fluid.wire.stokeslets import wire_along
 from spirillum.robot.outline import body_outline
 
@@ -28,7 +28,7 @@ def tail(phase: float) -> np.ndarray:
 def matrix(curves: list[np.ndarray]) -> np.ndarray:
     """12x12 resistance of body and rotor, SI."""
     wires = [(wire_along(curve, 0.5e-3), ROTOR) for curve in curves]
-    return VISCOSITY * solve([(body, BODY)], wires, Resolution(wire="high")).matrix
+    return VISCOSITY * solve([(body, BODY)], wires, Discretisation(wire="high")).matrix
 
 
 def advance(r: np.ndarray) -> float:

@@ -21,7 +21,7 @@ BODY = (0.035, 0.018)
 
 
 def of(seed: int = 0, **what: Any) -> Disturbances:
-    return Disturbances(Degradation(**what), seed, LENS, 20.0, BODY, 0.03)
+    return Disturbances(Degradation.of(what), seed, LENS, 20.0, BODY, 0.03)
 
 
 def test_noise_has_its_standard_deviation(tmp_path: Path) -> None:
@@ -61,7 +61,7 @@ def test_as_many_frames_are_lost_as_stated_but_not_the_ends() -> None:
 
 
 def test_the_tilt_has_its_size_and_any_direction() -> None:
-    tilts = np.array([tilt_of(Degradation(tilt=0.035), seed) for seed in range(40)])
+    tilts = np.array([tilt_of(Degradation.of({"tilt": 0.035}), seed) for seed in range(40)])
     assert np.allclose(np.hypot(*tilts.T), 0.035)
     assert (tilts.min(axis=0) < -0.02).all()
     assert (tilts.max(axis=0) > 0.02).all()

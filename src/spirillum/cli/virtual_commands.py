@@ -12,7 +12,7 @@ from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
 
 if TYPE_CHECKING:
-    from spirillum.virtual.options import Options
+    from spirillum.robot.arguments import Options
 
 __all__ = ["render", "virtual_experiment"]
 

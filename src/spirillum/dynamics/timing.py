@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from numbers import Integral
+from collections.abc import Sequence
+from numbers import Integral, Real
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import BeforeValidator, StrictFloat, StrictStr, ValidationError
+from pydantic import BeforeValidator, StrictFloat, StrictStr
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch, Window, schedule, windows_of
 from spirillum.dynamics.sampling import duration_of, sample_times
-from spirillum.errors import InputError, did_you_mean
-from spirillum.robot.fields import Section
+from spirillum.errors import InputError
+from spirillum.robot.arguments import Options
 
 __all__ = ["Timetable", "Timing"]
 
@@ -22,6 +22,12 @@ def _whole(value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise InputError(f"samples-per-turn = {str(value)[:40]}; allowed: a whole number from 1 to 10000")
     return int(value)
+
+
+def _number_of_turns(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(f"turns = {str(value)[:40]}; allowed: a number of turns")
+    return float(value)
 
 
 def _duty_file(value: Any) -> Any:
@@ -41,10 +47,12 @@ class Timetable(NamedTuple):
     """Every switching of the remote, the first at 0."""
 
 
-class Timing(Section):
+class Timing(Options):
     """Length, sampling and remote control of a run; a turn is one of the tail at its steady rate, or of the field."""
 
-    turns: StrictFloat = 3.0
+    argument: ClassVar[str] = "timing"
+
+    turns: Annotated[float, BeforeValidator(_number_of_turns)] = 3.0
     """Length of the run in turns (the paper's three periods)."""
     duration: StrictStr | StrictFloat | None = None
     """Length of the run instead, with its unit (``"2 s"``) or a float in s."""
@@ -55,36 +63,6 @@ class Timing(Section):
     on throughout."""
     duty: Annotated[str | Path | None, BeforeValidator(_duty_file)] = None
     """Duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next."""
-
-    @classmethod
-    def of(cls, value: Timing | Mapping[str, Any] | None) -> Timing:
-        """A timing from what a caller may give.
-
-        Args:
-            value: a timing, its fields by name, or None: three turns, on throughout.
-
-        Raises:
-            InputError: for an unknown field or a wrong value.
-        """
-        if isinstance(value, cls):
-            return value
-        names = ", ".join(cls.model_fields)
-        if not (value is None or isinstance(value, Mapping)):
-            raise InputError(f"timing = {str(value)[:60]!r}; allowed: {names}, each by name")
-        for name in value or {}:
-            if name not in cls.model_fields:
-                hint = did_you_mean(str(name)[:60], cls.model_fields)
-                raise InputError(f"timing.{name} is not a known field{hint}; allowed: {names}")
-        try:
-            return cls(**(value or {}))
-        except ValidationError as error:
-            first = error.errors()[0]
-            cause = first.get("ctx", {}).get("error")
-            if isinstance(cause, InputError):
-                raise cause from error
-            name = str(first["loc"][0])
-            allowed = {"turns": "a number of turns", "duration": "a time, as in 2 s, or a float in s"}.get(name, names)
-            raise InputError(f"{name} = {str(first['input'])[:40]}; allowed: {allowed}") from error
 
     def timetable(self, turn: float, duty: float) -> Timetable:
         """The times of a run.

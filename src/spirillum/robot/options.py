@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.robot.arguments import Options, in_range, one_of, whole
 from spirillum.robot.fields import Factor, Length, Section, Text
-from spirillum.robot.problems import problems_in
 
 __all__ = [
     "Calibration",
@@ -116,41 +114,17 @@ class ModelOptions(Section):
     """Resolved tail and body in their tube."""
 
 
-class Resolution(Section):
+class Resolution(Options):
     """Numerical resolution of the models `slender` and `tube`; None keeps the robot's own option."""
 
-    accuracy: Accuracy | None = None
+    argument: ClassVar[str] = "resolution"
+
+    accuracy: Annotated[Accuracy, BeforeValidator(one_of("standard", "high"))] | None = None
     """Of `slender` and `tube`: form of the wire and resolution of the surfaces, `standard` or `high`."""
-    tolerance: Tolerance | None = None
+    tolerance: Annotated[float, BeforeValidator(in_range(1e-4, 0.05))] | None = None
     """Of `tube`: relative tolerance of the speed per turn, 0.0001 to 0.05."""
-    phases: Phases | None = None
+    phases: Annotated[int, BeforeValidator(whole(1, 64))] | None = None
     """Of `tube`: number of phases of the tail that an answer is averaged over, 1 to 64."""
-
-    @classmethod
-    def of(cls, value: Resolution | Mapping[str, Any] | None) -> Self:
-        """A resolution from what a caller may give.
-
-        Args:
-            value: a resolution, its fields by name, or None: the robot's own options.
-
-        Raises:
-            InputError: for an unknown field or a wrong value.
-        """
-        if isinstance(value, cls):
-            return value
-        names = ", ".join(cls.model_fields)
-        if not (value is None or isinstance(value, Mapping)):
-            raise InputError(f"resolution = {str(value)[:60]!r}; allowed: {names}, each by name")
-        for name, given in (value or {}).items():
-            if name not in cls.model_fields:
-                hint = did_you_mean(str(name)[:60], cls.model_fields)
-                raise InputError(f"resolution.{name} is not a known field{hint}; allowed: {names}")
-            if isinstance(problems_in(cls, {name: given}), list):
-                raise InputError(f"{name} = {given!r}; allowed: {_ALLOWED[name]}")
-        return cls(**(value or {}))
-
-
-_ALLOWED = {"accuracy": "standard, high", "tolerance": "0.0001 to 0.05", "phases": "a whole number from 1 to 64"}
 
 
 class FittedTo(Section):

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError
-from spirillum.robot.fields import Length, LengthOrZero, Pitch, Section, Velocity, field_values
-from spirillum.robot.problems import problems_in
+from spirillum.robot.arguments import Options
+from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity
 from spirillum.units import show
 
 __all__ = ["Ends", "Placement"]
@@ -20,12 +18,15 @@ Ends = Literal["open", "closed"]
 """Ends of the channel: both open into a bath, or closed (no net flux)."""
 
 
-class Placement(Section):
+class Placement(Options):
     """Seat of a robot in its channel, for models that compute the walls; frozen, SI inside.
 
     The channel is horizontal, the robot's axis lies in the vertical plane through the channel's axis. What is None
     was left open: a model then takes its own default, or answers with a band over what is open.
     """
+
+    argument: ClassVar[str] = "placement"
+    prefixed: ClassVar[bool] = True
 
     gap: Length | None = None
     """Smallest distance between the body's surface and the glass."""
@@ -62,28 +63,6 @@ class Placement(Section):
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
 
-    @classmethod
-    def of(cls, value: Placement | Mapping[str, Any] | None) -> Placement:
-        """A placement from what a caller may give.
-
-        Args:
-            value: a placement, its fields (quantities with their unit, ``{"gap": "0.5 mm"}``, or floats in SI), or
-                None: nothing is known. A field that is None is as if left out.
-
-        Raises:
-            InputError: for an unknown field, a wrong value, or fields that exclude each other.
-        """
-        if isinstance(value, cls):
-            return value
-        if not (value is None or isinstance(value, Mapping)):
-            raise InputError(f"placement = {str(value)[:60]!r}; allowed: {', '.join(cls.model_fields)}, each by name")
-        units = {item.path: item.unit for item in field_values(cls())}
-        given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
-        checked = problems_in(_Placed, {"placement": given})
-        if isinstance(checked, list):
-            raise InputError(checked[0], checked)
-        return checked.placement
-
     @property
     def is_given(self) -> bool:
         """Whether anything is known or asked for."""
@@ -99,19 +78,3 @@ class Placement(Section):
         if self.flow is not None:
             return None
         return self.ends or ("open" if np.isfinite(channel_length) else "closed")
-
-
-class _Placed(Section):
-    """The fields under the name by which sentences call them."""
-
-    placement: Placement
-
-
-def _with_unit(value: Any, unit: str | None) -> Any:
-    """A number as a quantity in SI; anything else as it is."""
-    if unit is None or isinstance(value, bool) or not isinstance(value, (int, float, np.floating)):
-        return value
-    try:
-        return f"{float(value)!r} {unit}"
-    except OverflowError:
-        return f"{str(value)[:20]}... {unit}"

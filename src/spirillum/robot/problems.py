@@ -8,36 +8,43 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from spirillum.errors import did_you_mean
+from spirillum.errors import InputError, did_you_mean
 
 __all__ = ["problems_in"]
 
 _M = TypeVar("_M", bound=BaseModel)
 
 
-def problems_in(model: type[_M], table: Mapping[str, Any]) -> _M | list[str]:
+def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _M | list[str]:
     """Check a raw table; return the model, or every problem as a sentence, unknown fields first.
 
     A misspelt field is missing under its right name, too; its own sentence says what to do.
+
+    Args:
+        model: what the table has to be.
+        table: the raw table.
+        under: the name under which sentences put its fields; empty: none.
     """
     try:
         return model.model_validate(table)
     except ValidationError as error:
         sentences: list[str] = []
         for problem in sorted(error.errors(include_url=False), key=lambda item: item["type"] != "extra_forbidden"):
-            sentences += _sentences(model, problem)
+            sentences += _sentences(model, problem, under)
         return list(dict.fromkeys(sentences))
     except RecursionError:
         return ["its tables are nested too deeply; see `spirillum schema robot`"]
 
 
-def _sentences(model: type[BaseModel], problem: Mapping[str, Any]) -> Iterable[str]:
+def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -> Iterable[str]:
     """Our sentences for one of pydantic's findings."""
     kind, context = problem["type"], problem.get("ctx", {})
     names = [str(name) for name in problem["loc"] if name != "[key]"]
     if kind == "assembly":
         return str(context["sentences"]).split("\n")
-    field = ".".join(names)
+    field = ".".join([under, *names] if under else names)
+    if kind == "value_error" and isinstance(context.get("error"), InputError):
+        return [str(context["error"])]
     if kind == "quantity":
         return [f"{field} {context['sentence']}"]
     if kind == "missing":

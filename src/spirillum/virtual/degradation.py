@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from spirillum.errors import InputError, did_you_mean
+from spirillum.robot.arguments import Options, in_range, whole
 from spirillum.robot.fields import Angle
-from spirillum.virtual.options import Options, in_range, whole
 
 __all__ = ["Degradation"]
 

@@ -18,6 +18,7 @@ from pydantic import BeforeValidator
 from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import claim_folder, output_folder, write_text
+from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
@@ -26,7 +27,7 @@ from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
-from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions, in_range, whole
+from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render
 from spirillum.virtual.truth import SYNTHETIC, rate_quantities
@@ -234,11 +235,13 @@ def _planned(
             duration = min(_LONGEST, 0.9 * max(high - low, 0.1 * robot.body.length) / max(abs(velocity), 1e-12))
         spare = max(high - low - abs(velocity) * duration, 0.0)
         start = low + float(rng.uniform(0.1, 0.9)) * spare + (abs(velocity) * duration if velocity < 0 else 0.0)
-        trial = TrialOptions(
-            duration=duration,
-            start=start,
-            body_angle=float(rng.uniform(0.0, 2.0 * np.pi)),
-            tail_phase=float(rng.uniform(0.0, 2.0 * np.pi)),
+        trial = TrialOptions.of(
+            {
+                "duration": duration,
+                "start": start,
+                "body_angle": float(rng.uniform(0.0, 2.0 * np.pi)),
+                "tail_phase": float(rng.uniform(0.0, 2.0 * np.pi)),
+            }
         )
         planned.append(Planned(name, robot, number, rates, trial, int(rng.integers(2**31))))
     return planned

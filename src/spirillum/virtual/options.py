@@ -3,111 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from fractions import Fraction
-from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError
-from spirillum.robot.fields import Angle, LengthOrZero, Rate, Section, Time, Velocity, field_values
-from spirillum.robot.problems import problems_in
+from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
+from spirillum.robot.fields import Angle, LengthOrZero, Rate, Time, Velocity
 
-__all__ = [
-    "CameraOptions",
-    "MotionOptions",
-    "Options",
-    "Seeded",
-    "SetupErrors",
-    "TrialOptions",
-    "in_range",
-    "whole",
-]
-
-
-class Options(Section):
-    """Options that belong together: frozen, closed to unknown fields, quantities in SI."""
-
-    argument: ClassVar[str] = "options"
-    """Name of the argument that takes them."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _read(cls, given: Any) -> Any:
-        """Numbers given for quantities are SI; a field that is None is as if left out."""
-        if not isinstance(given, Mapping):
-            return given
-        units = {item.path: item.unit for item in field_values(cls.model_construct())}
-        return {name: _with_unit(value, units.get(name)) for name, value in given.items() if value is not None}
-
-    @classmethod
-    def of(cls, value: Self | Mapping[str, Any] | None) -> Self:
-        """Options from what a caller may give.
-
-        Args:
-            value: options, their fields by name (quantities with their unit, or floats in SI), or None: the defaults.
-
-        Raises:
-            InputError: for an unknown field or a wrong value.
-        """
-        if isinstance(value, cls):
-            return value
-        if not (value is None or isinstance(value, Mapping)):
-            allowed = ", ".join(cls.model_fields)
-            raise InputError(f"{cls.argument} = {str(value)[:60]!r}; allowed: {allowed}, each by name")
-        checked = problems_in(cls, value or {})
-        if isinstance(checked, list):
-            raise InputError(checked[0], checked)
-        return checked
-
-
-def _with_unit(value: Any, unit: str | None) -> Any:
-    """A number as text with its SI unit, where the field is a quantity."""
-    if unit is None or isinstance(value, bool) or not isinstance(value, Real):
-        return value
-    try:
-        return f"{float(value)!r} {unit}"
-    except OverflowError:
-        return f"inf {unit}"
-
-
-def _refusal(sentence: str) -> PydanticCustomError:
-    """The error of a value; the sentence follows the field's name."""
-    return PydanticCustomError("quantity", "{sentence}", {"sentence": sentence})
-
-
-def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
-    """A check of numbers from `low` to `high`; `unit` is for the sentence of an error."""
-
-    def check(value: Any) -> float:
-        number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (number and low <= value <= high):
-            raise _refusal(f"= {value!r}; allowed: {low:g} to {high:g}{unit}")
-        return float(value)
-
-    return check
-
-
-def whole(low: int, high: int) -> Callable[[Any], int]:
-    """A check of whole numbers from `low` to `high`."""
-
-    def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise _refusal(f"= {value!r}; allowed: a whole number from {low} to {high}")
-        return value
-
-    return check
-
-
-def _one_of(*allowed: str) -> Callable[[Any], Any]:
-    def check(value: Any) -> Any:
-        if value not in allowed:
-            raise _refusal(f"= {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
-        return value
-
-    return check
+__all__ = ["CameraOptions", "MotionOptions", "Seeded", "SetupErrors", "TrialOptions"]
 
 
 def _read_size(value: Any) -> tuple[int, int]:
@@ -117,10 +22,10 @@ def _read_size(value: Any) -> tuple[int, int]:
     pair = isinstance(value, tuple | list)
     parts = [str(item) for item in value] if pair else str(value).lower().replace("×", "x").split("x")
     if len(parts) != 2 or not all(part.strip().isdecimal() and len(part) <= 6 for part in parts):
-        raise _refusal(f"= {str(value)[:40]!r}; allowed: {allowed}")
+        raise refusal(f"= {str(value)[:40]!r}; allowed: {allowed}")
     width, height = (int(part) for part in parts)
     if not all(low <= length <= high and length % 2 == 0 for length in (width, height)):
-        raise _refusal(f"= {width}x{height}; allowed: {allowed}")
+        raise refusal(f"= {width}x{height}; allowed: {allowed}")
     return width, height
 
 
@@ -133,7 +38,7 @@ def _read_signed(value: Any, read: ValidatorFunctionWrapHandler) -> float:
 def _check_heading(angle: float) -> float:
     most = 45.0  # a setup knows only right and left
     if abs(angle) > math.radians(most) * (1.0 + 1e-9):
-        raise _refusal(f"= {math.degrees(angle):.4g} deg; allowed: {-most:g} to {most:g} deg")
+        raise refusal(f"= {math.degrees(angle):.4g} deg; allowed: {-most:g} to {most:g} deg")
     return angle
 
 
@@ -190,9 +95,9 @@ class CameraOptions(Options):
 
     argument: ClassVar[str] = "camera"
 
-    view: Annotated[Literal["top", "side"], BeforeValidator(_one_of("top", "side"))] = "top"
+    view: Annotated[Literal["top", "side"], BeforeValidator(one_of("top", "side"))] = "top"
     """From above, or level from beside the tank."""
-    direction: Annotated[Literal["right", "left"], BeforeValidator(_one_of("right", "left"))] = "right"
+    direction: Annotated[Literal["right", "left"], BeforeValidator(one_of("right", "left"))] = "right"
     """Where the nose points in the picture."""
     fps: Annotated[float, BeforeValidator(_read_frame_rate)] = 30.0
     """Frames a second, as the nearest fraction that a video can hold."""

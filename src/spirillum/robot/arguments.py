@@ -1,0 +1,104 @@
+"""Options that belong together as one argument: a frozen table, a mapping of its fields, or None for the defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from numbers import Real
+from typing import Any, ClassVar, Self
+
+from pydantic_core import PydanticCustomError
+
+from spirillum.errors import InputError, did_you_mean
+from spirillum.robot.fields import Section, field_values
+from spirillum.robot.problems import problems_in
+
+__all__ = ["Options", "in_range", "one_of", "refusal", "whole"]
+
+
+class Options(Section):
+    """Options that belong together: frozen, closed to unknown fields, quantities in SI.
+
+    In a file they are a table, in Python one argument, on the command line options of the same names.
+    """
+
+    argument: ClassVar[str] = "options"
+    """Name of the argument that takes them."""
+    prefixed: ClassVar[bool] = False
+    """Whether sentences name a field with its argument, as in `placement.gap`."""
+
+    @classmethod
+    def of(cls, value: Self | Mapping[str, Any] | None) -> Self:
+        """Options from what a caller may give.
+
+        Args:
+            value: options, their fields by name (quantities with their unit, or floats in SI), or None: the defaults.
+                A field that is None is as if left out.
+
+        Raises:
+            InputError: for an unknown field, a wrong value, or fields that exclude each other.
+        """
+        if isinstance(value, cls):
+            return value
+        if not (value is None or isinstance(value, Mapping)):
+            allowed = ", ".join(cls.model_fields)
+            raise InputError(f"{cls.argument} = {str(value)[:60]!r}; allowed: {allowed}, each by name")
+        for name in value or {}:
+            if name not in cls.model_fields:
+                hint = did_you_mean(str(name)[:60], cls.model_fields)
+                allowed = ", ".join(cls.model_fields)
+                raise InputError(f"{cls.argument}.{str(name)[:60]} is not a known field{hint}; allowed: {allowed}")
+        units = {item.path: item.unit for item in field_values(cls.model_construct())}
+        given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
+        checked = problems_in(cls, given, cls.argument if cls.prefixed else "")
+        if isinstance(checked, list):
+            raise InputError(checked[0], checked)
+        return checked
+
+
+def _with_unit(value: Any, unit: str | None) -> Any:
+    """A number as text with its SI unit, where the field is a quantity."""
+    if unit is None or isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    try:
+        return f"{float(value)!r} {unit}"
+    except OverflowError:
+        return f"{str(value)[:20]}... {unit}"
+
+
+def refusal(sentence: str) -> PydanticCustomError:
+    """The error of a value; the sentence follows the field's name."""
+    return PydanticCustomError("quantity", "{sentence}", {"sentence": sentence})
+
+
+def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
+    """A check of numbers from `low` to `high`; `unit` is for the sentence of an error."""
+
+    def check(value: Any) -> float:
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (number and low <= value <= high):
+            raise refusal(f"= {value!r}; allowed: {low:g} to {high:g}{unit}")
+        return float(value)
+
+    return check
+
+
+def whole(low: int, high: int) -> Callable[[Any], int]:
+    """A check of whole numbers from `low` to `high`."""
+
+    def check(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise refusal(f"= {value!r}; allowed: a whole number from {low} to {high}")
+        return value
+
+    return check
+
+
+def one_of(*allowed: str) -> Callable[[Any], Any]:
+    """A check of words."""
+
+    def check(value: Any) -> Any:
+        if value not in allowed:
+            raise refusal(f"= {str(value)[:40]!r}; allowed: {', '.join(allowed)}")
+        return value
+
+    return check
