@@ -85,6 +85,9 @@ class StokesSphere:
 @pytest.fixture(scope="session")
 def sphere() -> StokesSphere:
     """The flow around a sphere that moves and turns."""
+    from spirillum.fields.fluid_field import FluidField
+
+    FluidField.register(StokesSphere)  # not derived from it: modules may be imported only once their hooks are set
     return StokesSphere()
 
 
