@@ -47,11 +47,13 @@ def rendered(folder: Path) -> list[Path]:
             sp.render(
                 str(film["robot"]),
                 path,
-                forward_velocity=f"{film['speed']} mm/s",
-                tail_rate=f"{film['tail']} Hz",
-                body_rate=f"{film['body']} Hz",
-                duration=DURATION,
-                size="320x240",
+                motion={
+                    "forward_velocity": f"{film['speed']} mm/s",
+                    "tail_rate": f"{film['tail']} Hz",
+                    "body_rate": f"{film['body']} Hz",
+                },
+                trial={"duration": DURATION},
+                camera={"size": "320x240"},
                 degradation=str(film["degradation"]),
                 seed=number,
             )

@@ -7,7 +7,7 @@ from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import BeforeValidator, StrictFloat, StrictStr
+from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch, Window, schedule, windows_of
@@ -28,6 +28,12 @@ def _number_of_turns(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"turns = {str(value)[:40]}; allowed: a number of turns")
     return float(value)
+
+
+def _length(value: Any) -> Any:
+    if isinstance(value, bool) or not (value is None or isinstance(value, (str, Real))):
+        raise InputError(f"duration = {str(value)[:40]}; allowed: a time, as in 2 s, or a float in s")
+    return value
 
 
 def _duty_file(value: Any) -> Any:
@@ -54,7 +60,7 @@ class Timing(Options):
 
     turns: Annotated[float, BeforeValidator(_number_of_turns)] = 3.0
     """Length of the run in turns (the paper's three periods)."""
-    duration: StrictStr | StrictFloat | None = None
+    duration: Annotated[str | float | None, BeforeValidator(_length)] = None
     """Length of the run instead, with its unit (``"2 s"``) or a float in s."""
     samples_per_turn: Annotated[int, BeforeValidator(_whole)] = 100
     """Samples of the output per turn."""

@@ -1,8 +1,8 @@
 """Velocity and pressure around a robot in its tube, from the tractions that `tube` solves for.
 
-The flow is that of tractions and forces in unbounded fluid, what the wall reflects of them (`tube_wall`), and the mean
-flow through the tube. For the wall, tractions are many point forces, dense enough for the steepest wave that reaches
-the wall; where they stand in rows along the tube, one wave meets the whole row at once.
+The flow is that of tractions and forces in unbounded fluid, what the wall reflects of them (`fluid.tube.wall`),
+and the mean flow through the tube. For the wall, tractions are many point forces, dense enough for the steepest wave
+that reaches the wall; where they stand in rows along the tube, one wave meets the whole row at once.
 
 Far from the robot only the mean flow and a uniform pressure on either side are left.
 """

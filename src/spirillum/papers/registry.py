@@ -1,6 +1,7 @@
 """Papers by the name that a study file gives as `claims`.
 
-A new paper is a folder beside `biorob2012`, one line here, and its name in `spirillum.studies.spec.Study.claims`.
+A new paper is a folder beside `biorob2012`, an entry in each of the tables here, and its name in
+`spirillum.studies.spec.Study.claims`.
 """
 
 from __future__ import annotations

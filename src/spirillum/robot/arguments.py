@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 from pydantic_core import PydanticCustomError
@@ -86,9 +86,9 @@ def whole(low: int, high: int) -> Callable[[Any], int]:
     """A check of whole numbers from `low` to `high`."""
 
     def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
             raise refusal(f"= {value!r}; allowed: a whole number from {low} to {high}")
-        return value
+        return int(value)
 
     return check
 

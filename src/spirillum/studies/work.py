@@ -41,7 +41,6 @@ __all__ = [
     "tasks",
 ]
 
-"""Quantities of free swimming."""
 AT_RATES = (
     "forward_velocity",
     "tail_rotation_rate",

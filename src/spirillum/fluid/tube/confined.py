@@ -1,6 +1,6 @@
 """Body, coupling and tail in a circular tube: the coupled flow with the wall, for all rigid motions at once.
 
-Solids and wall are factored once for a place in the tube (`tube_solids`); every tail at every phase is solved against
+Solids and wall are factored once for a place in the tube (`solids`); every tail at every phase is solved against
 them by conjugate gradients on the forces along its wire, which meet the wall by the same waves.
 
 Inside, axes are x along the robot, y up, z to the right; answers come in body axes.

@@ -1,6 +1,6 @@
 """Solids of revolution in a circular tube: their single layer and the wall, factored.
 
-The equations are those of `interaction`, mode by mode, plus the wall's reflection (`tube_wall`), which couples the
+The equations are those of `interaction`, mode by mode, plus the wall's reflection (`wall`), which couples the
 modes of a body that lies off the axis. Mirror symmetry keeps two families of modes apart, even and odd to the sides.
 Neither tails nor their phases enter: one factorisation serves all of them.
 
