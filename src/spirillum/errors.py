@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-__all__ = ["InputError", "did_you_mean"]
+__all__ = ["InputError", "clipped", "did_you_mean"]
 
 
 _LONGEST = 800
@@ -30,6 +30,15 @@ def _one_line(text: str) -> str:
     """The text in one printable line, whatever a user's file put into it."""
     line = "".join(c if c.isprintable() else "?" for c in " ".join(text[:_LONGEST].split()))
     return line if len(text) <= _LONGEST else f"{line}…"
+
+
+def clipped(value: object, longest: int = 60) -> str:
+    """A value as Python writes it, cut to a length; an integer too long to write is said to be one."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python refuses to write integers of thousands of digits
+        return "(a huge number)"
+    return text if len(text) <= longest else f"{text[:longest]}…"
 
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:

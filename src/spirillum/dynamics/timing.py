@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from numbers import Integral, Real
 from pathlib import Path
@@ -27,13 +28,21 @@ def _whole(value: Any) -> Any:
 def _number_of_turns(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(f"turns = {str(value)[:40]}; allowed: a number of turns")
-    return float(value)
+    return _float(value)
+
+
+def _float(value: Real) -> float:
+    """A number; infinity where it is too large for one, which the next check refuses."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _length(value: Any) -> Any:
     if isinstance(value, bool) or not (value is None or isinstance(value, (str, Real))):
         raise InputError(f"duration = {str(value)[:40]}; allowed: a time, as in 2 s, or a float in s")
-    return value
+    return _float(value) if isinstance(value, Real) else value
 
 
 def _duty_file(value: Any) -> Any:

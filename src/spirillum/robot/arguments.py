@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.problems import problems_in
 
@@ -41,7 +41,8 @@ class Options(Section):
             return value
         if not (value is None or isinstance(value, Mapping)):
             allowed = ", ".join(cls.model_fields)
-            raise InputError(f"{cls.argument} = {str(value)[:60]!r}; allowed: {allowed}, each by name")
+            given_words = clipped(value) if isinstance(value, int) else repr(str(value)[:60])
+            raise InputError(f"{cls.argument} = {given_words}; allowed: {allowed}, each by name")
         for name in value or {}:
             if name not in cls.model_fields:
                 hint = did_you_mean(str(name)[:60], cls.model_fields)
@@ -62,7 +63,7 @@ def _with_unit(value: Any, unit: str | None) -> Any:
     try:
         return f"{float(value)!r} {unit}"
     except OverflowError:
-        return f"{str(value)[:20]}... {unit}"
+        return f"inf {unit}"
 
 
 def refusal(sentence: str) -> PydanticCustomError:
@@ -76,7 +77,7 @@ def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
     def check(value: Any) -> float:
         number = isinstance(value, Real) and not isinstance(value, bool)
         if not (number and low <= value <= high):
-            raise refusal(f"= {value!r}; allowed: {low:g} to {high:g}{unit}")
+            raise refusal(f"= {clipped(value)}; allowed: {low:g} to {high:g}{unit}")
         return float(value)
 
     return check
@@ -87,7 +88,7 @@ def whole(low: int, high: int) -> Callable[[Any], int]:
 
     def check(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
-            raise refusal(f"= {value!r}; allowed: a whole number from {low} to {high}")
+            raise refusal(f"= {clipped(value)}; allowed: a whole number from {low} to {high}")
         return int(value)
 
     return check

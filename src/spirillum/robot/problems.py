@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, clipped, did_you_mean
 
 __all__ = ["problems_in"]
 
@@ -53,8 +53,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
         allowed = list(_fields_at(model, names[:-1]))
         hint = did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
-    shown = repr(problem.get("input"))
-    shown = shown if len(shown) <= 60 else f"{shown[:60]}…"
+    shown = clipped(problem.get("input"))
     hint = ""
     if kind == "literal_error":
         allowed_words = str(context["expected"])
