@@ -41,8 +41,9 @@ class Options(Section):
             return value
         if not (value is None or isinstance(value, Mapping)):
             allowed = ", ".join(cls.model_fields)
-            given_words = clipped(value) if isinstance(value, int) else repr(str(value)[:60])
-            raise InputError(f"{cls.argument} = {given_words}; allowed: {allowed}, each by name")
+            offered: Any = value
+            words = clipped(offered) if isinstance(offered, int) else repr(str(offered)[:60])
+            raise InputError(f"{cls.argument} = {words}; allowed: {allowed}, each by name")
         for name in value or {}:
             if name not in cls.model_fields:
                 hint = did_you_mean(str(name)[:60], cls.model_fields)
