@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.sampling import late_averages
 from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
@@ -25,7 +26,6 @@ from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.steady import calibrated_balance
 from spirillum.units import show
-from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -263,21 +263,12 @@ def _dataset(
         coords={"time": ("time", m.time, attributes("time"))},
         attrs={
             "title": f"Axial swimming of {prediction.robot.name} (two degrees of freedom)",
-            "robot": prediction.robot.name,
-            "model": prediction.model.name,
-            "friction": prediction.friction,
-            "effective_friction": prediction.effective_friction,
-            "calibrated": int(prediction.calibrated),
-            "error_estimate": prediction.error_estimate,
-            "known_error": prediction.model.stated_error(prediction.robot.model),
+            **run_attributes(prediction),
             "motion": "held",
-            "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
             "events": json.dumps([{"time": time, "what": f"duty {duty:g}"} for time, duty in switches]),
             "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
             "integrator": f"VODE Adams, order up to {_HIGHEST_ORDER}, relative tolerance {_TOLERANCE:g}",
-            "references": " ".join(prediction.references),
             "warnings": "\n".join(prediction.warnings),
-            "versions": versions(),
         },
     )
     return dataset.assign(_averages(dataset, prediction))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.integration import INTEGRATOR, Reach, Trajectory
 from spirillum.dynamics.sampling import late_averages
 from spirillum.dynamics.two_links import TwoLinks
@@ -15,7 +16,6 @@ from spirillum.kernels import two_links as kernel
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
-from spirillum.version import versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,21 +91,12 @@ def _attributes(
 ) -> dict[str, Any]:
     return {
         "title": title,
-        "robot": prediction.robot.name,
-        "model": prediction.model.name,
-        "friction": prediction.friction,
-        "effective_friction": prediction.effective_friction,
-        "calibrated": int(prediction.calibrated),
-        "error_estimate": prediction.error_estimate,
-        "known_error": prediction.model.stated_error(prediction.robot.model),
+        **run_attributes(prediction),
         "motion": "free",
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
-        "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
         "integrator": INTEGRATOR,
-        "references": " ".join(prediction.references),
         "warnings": "\n".join(warnings),
-        "versions": versions(),
     }
 
 

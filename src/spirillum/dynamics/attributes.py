@@ -1,0 +1,31 @@
+"""Attributes that the datasets of all runs carry."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from spirillum.swimming.prediction import Prediction
+from spirillum.version import versions
+
+__all__ = ["run_attributes"]
+
+
+def run_attributes(prediction: Prediction) -> dict[str, Any]:
+    """Robot, model, friction, calibration, errors, settings, references and versions of a run.
+
+    Args:
+        prediction: the robot with model, friction and calibration.
+    """
+    return {
+        "robot": prediction.robot.name,
+        "model": prediction.model.name,
+        "friction": prediction.friction,
+        "effective_friction": prediction.effective_friction,
+        "calibrated": int(prediction.calibrated),
+        "error_estimate": prediction.error_estimate,
+        "known_error": prediction.model.stated_error(prediction.robot.model),
+        "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
+        "references": " ".join(prediction.references),
+        "versions": versions(),
+    }
