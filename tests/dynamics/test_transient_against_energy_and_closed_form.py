@@ -84,6 +84,34 @@ def test_switching_off_stops_the_robot() -> None:
     assert float(run["position"][-1]) > 0
 
 
+@pytest.mark.parametrize("ulps", [-1, 0, 1, 3])
+@pytest.mark.parametrize("share", [1 / 3, 0.5, 0.1, 0.7])
+def test_switching_off_at_a_sample_but_for_rounding(share: float, ulps: int) -> None:
+    """A circuit of constant resistance charges and decays exponentially, however switch and samples are rounded."""
+    robot = sp.load("biorob2012-wide", **LINEAR_CIRCUIT)
+    steady = sp.predict(robot, model="rft")
+    emf = 0.004 * steady.motor_rotation_rate / steady.motor_current
+    on, off = (10.8 + emf) / 0.082, (10.0 + emf) / 0.082  # no battery is in the circuit while it is off
+    for duration in (0.3, 0.9, 1.8):
+        switch = duration * share + ulps * np.spacing(duration * share)
+        run = held(robot, model="rft", timing={"duration": duration, "on": [(0.0, switch)]})
+        time = run["time"].values
+        at_switch = 3.7 / (10.8 + emf) * (1.0 - np.exp(-on * switch))
+        expected = np.where(
+            time <= switch,
+            3.7 / (10.8 + emf) * (1.0 - np.exp(-on * time)),
+            at_switch * np.exp(-off * np.maximum(time - switch, 0.0)),
+        )
+        np.testing.assert_allclose(run["motor_current"].values, expected, atol=1e-8)
+        np.testing.assert_array_equal(run["duty"].values, time <= switch)
+
+
+def test_pause_of_a_rounding_error_is_none() -> None:
+    whole = held("biorob2012-wide", timing={"duration": 1.8})
+    cut = held("biorob2012-wide", timing={"duration": 1.8, "on": [(0.0, 0.9), (0.9000000000000001, 1.8)]})
+    np.testing.assert_allclose(cut["motor_current"], whole["motor_current"], atol=1e-8)
+
+
 def test_battery_gives_duty_times_the_motor_current() -> None:
     half = held(sp.load("biorob2012-wide", **{"drive.duty": 0.5}), timing={"duration": "0.5 s"})
     charge = np.trapezoid(0.5 * half["motor_current"].values, half["time"].values)

@@ -168,20 +168,26 @@ def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Samples,
 def _segment(
     derivative: Callable[..., list[float]], duty: float, start: float, end: float, state: Samples, samples: Samples
 ) -> tuple[Samples, Samples]:
-    """Integrate between two switchings; states at the samples and at the end."""
+    """Integrate between two switchings; states at the samples and at the end.
+
+    Time counts from `start`, which (17) does not depend on: VODE refuses a step that is no longer than the rounding
+    error of its end, as from a switching to a sample that differs from it by rounding alone.
+    """
     from scipy.integrate import ode
 
     solver = ode(derivative).set_f_params(duty)
     solver.set_integrator(
         "vode", method="adams", order=_HIGHEST_ORDER, rtol=_TOLERANCE, atol=1e-3 * _TOLERANCE, nsteps=1_000_000
     )
-    solver.set_initial_value(state, start)
+    solver.set_initial_value(state, 0.0)
     block = np.empty((len(samples), 6))
     for row, t in enumerate(samples):
-        block[row] = solver.integrate(t)
-    last = block[-1] if len(samples) and samples[-1] == end else solver.integrate(end) if end > start else state
+        block[row] = solver.integrate(t - start)
+    last = block[-1] if len(samples) and samples[-1] == end else solver.integrate(end - start) if end > start else state
     if not solver.successful():
-        raise InputError(f"the motor's transient cannot be integrated beyond t = {solver.t:.4g} s with these constants")
+        raise InputError(
+            f"the motor's transient cannot be integrated beyond t = {start + solver.t:.4g} s with these constants"
+        )
     return block, np.array(last)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,8 @@ __all__ = ["duration_of", "late_averages", "sample_times"]
 _LARGEST_SAMPLES = 1_000_000
 _SHORTEST = 1e-6
 """Shortest run, in turns."""
+_ROUNDING = 1e-9
+"""Difference of two times that is rounding, over the distance of two samples."""
 
 
 def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
@@ -40,13 +42,17 @@ def duration_of(turns: float, turn: float, duration: str | float | None) -> floa
     return end
 
 
-def sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
+def sample_times(end: float, turn: float, samples_per_turn: int, switches: Sequence[float] = ()) -> Samples:
     """Evenly spaced times from 0 to `end`, s.
+
+    A sample that differs from a switching by rounding is at the switching, so that what it shows does not depend on
+    which of the two is rounded up.
 
     Args:
         end: length of the run, s.
         turn: time of a turn, s.
         samples_per_turn: samples in it.
+        switches: times of switchings within the run, s.
 
     Raises:
         InputError: for no samples, or too many.
@@ -57,7 +63,12 @@ def sample_times(end: float, turn: float, samples_per_turn: int) -> Samples:
             f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: 1 to 10000 a turn and "
             f"{_LARGEST_SAMPLES} in all"
         )
-    return np.linspace(0.0, end, max(count, 1) + 1)
+    time = np.linspace(0.0, end, max(count, 1) + 1)
+    for switch in switches:
+        nearest = round(switch / end * (time.size - 1))
+        if 0 < nearest < time.size - 1 and abs(time[nearest] - switch) < _ROUNDING * time[1]:
+            time[nearest] = switch
+    return time
 
 
 def late_averages(time: Samples, integrals: Mapping[str, tuple[Samples, str]]) -> dict[str, tuple[Any, ...]]:

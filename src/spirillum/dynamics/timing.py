@@ -90,5 +90,6 @@ class Timing(Options):
             InputError: for a length that is none, too many samples, times that go back, or a wrong duty file.
         """
         end = duration_of(self.turns, turn, self.duration)
-        time = sample_times(end, turn, self.samples_per_turn)
-        return Timetable(end, time, schedule(self.on, self.duty, duty, end))
+        switches = schedule(self.on, self.duty, duty, end)
+        time = sample_times(end, turn, self.samples_per_turn, [switch.time for switch in switches])
+        return Timetable(end, time, switches)
