@@ -19,6 +19,9 @@ def registered(name: str) -> str | None:
     for part in PARTS:
         if name not in QUANTITIES:
             name = name.removeprefix(part)
+    for end in ("_on", "_steady"):
+        if name not in QUANTITIES:
+            name = name.removesuffix(end)
     name = name if name in QUANTITIES else name.partition("_at_")[0]
     return name if name in QUANTITIES else None
 

@@ -153,6 +153,8 @@ _RUNS = (
         "conversion_energy", "", "J", "unmodelled conversion loss: integral of (K_b - K_m) omega_m I", "(17), (18)"
     ),
     Quantity("potential_energy", "", "J", "energy of weight and buoyancy, and of roughness that is pressed", _LINKS),
+    Quantity("time_on", "", "s", "time for which the drive is on", "remote"),
+    Quantity("time_steady", "", "s", "time for which the drive is on and the motion steady", "remote, and the motion"),
     Quantity("battery_charge_used", "", "C", "charge drawn from the battery", _LINKS),
 )
 

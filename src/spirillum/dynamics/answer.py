@@ -31,7 +31,7 @@ def _warnings(dataset: xr.Dataset) -> list[str]:
 
 
 def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
-    """Averages over the last two thirds of a run, its final values, and what happened in it.
+    """Averages of a run, its final values, and what happened in it.
 
     Args:
         dataset: what `spirillum.simulate` returns.
@@ -44,6 +44,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         "motion": dataset.attrs["motion"],
         "error_estimate": quantity(float(dataset.attrs["error_estimate"]), "1", statement=dataset.attrs["known_error"]),
         "events": json.loads(dataset.attrs["events"]),
+        "steady": dataset.attrs["steady"],
         "duration": quantity(float(last["time"]), "s"),
     }
     scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]

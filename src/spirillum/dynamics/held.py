@@ -16,7 +16,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.attributes import run_attributes
-from spirillum.dynamics.sampling import late_averages
+from spirillum.dynamics.averages import STEADY, run_averages, stretches_on
+from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.timing import Timing
 from spirillum.errors import InputError
 from spirillum.quantities import attributes
@@ -110,9 +111,7 @@ def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
     return AxialResponse(*(float(value[0]) for value in values))
 
 
-def motor_transient(
-    motor: Electrics, slip: float, time: Samples, switches: Sequence[tuple[float, float]]
-) -> MotorTransient:
+def motor_transient(motor: Electrics, slip: float, time: Samples, switches: Sequence[Switch]) -> MotorTransient:
     """Integrate (17) with variable-order Adams-Moulton predictor-corrector steps (VODE), as the paper does.
 
     Args:
@@ -200,7 +199,7 @@ def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
 
     Returns:
         Dataset over `time` with position, angles, rates, current, torques, powers, energies and efficiency;
-        averages over the last two thirds of the run as scalars; settings in the attributes.
+        averages over the last two thirds of the run, while on and while steady as scalars; settings in the attributes.
 
     Raises:
         InputError: for a wrong timing or a drive without a motor.
@@ -211,10 +210,13 @@ def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
     if prediction.tail_rotation_rate == 0:
         raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
-    _, time, switches = timing.timetable(turn, float(batch.electrics.duty[0]))
+    end, time, switches = timing.timetable(turn, float(batch.electrics.duty[0]))
     response = axial_response(batch, prediction)
-    transient = motor_transient(batch.electrics, response.slip, time, switches)
-    return _dataset(prediction, batch.electrics, response, transient, switches)
+    moments = np.union1d(time, [switch.time for switch in switches])
+    transient = motor_transient(batch.electrics, response.slip, moments, switches)
+    dataset = _dataset(prediction, batch.electrics, response, transient, switches)
+    averages = _averages(dataset, prediction, switches, end)
+    return dataset.isel(time=np.isin(moments, time)).assign(averages)
 
 
 def _dataset(
@@ -222,7 +224,7 @@ def _dataset(
     motor: Electrics,
     r: AxialResponse,
     m: MotorTransient,
-    switches: Sequence[tuple[float, float]],
+    switches: Sequence[Switch],
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -264,32 +266,37 @@ def _dataset(
         series["position"],
         attributes("position", meaning="distance swum along x", source=_SOURCE),
     )
-    dataset = xr.Dataset(
+    return xr.Dataset(
         data,
         coords={"time": ("time", m.time, attributes("time"))},
         attrs={
             "title": f"Axial swimming of {prediction.robot.name} (two degrees of freedom)",
             **run_attributes(prediction),
             "motion": "held",
+            "steady": STEADY,
             "events": json.dumps([{"time": time, "what": f"duty {duty:g}"} for time, duty in switches]),
             "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
             "integrator": f"VODE Adams, order up to {_HIGHEST_ORDER}, relative tolerance {_TOLERANCE:g}",
             "warnings": "\n".join(prediction.warnings),
         },
     )
-    return dataset.assign(_averages(dataset, prediction))
 
 
-def _averages(dataset: xr.Dataset, prediction: Prediction) -> dict[str, Any]:
-    """Averages over the last two thirds of the run, and its efficiency."""
+def _averages(
+    dataset: xr.Dataset, prediction: Prediction, switches: Sequence[Switch], end: float
+) -> dict[str, tuple[Any, ...]]:
+    """Averages of the run, and its efficiency."""
     integrals = {
         "mean_forward_velocity": ("position", "m/s"),
         "mean_tail_rotation_rate": ("tail_angle", "rad/s"),
         "mean_body_rotation_rate": ("body_angle", "rad/s"),
         "mean_electrical_power": ("electrical_energy", "W"),
     }
-    found = late_averages(
-        dataset["time"].values, {name: (dataset[of].values, unit) for name, (of, unit) in integrals.items()}
+    found = run_averages(
+        dataset["time"].values,
+        {name: (dataset[of].values, unit) for name, (of, unit) in integrals.items()},
+        stretches_on(switches, end),
+        by_turn=False,
     )
     found["hydrodynamic_efficiency"] = (
         (),

@@ -18,10 +18,12 @@ from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.kernels import two_links as kernel
 
-__all__ = ["INTEGRATOR", "TOLERANCE", "Event", "Reach", "Trajectory", "integrate"]
+__all__ = ["BATTERY_EMPTY", "INTEGRATOR", "TOLERANCE", "Event", "Reach", "Trajectory", "integrate"]
 
 TOLERANCE = 1e-8
 """Relative tolerance of a step."""
+BATTERY_EMPTY = "battery empty"
+"""Event after which the battery drives no longer."""
 INTEGRATOR = f"CyRK Tsit5, relative tolerance {TOLERANCE:g}"
 _STEPS_PER_SAMPLE, _STEPS_AT_LEAST = 400, 100_000
 _BREATH = 512  # steps between two signs of life
@@ -135,7 +137,7 @@ def integrate(
         tell(now)
         if stretch.ended:
             events.append(Event(now, stretch.ended))
-        if stretch.ended == _SPENT:
+        if stretch.ended == BATTERY_EMPTY:
             spent = True
         elif stretch.ended:
             times.append(np.array([now]))
@@ -156,7 +158,7 @@ def integrate(
     )
 
 
-_END, _SPENT = "end of the channel", "battery empty"
+_END = "end of the channel"
 _FILM = "film as thin as the roughness"
 
 
@@ -186,7 +188,7 @@ def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
 
         found.append(_Watch(_END, room, last=True))
     if np.isfinite(reach.charge) and links.drive[kernel.KIND] == kernel.MOTOR and not spent:
-        found.append(_Watch(_SPENT, lambda y: reach.charge - y[kernel.CHARGE], last=True))
+        found.append(_Watch(BATTERY_EMPTY, lambda y: reach.charge - y[kernel.CHARGE], last=True))
     return found
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.attributes import run_attributes
+from spirillum.dynamics.averages import STEADY, Stretch, run_averages
 from spirillum.dynamics.integration import INTEGRATOR, Reach, Trajectory
-from spirillum.dynamics.sampling import late_averages
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.kernels import two_links as kernel
 from spirillum.quantities import attributes
@@ -32,7 +33,13 @@ _MEANINGS = {"wobble_angle": "angle between the motor axis and the axis about wh
 
 
 def dataset_of(
-    prediction: Prediction, links: TwoLinks, run: Trajectory, reach: Reach, title: str, warnings: tuple[str, ...]
+    prediction: Prediction,
+    links: TwoLinks,
+    run: Trajectory,
+    on: Sequence[Stretch],
+    reach: Reach,
+    title: str,
+    warnings: tuple[str, ...],
 ) -> xr.Dataset:
     """The run of a free robot.
 
@@ -40,6 +47,7 @@ def dataset_of(
         prediction: the robot with model, friction and calibration.
         links: its two links.
         run: its motion.
+        on: times at constant duty in which its drive is on; their ends are among the run's samples.
         reach: its channel.
         title: title of the dataset.
         warnings: what to be careful about, a sentence each.
@@ -83,7 +91,7 @@ def dataset_of(
         },
         attrs=_attributes(prediction, run, reach, title, warnings),
     )
-    return dataset.assign(_averages(dataset))
+    return dataset.assign(_averages(dataset, on))
 
 
 def _attributes(
@@ -93,6 +101,7 @@ def _attributes(
         "title": title,
         **run_attributes(prediction),
         "motion": "free",
+        "steady": STEADY,
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
         "integrator": INTEGRATOR,
@@ -203,8 +212,8 @@ def _potential(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
     return np.asarray(heavy * run.states[:, kernel.POSITION + 2] + lift)
 
 
-def _averages(dataset: xr.Dataset) -> dict[str, Any]:
-    """Averages over the last two thirds of the run."""
+def _averages(dataset: xr.Dataset, on: Sequence[Stretch]) -> dict[str, tuple[Any, ...]]:
+    """Averages of the run."""
     integrals = {
         "mean_forward_velocity": (dataset["position"].values[:, 0], "m/s"),
         "mean_tail_rotation_rate": (dataset["tail_angle"].values, "rad/s"),
@@ -213,4 +222,4 @@ def _averages(dataset: xr.Dataset) -> dict[str, Any]:
     }
     if "electrical_energy" in dataset:
         integrals["mean_electrical_power"] = (dataset["electrical_energy"].values, "W")
-    return late_averages(dataset["time"].values, integrals)
+    return run_averages(dataset["time"].values, integrals, on, by_turn=True)

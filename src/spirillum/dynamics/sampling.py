@@ -1,10 +1,9 @@
-"""Length and sample times of a run, and averages over it."""
+"""Length and sample times of a run."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["duration_of", "late_averages", "sample_times"]
+__all__ = ["duration_of", "sample_times"]
 
 _LARGEST_SAMPLES = 1_000_000
 _SHORTEST = 1e-6
@@ -69,27 +68,3 @@ def sample_times(end: float, turn: float, samples_per_turn: int, switches: Seque
         if 0 < nearest < time.size - 1 and abs(time[nearest] - switch) < _ROUNDING * time[1]:
             time[nearest] = switch
     return time
-
-
-def late_averages(time: Samples, integrals: Mapping[str, tuple[Samples, str]]) -> dict[str, tuple[Any, ...]]:
-    """Averages over the last two thirds of a run, the final two of the paper's three periods, as scalars of a dataset.
-
-    Args:
-        time: sample times from 0, s, (n,).
-        integrals: name of each average to the integral of its quantity at the samples, (n,), and the average's unit.
-    """
-    first = time[-1] / 3.0
-    span = time[-1] - first
-    note = "average over the last two thirds of the run"
-
-    def slope(values: Samples) -> float:
-        return float((values[-1] - np.interp(first, time, values)) / span) if span > 0 else np.nan
-
-    return {
-        name: (
-            (),
-            slope(values),
-            {"units": unit, "long_name": f"{name.replace('_', ' ')}, {note}", "source": "Section III of BioRob 2012"},
-        )
-        for name, (values, unit) in integrals.items()
-    }

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.averages import stretches_on
 from spirillum.dynamics.held import held_run
-from spirillum.dynamics.integration import integrate
+from spirillum.dynamics.integration import BATTERY_EMPTY, integrate
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.start import reach_of, start_state
 from spirillum.dynamics.timing import Timing
@@ -69,7 +70,8 @@ def simulate(
 
     Returns:
         Dataset over `time`: position, attitude, angles, rates, current, torques, powers, energies; averages over the
-        last two thirds of the run as scalars; settings and events in the attributes.
+        last two thirds of the run, while the drive is on, and while the motion is steady as scalars; settings and
+        events in the attributes.
 
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
@@ -97,12 +99,16 @@ def simulate(
     start = start_state(steady.robot, placed, lying=float(links.weight[: kernel.MOMENT_BODY].sum()) > 0)
     _check_clear(links, start, placed)
     reach = reach_of(steady.robot)
-    run = integrate(links, start, time, switches, reach, progress)
+    moments = np.union1d(time, [switch.time for switch in switches])
+    run = integrate(links, start, moments, switches, reach, progress)
+    driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
+    on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
     said = [*steady.warnings, *_first_form(steady, links, weight=weight)]
     if all(switch.duty == 0 for switch in switches):
         said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
-    return dataset_of(steady, links, run, reach, title, tuple(said))
+    dataset = dataset_of(steady, links, run, on, reach, title, tuple(said))
+    return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
 
 def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:

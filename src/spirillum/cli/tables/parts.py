@@ -15,7 +15,7 @@ __all__ = ["Answer", "add_bands", "add_quantities", "counted", "friendly", "grid
 
 
 Answer = Mapping[str, Any]
-_NUMBERS = ("value", "low", "high", "SI")
+_NUMBERS = ("value", "low", "high", "SI", "while on", "while steady")
 """Columns of numbers."""
 
 

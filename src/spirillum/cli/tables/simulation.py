@@ -7,9 +7,11 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
+from rich.table import Table
 
 from spirillum.answer import quantity
 from spirillum.cli.tables.parts import Answer, add_quantities, grid, show_error
+from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
 
@@ -20,21 +22,43 @@ def table(answer: Answer, console: Console) -> None:
     rows = grid(title, "quantity", "value", "unit", "SI")
     add_quantities(rows, dict(_rows(answer)))
     console.print(rows)
+    console.print(_averages(answer))
     for event in answer["events"]:
         console.print(f"{event['time']:.4g} s: {escape(event['what'])}", highlight=False)
     show_error(answer["error_estimate"], console)
     console.print("means are over the last two thirds of the run", highlight=False)
+    console.print(f"steady: {answer['steady']}", highlight=False, soft_wrap=True)
     for name in ("plot", "movie"):
         if name in answer:
             console.print(f"{name} in {escape(answer[name])}", highlight=False, soft_wrap=True)
     console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 
 
+def _averages(answer: Answer) -> Table:
+    """Means while the drive is on, and while the motion is steady."""
+    table = grid("", "mean", "while on", "while steady", "unit")
+    for name, item in answer.items():
+        if not name.endswith("_on"):
+            continue
+        steady = answer[name.removesuffix("_on") + "_steady"]
+        sized = steady["value"] if item["value"] is None else item["value"]
+        unit = display_unit(sized, item["unit"])
+        values = [in_unit(one["value"], one["unit"], unit) for one in (item, steady)]
+        words = name.removesuffix("_on").removeprefix("mean_").replace("_", " ")
+        table.add_row(words, *values, unit)
+    return table
+
+
 def _rows(answer: Answer) -> list[tuple[str, Any]]:
     """Quantities of the answer, vectors by their parts."""
     found: list[tuple[str, Any]] = []
     for name, item in answer.items():
-        if name == "error_estimate" or not isinstance(item, Mapping) or "unit" not in item:
+        if (
+            name == "error_estimate"
+            or name.endswith(("_on", "_steady"))
+            or not isinstance(item, Mapping)
+            or "unit" not in item
+        ):
             continue
         if isinstance(item["value"], list):
             parts = zip("xyz", item["value"], strict=True)
