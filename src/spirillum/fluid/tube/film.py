@@ -37,6 +37,9 @@ __all__ = ["ROUNDED", "FilmBody", "film_resistance", "frame"]
 ROUNDED = 0.7
 """Angle of a rounded end that belongs to the film, rad."""
 _HALF = 0.5 * np.pi
+_EXTRA = 3
+"""Gauss points of an element beyond its polynomials' degree."""
+_TOUCHES = "the body touches the wall of the tube"
 _PATCH = 1.2
 """Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
 
@@ -95,33 +98,54 @@ class _Surface(NamedTuple):
 
 
 class _Basis(NamedTuple):
-    """Polynomials on [-1, 1] at Gauss points, and their products in pairs."""
+    """Continuous piecewise polynomials on [-1, 1] at Gauss points."""
 
     nodes: Samples
     weights: Samples
     values: Samples
-    """(points, functions): two that are 1 at one end, then bubbles; without the first two if both ends are 0."""
+    """(points, functions)."""
     slopes: Samples
     pairs: Samples
     """Products of slopes with slopes, values with values, slopes with values, values with slopes:
     (4, points, functions^2)."""
 
+    @classmethod
+    def of(cls, nodes: Samples, weights: Samples, values: Samples, slopes: Samples) -> _Basis:
+        """Complete it by the products."""
+        kinds = ((slopes, slopes), (values, values), (slopes, values), (values, slopes))
+        pairs = [(one[:, :, None] * other[:, None, :]).reshape(nodes.size, -1) for one, other in kinds]
+        return cls(nodes, weights, values, slopes, np.stack(pairs))
+
 
 @lru_cache(maxsize=32)
-def _basis(degree: int, *, bubbles: bool) -> _Basis:
-    nodes, weights = np.polynomial.legendre.leggauss(degree + 4)
+def _element(degree: int) -> _Basis:
+    """Polynomials of one element: bubbles that are 0 at both ends, then those that are 1 at its start and its end."""
+    nodes, weights = np.polynomial.legendre.leggauss(degree + _EXTRA)
     legendre = np.polynomial.legendre.legvander(nodes, degree)
     k = np.arange(2, degree + 1)
-    values = (legendre[:, 2:] - legendre[:, :-2]) / np.sqrt(4.0 * k - 2.0)
-    slopes = legendre[:, 1:-1] * np.sqrt(k - 0.5)
-    if not bubbles:
-        values = np.column_stack([0.5 * (1.0 - nodes), 0.5 * (1.0 + nodes), values])
-        slopes = np.column_stack([np.full_like(nodes, -0.5), np.full_like(nodes, 0.5), slopes])
-    pairs = [
-        (one[:, :, None] * other[:, None, :]).reshape(nodes.size, -1)
-        for one, other in ((slopes, slopes), (values, values), (slopes, values), (values, slopes))
-    ]
-    return _Basis(nodes, weights, values, slopes, np.stack(pairs))
+    bubbles = (legendre[:, 2:] - legendre[:, :-2]) / np.sqrt(4.0 * k - 2.0)
+    values = np.column_stack([bubbles, 0.5 * (1.0 - nodes), 0.5 * (1.0 + nodes)])
+    half = np.full_like(nodes, 0.5)
+    return _Basis.of(nodes, weights, values, np.column_stack([legendre[:, 1:-1] * np.sqrt(k - 0.5), -half, half]))
+
+
+def _cut(element: _Basis, pieces: int) -> tuple[Samples, Samples]:
+    """Gauss points and weights of [-1, 1] in equal elements."""
+    starts = np.arange(pieces)[:, None] * 2.0 / pieces - 1.0
+    return (starts + (1.0 + element.nodes) / pieces).ravel(), np.tile(element.weights / pieces, pieces)
+
+
+@lru_cache(maxsize=32)
+def _halves(degree: int) -> _Basis:
+    """Polynomials on both halves of [-1, 1] that meet in the middle and are 0 at the ends."""
+    element = _element(degree)
+    nodes, weights = _cut(element, 2)
+    grids = []
+    for one, scale in ((element.values, 1.0), (element.slopes, 2.0)):
+        bubbles, zero = scale * one[:, :-2], np.zeros_like(one[:, :-2])
+        middle = scale * np.concatenate([one[:, -1], one[:, -2]])[:, None]
+        grids.append(np.hstack([np.vstack([bubbles, zero]), np.vstack([zero, bubbles]), middle]))
+    return _Basis.of(nodes, weights, *grids)
 
 
 class _Stretched(NamedTuple):
@@ -192,11 +216,12 @@ class _Place:
 
 
 class _Resolution(NamedTuple):
-    """Polynomial degrees."""
+    """Degree of polynomials along and around the body; elements of equal length in the stretched coordinates."""
 
-    rounded: int = 12
-    side: int = 16
-    around: int = 22
+    along: int = 8
+    around: int = 13
+    rounded: int = 2
+    side: int = 4
 
 
 _STANDARD = _Resolution()
@@ -227,129 +252,122 @@ def film_resistance(
 def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0) -> Matrix6:
     """Resistance of the film of a body that was read already; arguments and answer of `film_resistance`."""
     place = _Place(body, radius, e, frame(p, psi))
-    degrees = _Resolution(*(max(2, round(fineness * degree)) for degree in _STANDARD))
-    surfaces = _spheroid(place, degrees) if body.half else _with_side(place, degrees)
-    around = _basis(degrees.around, bubbles=True)
-    columns, total = around.values.shape[1], sum(basis.values.shape[1] for basis, _ in surfaces) - len(surfaces) - 1
-    matrix = np.zeros((total, columns, total, columns))
-    loads = np.zeros((total, columns, 6))
-    resistance = np.zeros((6, 6))
-    start = -1  # of the function that is 1 at the rear edge, which the film has not
-    for basis, surface in surfaces:
-        inner = basis.values.shape[1] - 2
-        rows = np.concatenate([[start, start + inner + 1], np.arange(start + 1, start + inner + 1)])
-        kept = np.flatnonzero((rows >= 0) & (rows < total))
-        stiffness, load, shear = _assembled(place, surface, basis, around)
-        into = rows[kept]
-        matrix[np.ix_(into, range(columns), into, range(columns))] += stiffness[
-            np.ix_(kept, range(columns), kept, range(columns))
-        ]
-        loads[into] += load[kept]
-        resistance += shear
-        start += inner + 1
-    size = total * columns
-    factor = cholesky(matrix.reshape(size, size), lower=True, overwrite_a=True, check_finite=False)
-    flow = solve_triangular(factor, loads.reshape(size, 6), lower=True, check_finite=False)
-    return resistance + flow.T @ flow
+    grid = _STANDARD._replace(along=round(fineness * _STANDARD.along), around=round(fineness * _STANDARD.around))
+    surface = _spheroid(place, grid) if body.half else _with_side(place, grid)
+    stiffness, loads, resistance = _assembled(place, surface, _element(grid.along), _halves(grid.around))
+    elements, rows, columns = loads.shape[:3]
+    inner = (rows - 2) * columns  # unknowns that no other element has
+    size = rows * columns
+    stiffness, loads = stiffness.reshape(elements, size, size), loads.reshape(elements, size, 6)
+    # What the ends of the elements are left with when their insides are eliminated; 0 at both edges.
+    ends = np.zeros((elements + 1, columns, elements + 1, columns))
+    push = np.zeros((elements + 1, columns, 6))
+    for k in range(elements):
+        factor = cholesky(stiffness[k, :inner, :inner], lower=True, check_finite=False)
+        coupled = np.hstack([stiffness[k, :inner, inner:], loads[k, :inner]])
+        solved = solve_triangular(factor, coupled, lower=True, check_finite=False)
+        link, flow = solved[:, :-6], solved[:, -6:]
+        resistance += flow.T @ flow
+        left = (stiffness[k, inner:, inner:] - link.T @ link).reshape(2, columns, 2, columns)
+        ends[k : k + 2, :, k : k + 2] += left
+        push[k : k + 2] += (loads[k, inner:] - link.T @ flow).reshape(2, columns, 6)
+    size = (elements - 1) * columns
+    factor = cholesky(ends[1:-1, :, 1:-1].reshape(size, size), lower=True, check_finite=False)
+    flow = solve_triangular(factor, push[1:-1].reshape(size, 6), lower=True, check_finite=False)
+    return np.asarray(resistance + flow.T @ flow)
 
 
-def _assembled(place: _Place, surface: _Surface, basis: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
-    """Stiffness (n_u, n_v, n_u, n_v), loads (n_u, n_v, 6) and resistance of shear of one part of the surface."""
-    points, normals, along, across = surface
+def _assembled(place: _Place, surface: _Surface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
+    """Stiffness (elements, n_u, n_v, n_u, n_v), loads (elements, n_u, n_v, 6) and the shear's resistance."""
+    points, normals, by_u, by_v = surface
     h = place.clearance(points)
     if not h.min() > 0:
-        raise InputError("the body touches the wall of the tube")
-    area = np.einsum("abi,abi->ab", np.cross(along, across), normals)
-    area = np.abs(area)
-    to_u, to_v = np.cross(across, normals), np.cross(normals, along)  # gradients of u and v, times the area
-    sign = np.sign(np.einsum("abi,abi->ab", to_u, along))[..., None]
-    to_u, to_v = sign * to_u / area[..., None], sign * to_v / area[..., None]
-    element = basis.weights[:, None] * around.weights * area
+        raise InputError(_TOUCHES)
+    normal = np.cross(by_u, by_v)
+    squared = np.einsum("abi,abi->ab", normal, normal)
+    to_u, to_v = np.cross(by_v, normal), np.cross(normal, by_u)  # gradients of u and v
+    to_u, to_v = to_u / squared[..., None], to_v / squared[..., None]
+    weights = np.resize(along.weights, h.shape[0])
+    element = weights[:, None] * around.weights * np.sqrt(squared)
     mobility = element * h**3 / 12.0
-    uu = mobility * np.einsum("abi,abi->ab", to_u, to_u)
-    vv = mobility * np.einsum("abi,abi->ab", to_v, to_v)
-    uv = mobility * np.einsum("abi,abi->ab", to_u, to_v)
-    left = np.concatenate(basis.pairs)
-    right = np.concatenate([uu @ around.pairs[1], vv @ around.pairs[0], uv @ around.pairs[3], uv @ around.pairs[2]])
-    n_u, n_v = basis.values.shape[1], around.values.shape[1]
-    stiffness = (left.T @ right).reshape(n_u, n_u, n_v, n_v).transpose(0, 2, 1, 3)
+    uu, vv, uv = (
+        mobility * np.einsum("abi,abi->ab", one, other) for one, other in ((to_u, to_u), (to_v, to_v), (to_u, to_v))
+    )
+    n_u, n_v, n_q = along.values.shape[1], around.values.shape[1], along.nodes.size
+    count = h.shape[0] // n_q
+    slopes, values, mixed, swapped = around.pairs
+    right = np.stack([part @ pairs for part, pairs in ((uu, values), (vv, slopes), (uv, swapped), (uv, mixed))])
+    right = right.reshape(4, count, n_q, -1).swapaxes(0, 1).reshape(count, 4 * n_q, -1)
+    stiffness = along.pairs.reshape(4 * n_q, -1).T @ right
+    stiffness = stiffness.reshape(count, n_u, n_u, n_v, n_v).transpose(0, 1, 3, 2, 4)
     unit = np.eye(3)
     motions = np.concatenate([np.broadcast_to(unit, (*h.shape, 3, 3)), np.cross(unit, points[:, :, None, :])], axis=2)
     through = motions @ normals[..., None]
     tangential = motions - through * normals[:, :, None, :]
     half = (0.5 * element * h)[..., None]
-    by_u = half * (motions @ to_u[..., None])[..., 0]
-    by_v = half * (motions @ to_v[..., None])[..., 0]
-    squeeze = element[..., None] * through[..., 0]
+
+    def tested(density: Samples, one: Samples, other: Samples) -> Samples:
+        rings = np.tensordot(other, density, axes=(0, 1)).reshape(n_v, count, n_q, 6)
+        return np.tensordot(one, rings, axes=(0, 2)).transpose(2, 0, 1, 3)
+
     loads = (
-        np.einsum("ai,bj,abm->ijm", basis.slopes, around.values, by_u, optimize=True)
-        + np.einsum("ai,bj,abm->ijm", basis.values, around.slopes, by_v, optimize=True)
-        + np.einsum("ai,bj,abm->ijm", basis.values, around.values, squeeze, optimize=True)
+        tested(half * (motions @ to_u[..., None])[..., 0], along.slopes, around.values)
+        + tested(half * (motions @ to_v[..., None])[..., 0], along.values, around.slopes)
+        + tested(element[..., None] * through[..., 0], along.values, around.values)
     )
-    flat = (tangential * np.sqrt(element / h)[..., None, None]).transpose(2, 0, 1, 3).reshape(6, -1)
-    return stiffness, loads, flat @ flat.T
+    sheared = (tangential * np.sqrt(element / h)[..., None, None]).swapaxes(0, 2).reshape(6, -1)
+    return stiffness, loads, sheared @ sheared.T
 
 
-def _with_side(place: _Place, degrees: _Resolution) -> list[tuple[_Basis, _Surface]]:
-    """Parts of the film of a body with a straight side, from the rear to the front."""
+def _with_side(place: _Place, grid: _Resolution) -> _Surface:
+    """The film of a body with a straight side, from the rear to the front."""
     body = place.body
-    a, tilt = body.radius, abs(place.axes[2, 0])
+    a, lift = body.radius, place.axes[2, 0]
     reduced = a * place.tube / (place.tube - a)
-    gaps = [place.gap(body.rear[0]), place.gap(body.front[0])]
-    if min(gaps) <= 0:
-        raise InputError("the body touches the wall of the tube")
-    lowest = []
-    for (_, f), gap, outward in ((body.rear, gaps[0], -1.0), (body.front, gaps[1], 1.0)):
-        down = max(-outward * place.axes[2, 0], 0.0)
-        lowest.append(gap - f * (1.0 - np.sqrt(1.0 - down**2)))
-    thinnest = 1.0 / np.hypot(1.0 / lowest[0], 1.0 / lowest[1])
-    if min(lowest) <= 0:
-        raise InputError("the body touches the wall of the tube")
-    widths = [np.sqrt(2.0 * gap * reduced) for gap in gaps]
+    shoulders = (body.rear, body.front)
+    gaps = [place.gap(x) for x, _ in shoulders]
+    # of the rounded ends too, which may be turned to the wall
+    nearest = [
+        gap - f * (1.0 - np.sqrt(1.0 - min(outward * lift, 0.0) ** 2))
+        for (_, f), gap, outward in zip(shoulders, gaps, (-1.0, 1.0), strict=True)
+    ]
+    if not min(*gaps, *nearest) > 0:
+        raise InputError(_TOUCHES)
+    thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
+    width = float(np.sqrt(2.0 * thinnest * reduced) / a)
+    around = _stretched(_halves(grid.around).nodes, -_HALF, _HALF, ((0.0, width),))
+    element = _element(grid.along)
     marks = tuple(
-        (x, 1.0 / (1.0 / width + tilt / gap))
-        for (x, _), width, gap in zip((body.rear, body.front), widths, gaps, strict=True)
+        (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(lift) / gap)))
+        for (x, _), gap in zip(shoulders, gaps, strict=True)
     )
-    around = _stretched(
-        _basis(degrees.around, bubbles=True).nodes,
-        -_HALF,
-        _HALF,
-        ((0.0, float(np.sqrt(2.0 * thinnest * reduced) / a)),),
-    )
-    parts = []
-    basis = _basis(degrees.side, bubbles=False)
-    x = _stretched(basis.nodes, body.rear[0], body.front[0], marks)
-    flat = np.zeros_like(x.at)
-    side = (basis, _revolved(place, around, x.at, x.slope, (x.at, flat + a), (flat + 1.0, flat), (flat, flat + 1.0)))
-    for (joint, f), gap, outward in ((body.rear, lowest[0], -1.0), (body.front, lowest[1], 1.0)):
+    nodes = _cut(element, grid.side)[0]
+    x = _stretched(nodes, body.rear[0], body.front[0], marks)
+    zero, one = np.zeros_like(nodes), np.ones_like(nodes)
+    parts = [_revolved(place, around, x.slope / grid.side, (x.at, a * one), (one, zero), (zero, one))]
+    for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
         if f == 0:
             continue
-        basis = _basis(degrees.rounded, bubbles=False)
-        # the nearest point, where the end is turned to the wall
-        nearest = -np.arcsin(place.axes[2, 0])
         low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
-        angle = _stretched(basis.nodes, low, high, ((float(nearest), float(np.sqrt(2.0 * gap / f))),))
+        mark = (-float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
+        angle = _stretched(_cut(element, grid.rounded)[0], low, high, (mark,))
         sin, cos = np.sin(angle.at), np.cos(angle.at)
-        outline = (joint + f * sin, body.radius - f + f * cos)
-        # the bottom line turns with the joint's, as far as the film reaches
-        surface = _revolved(place, around, outline[0], angle.slope, outline, (f * cos, -f * sin), (sin, cos))
-        parts.append((outward, (basis, surface)))
-    behind = [part for outward, part in parts if outward < 0]
-    before = [part for outward, part in parts if outward > 0]
-    return [*behind, side, *before]
+        outline = (joint + f * sin, a - f + f * cos)
+        end = _revolved(place, around, angle.slope / grid.rounded, outline, (f * cos, -f * sin), (sin, cos))
+        parts.insert(0 if outward < 0 else len(parts), end)
+    return _Surface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
 
 def _revolved(
     place: _Place,
     around: _Stretched,
-    x: Samples,
     rate: Samples,
     outline: tuple[Samples, Samples],
     tangent: tuple[Samples, Samples],
     normal: tuple[Samples, Samples],
 ) -> _Surface:
     """Surface of revolution of an outline (x, rho) with its tangent by s and unit normal; `rate` is ds/du."""
-    turn, turning = place.bottom(x)
+    turn, turning = place.bottom(outline[0])
     fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
     theta = around.at + turn[:, None] * fade
     by_v = around.slope * (1.0 - turn[:, None] * 2.0 * around.at / _HALF**2)
@@ -372,7 +390,7 @@ def _revolved(
     )
 
 
-def _spheroid(place: _Place, degrees: _Resolution) -> list[tuple[_Basis, _Surface]]:
+def _spheroid(place: _Place, grid: _Resolution) -> _Surface:
     """The film of a spheroid: a patch of the stretched unit sphere about its nearest point."""
     body = place.body
     stretch = np.array([body.half, body.radius, body.radius])
@@ -398,19 +416,15 @@ def _spheroid(place: _Place, degrees: _Resolution) -> list[tuple[_Basis, _Surfac
     probe = np.array([-step, 0.0, step])
     h = place.clearance(patch(probe, probe).points)
     if h[1, 1] <= 0:
-        raise InputError("the body touches the wall of the tube")
+        raise InputError(_TOUCHES)
     bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
-    basis, around = _basis(degrees.side, bubbles=False), _basis(degrees.around, bubbles=True)
+    pieces = 2 * grid.rounded
+    nodes = (_cut(_element(grid.along), pieces)[0], _halves(grid.around).nodes)
     beta, theta = (
-        _stretched(nodes, -_PATCH, _PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / bend))),))
-        for nodes, bend in zip((basis.nodes, around.nodes), bends, strict=True)
+        _stretched(unit, -_PATCH, _PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / bend))),))
+        for unit, bend in zip(nodes, bends, strict=True)
     )
     surface = patch(beta.at, theta.at)
-    return [
-        (
-            basis,
-            surface._replace(
-                along=surface.along * beta.slope[:, None, None], across=surface.across * theta.slope[:, None]
-            ),
-        )
-    ]
+    return surface._replace(
+        along=surface.along * beta.slope[:, None, None] / pieces, across=surface.across * theta.slope[:, None]
+    )
