@@ -144,7 +144,8 @@ KINDS: dict[str, Kind] = {
     "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
     "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),
     "angle": Kind("angle", "rad", "90 deg", "-1e6 rad", "1e6 rad"),
-    "pitch": Kind("angle", "rad", "2 deg", "0 deg", "45 deg"),
+    "pitch": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
+    "yaw": Kind("angle", "rad", "2 deg", "-45 deg", "45 deg"),
     "velocity": Kind("velocity", "m/s", "-2 mm/s", "-1e3 m/s", "1e3 m/s"),
     "time": Kind("time", "s", "2 s", "0 s", "1e9 s"),
 }

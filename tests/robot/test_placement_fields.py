@@ -36,6 +36,7 @@ def test_level() -> None:
     assert Placement.of({"pitch": 0.0}).level
     assert not Placement.of({"gap": 1e-3}).level
     assert not Placement.of({"pitch": "1 deg"}).level
+    assert not Placement.of({"pitch": "0 deg", "yaw": "1 deg"}).level
 
 
 @pytest.mark.parametrize(
@@ -51,8 +52,10 @@ def test_level() -> None:
         ({"eccentricity": -0.1}, ("placement.eccentricity = -0.1", "greater than or equal to 0")),
         ({"eccentricity": float("nan")}, ("placement.eccentricity = nan", "finite number")),
         ({"eccentricity": "0.5"}, ("placement.eccentricity = '0.5'", "number")),
-        ({"pitch": "-1 deg"}, ('placement.pitch = "-1 deg"', "0 deg to 45 deg")),
-        ({"pitch": "46 deg"}, ('placement.pitch = "46 deg"', "0 deg to 45 deg")),
+        ({"pitch": "-46 deg"}, ('placement.pitch = "-46 deg"', "-45 deg to 45 deg")),
+        ({"pitch": "46 deg"}, ('placement.pitch = "46 deg"', "-45 deg to 45 deg")),
+        ({"yaw": "46 deg"}, ('placement.yaw = "46 deg"', "-45 deg to 45 deg")),
+        ({"yaw": "-46 deg"}, ('placement.yaw = "-46 deg"', "-45 deg to 45 deg")),
         ({"tail_drop": "-1 mm"}, ('placement.tail_drop = "-1 mm"', "0 m to 100 m")),
         ({"ends": "opn"}, ("placement.ends = 'opn'", "did you mean open?", "'open' or 'closed'")),
         ({"flow": "nan mm/s"}, ('placement.flow = "nan mm/s"', "not finite")),
@@ -60,6 +63,7 @@ def test_level() -> None:
         ({"gapp": "1 mm"}, ("placement.gapp is not a known field (did you mean gap?)", "gap, eccentricity, pitch")),
         ({"gap": "1 mm", "eccentricity": 0.5}, ("placement.eccentricity = 0.5", "placement.gap = 1 mm", "one of them")),
         ({"pitch": "2 deg", "eccentricity": 0.5}, ("placement.pitch = 2 deg", "placement.gap for a pitched robot")),
+        ({"yaw": "-2 deg", "eccentricity": 0.5}, ("placement.yaw = -2 deg", "placement.gap for a yawed robot")),
         ({"flow": "2 mm/s", "ends": "open"}, ("placement.ends = 'open'", "placement.flow = 2 mm/s", "one of them")),
     ],
 )
@@ -77,7 +81,7 @@ def test_every_problem_is_listed() -> None:
 
 @pytest.mark.parametrize("given", ["0.5 mm", 5e-4, ["gap"]])
 def test_what_is_no_table_is_refused(given: Any) -> None:
-    with pytest.raises(InputError, match="allowed: gap, eccentricity, pitch, tail_drop, ends, flow, each by name"):
+    with pytest.raises(InputError, match="allowed: gap, eccentricity, pitch, yaw, tail_drop, ends, flow, each by name"):
         Placement.of(given)
 
 

@@ -27,13 +27,15 @@ SHAPES: dict[str, Outline] = {
     "sphere": body_outline("sphere", 0.018, 0.018, 0.0, None, None),
 }
 pitches = st.floats(0.0, np.radians(30))
+tilts = st.floats(-np.radians(30), np.radians(30))
 offsets = st.floats(-0.009, 0.009)
 
 
-def in_tube(points: np.ndarray, e: float, pitch: float) -> np.ndarray:
+def in_tube(points: np.ndarray, e: float, pitch: float, yaw: float = 0.0) -> np.ndarray:
     """Distance of points of the robot's frame from the tube's axis, by turning and shifting them."""
     x, y, z = points.T
-    return np.hypot(y, -e + x * np.sin(pitch) + z * np.cos(pitch))
+    along, up = x * np.cos(pitch) - z * np.sin(pitch), x * np.sin(pitch) + z * np.cos(pitch)
+    return np.hypot(along * np.sin(yaw) + y * np.cos(yaw), up - e)
 
 
 def turned(points: np.ndarray, phase: float) -> np.ndarray:
@@ -190,3 +192,81 @@ def test_contact_is_bounded_by_coupling_nose_and_the_largest_pitch() -> None:
     capsule = SHAPES["rounded"]
     found = contact_pitch(capsule, np.array([[-0.018, 0.0, 0.0]]), 0.0005, 0.0095, 1e-4)
     assert found == pytest.approx(np.arcsin((0.0095 - 0.009 - 1e-4) / 0.0085), abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@given(e=offsets, pitch=tilts, yaw=tilts)
+def test_yawed_gap_against_points_on_the_surface(shape: str, e: float, pitch: float, yaw: float) -> None:
+    one_side = surface(shape)
+    brute = R - max(in_tube(one_side * [1, side, 1], e, pitch, yaw).max() for side in (-1, 1))
+    found = Seat(R, e, pitch, yaw=yaw).clearance(SHAPES[shape])
+    assert found <= brute + 1e-14
+    assert found == pytest.approx(brute, abs=1e-6)
+    assert Seat(R, e, pitch, yaw=-yaw).clearance(SHAPES[shape]) == pytest.approx(found, abs=1e-14)
+    turned_over = Seat(R, -e, -pitch, yaw=yaw).clearance(SHAPES[shape])
+    assert turned_over == pytest.approx(found, abs=1e-14)
+
+
+@given(pitch=tilts)
+def test_on_the_axis_yaw_is_pitch_to_the_side(pitch: float) -> None:
+    for outline in SHAPES.values():
+        up, aside = Seat(R, 0.0, pitch).clearance(outline), Seat(R, 0.0, yaw=pitch).clearance(outline)
+        assert aside == pytest.approx(up, abs=1e-13)
+    up_tail, aside_tail = (
+        seat.tail_clearance(helix(), 0.0005) for seat in (Seat(R, 0.0, pitch), Seat(R, 0.0, yaw=pitch))
+    )
+    assert aside_tail.clearance == pytest.approx(up_tail.clearance, abs=1e-13)
+
+
+@given(e=offsets, pitch=tilts, yaw=tilts, drop=st.floats(0.0, 0.003))
+def test_whole_turn_of_a_yawed_tail(e: float, pitch: float, yaw: float, drop: float) -> None:
+    points, lower = helix(count=301), np.array([0.0, 0.0, -drop])
+    whole = Seat(R, e, pitch, drop, yaw).tail_clearance(points, 0.0005)
+    phases = np.linspace(0, 2 * np.pi, 361)
+    many = min(R - 0.0005 - in_tube(turned(points, phase) + lower, e, pitch, yaw).max() for phase in phases)
+    assert -1e-14 <= many - whole.clearance <= 0.0025 * np.radians(1) ** 2
+    there = R - 0.0005 - in_tube(turned(points, whole.phase) + lower, e, pitch, yaw)
+    assert there.min() == pytest.approx(whole.clearance, abs=1e-14)
+    assert there[whole.index] == pytest.approx(whole.clearance, abs=1e-14)
+
+
+@pytest.mark.parametrize("shape", ["capsule", "spheroid"])
+@given(gap=st.floats(1e-5, 2e-3), pitch=st.floats(-0.2, 0.2), yaw=st.floats(-0.2, 0.2))
+def test_offset_of_a_yawed_body(shape: str, gap: float, pitch: float, yaw: float) -> None:
+    """Nose down as nose up; the lower of the two seats with that gap; continuous where the yaw goes to zero."""
+    e = Seat.at_gap(SHAPES[shape], R, gap, pitch, yaw=yaw).offset
+    assert Seat(R, e, pitch, yaw=yaw).clearance(SHAPES[shape]) == pytest.approx(gap, abs=1e-13)
+    assert Seat(R, e + 1e-5, pitch, yaw=yaw).clearance(SHAPES[shape]) < gap
+    assert gap < largest_gap(SHAPES[shape], R, pitch, yaw)
+    hardly, straight = (Seat.at_gap(SHAPES[shape], R, gap, pitch, yaw=angle).offset for angle in (1e-9, 0.0))
+    assert hardly == pytest.approx(straight, abs=1e-10)
+
+
+def test_contact_nose_down_and_yawed() -> None:
+    """A ball with a rod behind it, lying: nose down the rod's end touches the roof, yawed it touches sooner."""
+    rod = np.stack([np.linspace(-0.0275, -0.0875, 61), np.zeros(61), np.zeros(61)], axis=-1)
+    gap, e = 5e-4, R - 0.009 - 5e-4
+    down = contact_pitch(SHAPES["sphere"], rod, 0.0005, R, gap, nose_down=True)
+    assert down == pytest.approx(-np.arcsin((R - 0.0005 + e) / 0.0875), abs=1e-9)
+    up, yawed = (contact_pitch(SHAPES["sphere"], rod, 0.0005, R, gap, yaw=yaw) for yaw in (0.0, 0.05))
+    assert 0 < yawed < up
+    where = np.array([-0.0875 * np.cos(yawed) * np.sin(0.05), -e - 0.0875 * np.sin(yawed)])
+    assert np.hypot(*where) == pytest.approx(R - 0.0005, abs=1e-10)
+
+
+def test_axes_of_the_seat() -> None:
+    """Nose to +y with yaw, up with pitch; `forward` is the tube's axis in body axes."""
+    seat = Seat(R, 0.003, 0.2, yaw=0.1)
+    nose = seat.placed(np.array([[1.0, 0.0, 0.0]]))[0] + [0.0, 0.003, 0.0]
+    wanted = [np.cos(0.2) * np.cos(0.1), np.sin(0.2), -np.cos(0.2) * np.sin(0.1)]  # x, up, right
+    np.testing.assert_allclose(nose, wanted, atol=1e-15)
+    np.testing.assert_allclose(seat.rotation @ seat.rotation.T, np.eye(3), atol=1e-15)
+    assert seat.forward[0] == pytest.approx(np.cos(0.2) * np.cos(0.1))
+    assert seat.forward[1] == pytest.approx(-np.sin(0.1))
+    x, rho = np.array([0.01, -0.03]), np.array([0.005, 0.002])
+    many = [
+        R - in_tube(np.stack([0 * t + xi, r * np.cos(t), r * np.sin(t)], axis=1), 0.003, 0.2, 0.1).max()
+        for xi, r in zip(x, rho, strict=True)
+        for t in [np.linspace(0, 2 * np.pi, 2001)]
+    ]
+    np.testing.assert_allclose(seat.distances(x, rho), many, atol=1e-6)

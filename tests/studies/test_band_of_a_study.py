@@ -28,7 +28,7 @@ def leaning(walled: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
         drag[:, 0, 0] = (1e-3 / (place.gap or 0.5e-3) - 3.0 * (place.pitch or 0.0)) * 0.04 / batch.channel_diameter
         return made_up(self, batch) + drag
 
-    def steepest(g: Any, _radius: float, gap: float, _drop: float) -> float:
+    def steepest(g: Any, _radius: float, gap: float, _drop: float, _yaw: float) -> float:
         return (6e-3 + gap - g.amplitude) / g.tail_length
 
     monkeypatch.setattr(type(walled), "axial", axial)

@@ -35,6 +35,7 @@ from spirillum.cli.options import (
     TailDrop,
     TailRate,
     Tolerance,
+    Yaw,
     complete_models,
     complete_parts,
     complete_resistance_models,
@@ -91,6 +92,7 @@ def predict(
     gap: Gap = None,
     eccentricity: Eccentricity = None,
     pitch: Pitch = None,
+    yaw: Yaw = None,
     tail_drop: TailDrop = None,
     ends: Ends = None,
     flow: ImposedFlow = None,
@@ -121,7 +123,7 @@ def predict(
             calibration=calibration,
             posterior=posterior,
             resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
             band=not no_band,
             motion=motion,
             progress=progress,
@@ -144,6 +146,7 @@ def compare_models(
     gap: Gap = None,
     eccentricity: Eccentricity = None,
     pitch: Pitch = None,
+    yaw: Yaw = None,
     tail_drop: TailDrop = None,
     ends: Ends = None,
     flow: ImposedFlow = None,
@@ -171,7 +174,7 @@ def compare_models(
             calibrated=calibrated or None,
             calibration=calibration,
             resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
             progress=progress,
         )
     if target is not None:
@@ -201,6 +204,7 @@ def resistance(
     gap: Gap = None,
     eccentricity: Eccentricity = None,
     pitch: Pitch = None,
+    yaw: Yaw = None,
     tail_drop: TailDrop = None,
     ends: Ends = None,
     flow: ImposedFlow = None,
@@ -223,7 +227,7 @@ def resistance(
             about=about,
             phase=angle(phase),
             resolution={"accuracy": accuracy, "tolerance": tolerance},
-            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow),
+            placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
         )
     renderer.show(result.to_dict(), json=json)
 

@@ -38,12 +38,14 @@ def placement_from(
     tail_drop: str | None,
     ends: str | None,
     flow: str | None,
+    yaw: str | None = None,
 ) -> dict[str, str | float]:
     """Those fields of the placement that were given."""
     fields = {
         "gap": gap,
         "eccentricity": eccentricity,
         "pitch": pitch,
+        "yaw": yaw,
         "tail_drop": tail_drop,
         "ends": ends,
         "flow": flow,

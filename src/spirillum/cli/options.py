@@ -29,6 +29,7 @@ __all__ = [
     "TailDrop",
     "TailRate",
     "Tolerance",
+    "Yaw",
     "complete_frames",
     "complete_models",
     "complete_parts",
@@ -160,7 +161,11 @@ Eccentricity = Annotated[
     typer.Option(help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1."),
 ]
 Pitch = Annotated[
-    str | None, typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is raised, such as 2deg.")
+    str | None,
+    typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is raised, such as 2deg; below 0 lowered."),
+]
+Yaw = Annotated[
+    str | None, typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is turned to +y, such as 2deg.")
 ]
 TailDrop = Annotated[
     str | None,

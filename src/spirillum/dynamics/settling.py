@@ -311,6 +311,8 @@ def _level(placement: Placement | Mapping[str, Any] | None) -> Placement:
     asked = Placement.of(placement)
     if asked.pitch:
         raise InputError(f"placement.pitch = {show(asked.pitch, 'deg')}; allowed: 0 deg, for a level robot settles")
+    if asked.yaw:
+        raise InputError(f"placement.yaw = {show(asked.yaw, 'deg')}; allowed: 0 deg, for a level robot settles")
     if asked.flow:
         raise InputError(f"placement.flow = {show(asked.flow, 'mm/s')}; allowed: none, for its lift is not computed")
     return asked

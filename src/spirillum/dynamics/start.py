@@ -42,7 +42,7 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
 
 def _check(robot: Robot, placement: Placement) -> None:
     unset = Placement()
-    for name in ("tail_drop", "ends", "flow"):
+    for name in ("yaw", "tail_drop", "ends", "flow"):
         if getattr(placement, name) != getattr(unset, name):
             raise InputError(
                 f"placement.{name} = {getattr(placement, name)} is nothing that a free run knows; allowed: gap or "

@@ -23,7 +23,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
 from spirillum.swimming.prediction import Prediction, predict, prepared
-from spirillum.units import KINDS, Kind, parse_option
+from spirillum.units import KINDS, Kind, parse_option, show
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -226,6 +226,7 @@ def flow(
     angle = parse_option("phase", phase, KINDS["angle"])
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    _check_not_yawed(placement)
     wanted = Resolution.of(resolution)
     if wanted.accuracy is None and model == "slender":
         wanted = wanted.model_copy(update={"accuracy": "high"})
@@ -291,7 +292,20 @@ def seat_in_tube(
     """
     if _checked_model(model) != "tube":
         return None
+    _check_not_yawed(placement)
     return seat_of(prepared(robot, model, placement=placement, resolution=resolution)[2])
+
+
+def _check_not_yawed(placement: Placement | Mapping[str, Any] | None) -> None:
+    """Refuse a yawed robot: the flow in the tube is summed for one side, of which the other is the mirror image.
+
+    Raises:
+        InputError: for a yaw.
+    """
+    yaw = Placement.of(placement).yaw
+    if yaw:
+        why = "for the flow around a yawed robot is not computed"
+        raise InputError(f"placement.yaw = {show(yaw, 'deg')}; allowed: 0 deg, {why}")
 
 
 def plane_around(

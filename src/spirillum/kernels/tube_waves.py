@@ -246,21 +246,25 @@ def station_waves(extensions: Samples, angle: Samples, phase: Samples, out: Samp
 
 @compiled
 def tilted_waves(
-    extensions: Samples, angle: Samples, phase: Samples, theta: Samples, pitch: float, out: Samples
+    extensions: Samples, angle: Samples, phase: Samples, theta: Samples, rotation: Samples, out: Samples
 ) -> None:
-    """Velocities (x, rho, theta) of all waves on rings about a pitched axis, in cylindrical components about it.
+    """Velocities (x, rho, theta) of all waves on rings about a tilted axis, in cylindrical components about it.
 
     Args:
         extensions: at the rings' points, (angles, n, orders, 3, 3).
         angle: polar angles of the points about the tube's axis, (angles, n).
         phase: k x there, (angles, n).
         theta: angles about the rings' axis, (angles,).
-        pitch: angle by which that axis rises forward.
+        rotation: from the rings' axes to the tube's, (3, 3).
         out: to be filled: component; even, odd; angle; ring; real, imaginary; order; wall component.
     """
-    c, s = math.cos(pitch), math.sin(pitch)
     for t in range(theta.size):
         cos_t, sin_t = math.cos(theta[t]), math.sin(theta[t])
+        x_0, y_0, z_0 = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+        outward = rotation[:, 1] * cos_t + rotation[:, 2] * sin_t
+        around = rotation[:, 2] * cos_t - rotation[:, 1] * sin_t
+        x_1, y_1, z_1 = outward[0], outward[1], outward[2]
+        x_2, y_2, z_2 = around[0], around[1], around[2]
         for n in range(angle.shape[1]):
             cos_a, sin_a = math.cos(angle[t, n]), math.sin(angle[t, n])
             real, imaginary = math.cos(phase[t, n]), math.sin(phase[t, n])
@@ -275,7 +279,6 @@ def tilted_waves(
                         for part in range(2):
                             x = -u * like * imaginary if part == 0 else u * like * real
                             wave = real if part == 0 else imaginary
-                            up, side = c * y * wave - s * x, z * wave
-                            out[0, parity, t, n, part, p, w] = c * x + s * y * wave
-                            out[1, parity, t, n, part, p, w] = up * cos_t + side * sin_t
-                            out[2, parity, t, n, part, p, w] = side * cos_t - up * sin_t
+                            out[0, parity, t, n, part, p, w] = x_0 * x + (y_0 * y + z_0 * z) * wave
+                            out[1, parity, t, n, part, p, w] = x_1 * x + (y_1 * y + z_1 * z) * wave
+                            out[2, parity, t, n, part, p, w] = x_2 * x + (y_2 * y + z_2 * z) * wave

@@ -40,6 +40,7 @@ __all__ = [
     "Velocity",
     "Viscosity",
     "Voltage",
+    "Yaw",
     "field_values",
 ]
 
@@ -126,6 +127,7 @@ Viscosity = Annotated[float, *_quantity("viscosity")]
 Rate = Annotated[float, *_quantity("rate")]
 Torque = Annotated[float, *_quantity("torque")]
 Pitch = Annotated[float, *_quantity("pitch")]
+Yaw = Annotated[float, *_quantity("yaw")]
 Velocity = Annotated[float, *_quantity("velocity")]
 RotaryFriction = Annotated[float, *_quantity("rotary friction")]
 MagneticMoment = Annotated[float, *_quantity("magnetic moment")]

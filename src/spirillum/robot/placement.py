@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.robot.arguments import Options
-from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity
+from spirillum.robot.fields import Length, LengthOrZero, Pitch, Velocity, Yaw
 from spirillum.units import show
 
 __all__ = ["Ends", "Placement"]
@@ -21,8 +21,9 @@ Ends = Literal["open", "closed"]
 class Placement(Options):
     """Seat of a robot in its channel, for models that compute the walls; frozen, SI inside.
 
-    The channel is horizontal, the robot's axis lies in the vertical plane through the channel's axis. What is None
-    was left open: a model then takes its own default, or answers with a band over what is open.
+    The channel is horizontal, the body's mid-length lies in the vertical plane through the channel's axis, and without
+    yaw so does the robot's axis. What is None was left open: a model then takes its own default, or answers with a band
+    over what is open.
     """
 
     argument: ClassVar[str] = "placement"
@@ -33,7 +34,9 @@ class Placement(Options):
     eccentricity: Annotated[float | None, Field(strict=True, ge=0.0, le=1.0, allow_inf_nan=False)] = None
     """Instead of `gap`, for a level robot: offset of the body's centre over R - a, towards the floor; 0 on the axis."""
     pitch: Pitch | None = None
-    """Angle by which the nose is raised, about the body's mid-length."""
+    """Angle by which the nose is raised, about the body's mid-length; negative for a nose that is lowered."""
+    yaw: Yaw = 0.0
+    """Angle by which the nose is turned to +y (left), about the vertical through the body's mid-length."""
     tail_drop: LengthOrZero = 0.0
     """Distance by which the tail's axis is lowered: a surrogate, for no rigid tail on a revolute joint does it."""
     ends: Ends | None = None
@@ -54,6 +57,11 @@ class Placement(Options):
                 f"placement.pitch = {show(self.pitch, 'deg')} is given together with placement.eccentricity; "
                 "allowed: 0 deg, or placement.gap for a pitched robot"
             )
+        if self.eccentricity is not None and self.yaw:
+            problems.append(
+                f"placement.yaw = {show(self.yaw, 'deg')} is given together with placement.eccentricity; "
+                "allowed: 0 deg, or placement.gap for a yawed robot"
+            )
         if self.flow is not None and self.ends is not None:
             problems.append(
                 f"placement.ends = '{self.ends}' is given together with placement.flow = {show(self.flow, 'mm/s')}; "
@@ -71,7 +79,7 @@ class Placement(Options):
     @property
     def level(self) -> bool:
         """Whether the robot's axis is known to be parallel to the channel's."""
-        return self.pitch == 0 or self.eccentricity is not None
+        return self.eccentricity is not None or (self.pitch == 0 and self.yaw == 0)
 
     def ends_of(self, channel_length: float) -> Ends | None:
         """Ends in force for a channel of that length, m (infinite or NaN: none is known); None with an imposed flow."""

@@ -1,16 +1,17 @@
 """Seat of a robot in its tube: where its axis runs, and the distances between its surfaces and the wall.
 
 A `Placement` is what a user asks for; a `Seat` is the geometry that follows from it. The tube's axis is horizontal. The
-robot's axis lies in the vertical plane through it, pitched nose up by alpha about the y axis through the body's
-mid-length, which is e below the tube's axis. A point (x, y, z) of the robot's frame then lies at height
--e + x sin(alpha) + z cos(alpha) and at y to the side.
+body's mid-length is e below it. There the robot is pitched nose up by alpha and then yawed by psi about the vertical,
+nose to +y: its axis is (cos(alpha) cos(psi), cos(alpha) sin(psi), sin(alpha)). A point (x, y, z) of the robot's frame
+lies at the height -e + x sin(alpha) + z cos(alpha), and to the side at (x cos(alpha) - z sin(alpha)) sin(psi)
++ y cos(psi).
 
-The points (x, rho cos(theta), rho sin(theta)) of a ring about the robot's axis have the squared distance
+Without yaw the points (x, rho cos(theta), rho sin(theta)) of a ring about the robot's axis have the squared distance
 
     rho^2 + d^2 + 2 d rho cos(alpha) s - rho^2 sin(alpha)^2 s^2,   d = -e + x sin(alpha), s = sin(theta)
 
 from the tube's axis: a parabola in s, so that the farthest point of a ring is known in closed form, and with it the
-farthest point of a tail over a whole turn. Lengths in m, angles in rad.
+farthest point of a tail over a whole turn. With yaw it is found by Newton's method. Lengths in m, angles in rad.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ GAP_SHARE = 1.0 / 18.0
 GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
 """Least and largest gap over the body's radius of the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
 STEEPEST_PITCH = 0.25 * np.pi
-"""Largest pitch of a placement, rad."""
+"""Largest pitch of a placement, nose up or down, rad."""
 _SAMPLES = 257
 _ROUNDS = 4  # each narrows the bracket of the farthest ring by a factor of 128
 _STEPS = 181  # pitches that are tried before the first contact is bracketed
 _NARROWEST = 1e-10  # of the bracket around it, rad
+_AROUND = 64  # points of a yawed ring among which Newton's method begins
+_NEWTON_STEPS = 6
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,8 @@ class Seat:
     """alpha, nose up."""
     tail_drop: float = 0.0
     """Distance by which the tail's axis is lowered, across itself; the tail turns about the lowered axis."""
+    yaw: float = 0.0
+    """psi, nose to +y (to the left, seen along the tube)."""
 
     @classmethod
     def of(cls, placement: Placement, body: Outline, body_diameter: float, radius: float) -> Seat:
@@ -80,10 +85,12 @@ class Seat:
         if placement.eccentricity is not None:
             return cls(radius, placement.eccentricity * (radius - 0.5 * body_diameter), 0.0, placement.tail_drop)
         gap = gap_of(placement, body_diameter, radius)
-        return cls.at_gap(body, radius, gap, placement.pitch or 0.0, placement.tail_drop)
+        return cls.at_gap(body, radius, gap, placement.pitch or 0.0, placement.tail_drop, placement.yaw)
 
     @classmethod
-    def at_gap(cls, body: Outline, radius: float, gap: float, pitch: float = 0.0, tail_drop: float = 0.0) -> Seat:
+    def at_gap(
+        cls, body: Outline, radius: float, gap: float, pitch: float = 0.0, tail_drop: float = 0.0, yaw: float = 0.0
+    ) -> Seat:
         """The seat at which the body's smallest distance to the wall is `gap`: of two such seats the lower one.
 
         For a level body of largest radius a, e = R - a - gap. The offset is NaN where the gap is larger than
@@ -95,8 +102,14 @@ class Seat:
             gap: smallest distance between body and wall.
             pitch: nose-up pitch alpha.
             tail_drop: distance by which the tail's axis is lowered.
+            yaw: psi, nose to +y.
         """
-        return cls(radius, _offset(body, radius, gap, pitch), pitch, tail_drop)
+        return cls(radius, _offset(body, radius, gap, pitch, yaw), pitch, tail_drop, yaw)
+
+    @property
+    def level(self) -> bool:
+        """Whether the robot's axis is parallel to the tube's."""
+        return self.pitch == 0 and self.yaw == 0
 
     def clearance(self, outline: Outline) -> float:
         """Smallest distance between a solid of revolution and the wall, m; negative where it cuts into it.
@@ -109,7 +122,7 @@ class Seat:
             low, high = 0.0, 1.0
             for _ in range(_ROUNDS):
                 t = np.linspace(low, high, _SAMPLES)
-                distance, _ = _farthest(*piece.points(t), self.offset, self.pitch)
+                distance, _ = self._farthest(*piece.points(t))
                 at = int(np.argmax(distance))
                 reach = max(reach, float(distance[at]))
                 low, high = float(t[max(at - 1, 0)]), float(t[min(at + 1, _SAMPLES - 1)])
@@ -125,17 +138,23 @@ class Seat:
             wire_radius: radius of the wire.
         """
         x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-        lowered = self.offset + self.tail_drop * np.cos(self.pitch)
-        distance, s = _farthest(x, np.hypot(y, z), lowered, self.pitch)
+        distance, theta = self._farthest(x, np.hypot(y, z), self.tail_drop)
         index = int(np.argmax(distance))
-        phase = float(np.arcsin(s[index]) - np.arctan2(z, y)[index])
+        phase = float((theta - np.arctan2(z, y))[index])
         return TailClearance(float(self.radius - wire_radius - distance[index]), phase % (2.0 * np.pi), index)
 
     @property
     def rotation(self) -> Samples:
         """From the robot's axes to the tube's, 3x3."""
         c, s = np.cos(self.pitch), np.sin(self.pitch)
-        return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        return np.array([[cos * c, -cos * s, sin], [s, c, 0.0], [-sin * c, sin * s, cos]])
+
+    @property
+    def forward(self) -> Samples:
+        """The tube's axis in body axes (x along the robot, y to the left, z up), (3,)."""
+        along, up, right = self.rotation[0]
+        return np.array([along, -right, up])
 
     def placed(self, points: Samples) -> Samples:
         """Points in the robot's axes as points about the tube's axis, (n, 3)."""
@@ -144,11 +163,69 @@ class Seat:
 
     def distances(self, x: Samples, rho: Samples) -> Samples:
         """Smallest distances from the wall of rings about the robot's axis, sampled around each."""
-        theta = np.linspace(0.0, np.pi, 181)
-        height = x[..., None] * np.sin(self.pitch) + rho[..., None] * np.cos(theta) * np.cos(self.pitch) - self.offset
-        farthest = np.max(np.hypot(height, rho[..., None] * np.sin(theta)), axis=-1)
-        nearest: Samples = self.radius - farthest
+        theta = np.linspace(0.0, np.pi, 181) if self.yaw == 0 else np.linspace(0.0, 2.0 * np.pi, 361)
+        up, right = rho[..., None] * np.cos(theta), rho[..., None] * np.sin(theta)
+        height = x[..., None] * np.sin(self.pitch) + up * np.cos(self.pitch) - self.offset
+        if self.yaw:
+            along = x[..., None] * np.cos(self.pitch) - up * np.sin(self.pitch)
+            right = right * np.cos(self.yaw) - along * np.sin(self.yaw)
+        nearest: Samples = self.radius - np.max(np.hypot(height, right), axis=-1)
         return nearest
+
+    def _farthest(self, x: Samples, rho: Samples, drop: float = 0.0) -> tuple[Samples, Samples]:
+        """Distance of the farthest point of each ring from the tube's axis, m, and its angle theta.
+
+        Args:
+            x: of the rings, (n,).
+            rho: their radii, (n,).
+            drop: distance by which their axis is lowered, across itself.
+        """
+        pitch = self.pitch
+        d = -(self.offset + drop * np.cos(pitch)) + x * np.sin(pitch)
+        if self.yaw:
+            sideways = (x * np.cos(pitch) + drop * np.sin(pitch)) * np.sin(self.yaw)
+            return _farthest_of_ellipses(
+                (d, rho * np.cos(pitch)), (sideways, -rho * np.sin(pitch) * np.sin(self.yaw), rho * np.cos(self.yaw))
+            )
+        along, across = d * np.cos(pitch), rho * np.sin(pitch) ** 2
+        inside = np.abs(along) < across  # else the ring's lowest or highest point is the farthest
+        s = np.where(inside, along / np.where(inside, across, 1.0), np.where(along < 0, -1.0, 1.0))
+        sideways = rho * np.sqrt(1.0 - s**2)
+        return np.hypot(sideways, d + rho * np.cos(pitch) * s), np.arcsin(s)
+
+
+def _farthest_of_ellipses(
+    height: tuple[Samples, Samples], side: tuple[Samples, Samples, Samples]
+) -> tuple[Samples, Samples]:
+    """Largest distance from the origin on each ellipse of the cross-section, and the angle at which it is.
+
+    Args:
+        height: its mean and its coefficient of sin(theta), (n,) each.
+        side: its mean and its coefficients of sin(theta) and cos(theta), (n,) each.
+    """
+    theta = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
+    s, c = np.sin(theta), np.cos(theta)
+    squared = (height[0][:, None] + height[1][:, None] * s) ** 2
+    squared += (side[0][:, None] + side[1][:, None] * s + side[2][:, None] * c) ** 2
+    angle = theta[np.argmax(squared, axis=1)]
+
+    def at(angle: Samples) -> tuple[Samples, Samples]:
+        s, c = np.sin(angle), np.cos(angle)
+        return height[0] + height[1] * s, side[0] + side[1] * s + side[2] * c
+
+    best = np.hypot(*at(angle))
+    found = angle
+    for _ in range(_NEWTON_STEPS):
+        s, c = np.sin(angle), np.cos(angle)
+        up, aside = at(angle)
+        up_1, aside_1 = height[1] * c, side[1] * c - side[2] * s
+        slope = up * up_1 + aside * aside_1
+        bend = up_1**2 + aside_1**2 - up * height[1] * s - aside * (side[1] * s + side[2] * c)
+        step = np.where(bend < 0, -slope / np.where(bend < 0, bend, 1.0), 0.0)
+        angle = angle + np.clip(step, -2.0 * np.pi / _AROUND, 2.0 * np.pi / _AROUND)
+        distance = np.hypot(*at(angle))
+        found, best = np.where(distance > best, angle, found), np.maximum(distance, best)
+    return best, found
 
 
 def gap_of(placement: Placement, body_diameter: float, radius: float) -> float:
@@ -168,43 +245,44 @@ def gap_of(placement: Placement, body_diameter: float, radius: float) -> float:
 
 
 @lru_cache(maxsize=4096)
-def largest_gap(outline: Outline, radius: float, pitch: float = 0.0) -> float:
+def largest_gap(outline: Outline, radius: float, pitch: float = 0.0, yaw: float = 0.0) -> float:
     """Largest smallest distance to the wall that any offset leaves, m; negative where the body does not fit.
 
     Args:
         outline: outline of the body.
         radius: radius R of the tube.
         pitch: nose-up pitch alpha.
+        yaw: psi, nose to +y.
     """
-    return Seat(radius, _centred(outline, radius, pitch), pitch).clearance(outline)
+    return Seat(radius, _centred(outline, radius, pitch, yaw), pitch, yaw=yaw).clearance(outline)
 
 
 @lru_cache(maxsize=4096)
-def _offset(outline: Outline, radius: float, gap: float, pitch: float) -> float:
+def _offset(outline: Outline, radius: float, gap: float, pitch: float, yaw: float) -> float:
     """Offset e of `Seat.at_gap`, m."""
-    if pitch == 0:
+    if pitch == 0 and yaw == 0:
         e = radius - _largest_radius(outline) - gap
         return float(e) if e >= -1e-12 * radius else np.nan
     from scipy.optimize import brentq
 
     def spare(e: float) -> float:
-        return Seat(radius, e, pitch).clearance(outline) - gap
+        return Seat(radius, e, pitch, yaw=yaw).clearance(outline) - gap
 
-    centred = _centred(outline, radius, pitch)
+    centred = _centred(outline, radius, pitch, yaw)
     if spare(centred) < 0:
         return np.nan
     floor = radius + max(abs(float(x)) for p in outline.pieces for x in p.points(np.linspace(0.0, 1.0, 3))[0])
     return float(brentq(spare, centred, floor, xtol=1e-13 * radius, rtol=1e-14))
 
 
-def _centred(outline: Outline, radius: float, pitch: float) -> float:
+def _centred(outline: Outline, radius: float, pitch: float, yaw: float) -> float:
     """Offset e at which the smallest distance to the wall is largest: it is concave in e, m."""
-    if pitch == 0:
+    if pitch == 0:  # yaw leaves the mirror image above and below
         return 0.0
     from scipy.optimize import minimize_scalar
 
     found = minimize_scalar(
-        lambda e: -Seat(radius, e, pitch).clearance(outline),
+        lambda e: -Seat(radius, e, pitch, yaw=yaw).clearance(outline),
         bounds=(-radius, radius),
         options={"xatol": 1e-9 * radius},
     )
@@ -214,16 +292,6 @@ def _centred(outline: Outline, radius: float, pitch: float) -> float:
 def _largest_radius(outline: Outline) -> float:
     """Largest radius a of a solid of revolution, m; where it is reached does not matter in a level tube."""
     return -Seat(0.0, 0.0).clearance(outline)
-
-
-def _farthest(x: Samples, rho: Samples, e: float, pitch: float) -> tuple[Samples, Samples]:
-    """Distance of the farthest point of each ring from the tube's axis, m, and the sine of its angle theta."""
-    d = -e + x * np.sin(pitch)
-    along, across = d * np.cos(pitch), rho * np.sin(pitch) ** 2
-    inside = np.abs(along) < across  # else the ring's lowest or highest point is the farthest
-    s = np.where(inside, along / np.where(inside, across, 1.0), np.where(along < 0, -1.0, 1.0))
-    sideways = rho * np.sqrt(1.0 - s**2)
-    return np.hypot(sideways, d + rho * np.cos(pitch) * s), s
 
 
 def contact_pitch(
@@ -236,11 +304,14 @@ def contact_pitch(
     coupling: Outline | None = None,
     tail_drop: float = 0.0,
     clearance: float = 0.0,
+    yaw: float = 0.0,
+    nose_down: bool = False,
 ) -> float:
-    """Largest nose-up pitch at which tail and coupling keep a clearance from the wall while the body keeps its gap.
+    """Largest pitch at which tail and coupling keep a clearance from the wall while the body keeps its gap.
 
-    The robot is raised from level until the wire at any phase, or the coupling, comes to the clearance, or until the
-    nose leaves the body no seat with that gap; at most `STEEPEST_PITCH`. Rad; NaN where a level robot does not fit.
+    The nose is raised from level, or lowered, until the wire at any phase, or the coupling, comes to the clearance, or
+    until the nose leaves the body no seat with that gap; at most `STEEPEST_PITCH`. Rad, negative for a lowered nose;
+    NaN where a level robot does not fit.
 
     Args:
         body: outline of the body.
@@ -251,10 +322,13 @@ def contact_pitch(
         coupling: outline of the coupling's solid, where there is one; it stays on the robot's axis.
         tail_drop: distance by which the tail's axis is lowered.
         clearance: smallest distance allowed between the wire's surface, or the coupling, and the wall.
+        yaw: psi, nose to +y.
+        nose_down: lower the nose instead of raising it.
     """
+    sign = -1.0 if nose_down else 1.0
 
     def spare(pitch: float) -> float:
-        seat = Seat.at_gap(body, radius, gap, pitch, tail_drop)
+        seat = Seat.at_gap(body, radius, gap, sign * pitch, tail_drop, yaw)
         if np.isnan(seat.offset):
             return -radius
         tail = seat.tail_clearance(points, wire_radius).clearance
@@ -266,9 +340,9 @@ def contact_pitch(
     tried = np.linspace(0.0, STEEPEST_PITCH, _STEPS)
     touching = next((step for step in range(1, _STEPS) if spare(float(tried[step])) < 0), None)
     if touching is None:
-        return STEEPEST_PITCH
+        return sign * STEEPEST_PITCH
     low, high = float(tried[touching - 1]), float(tried[touching])
     while high - low > _NARROWEST:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if spare(middle) < 0 else (middle, high)
-    return low
+    return sign * low

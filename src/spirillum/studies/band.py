@@ -132,7 +132,9 @@ def reference_place(settings: Mapping[str, Any]) -> str:
     radii = [0.5 * robot["body"]["diameter"] for robot in settings.get("robots", [])]
     gaps = sorted({show(placement.get("gap") or GAP_SHARE * radius, "mm") for radius in radii}, key=len)
     pitch = placement.get("pitch") or 0.0
-    tilt = f"pitch {show(pitch, 'deg')}" if pitch else "level"
+    yaw = placement.get("yaw") or 0.0
+    tilts = [f"{name} {show(angle, 'deg')}" for name, angle in (("pitch", pitch), ("yaw", yaw)) if angle]
+    tilt = ", ".join(tilts) or "level"
     return f"gap {' or '.join(gaps) if len(gaps) <= 2 else 'of the reference place'}, {tilt}"
 
 

@@ -121,25 +121,25 @@ def band_places(batch: RobotBatch, model: SwimmerModel) -> list[Placement]:
         return []
     g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
     known = batch.placement
-    gaps = _gaps(g, radius, known.pitch or 0.0) if "gap" in over else [known.gap]
+    gaps = _gaps(g, radius, known.pitch or 0.0, known.yaw) if "gap" in over else [known.gap]
     places = []
     for gap in gaps:
         assert gap is not None  # noqa: S101 - either open or given
         alike = g._replace(wavelength=1.0, hand=1.0)
-        steepest = _steepest(alike, radius, gap, known.tail_drop) if "pitch" in over else 0.0
+        steepest = _steepest(alike, radius, gap, known.tail_drop, known.yaw) if "pitch" in over else 0.0
         pitches = np.linspace(0.0, steepest, PLACES_PER_FIELD).tolist() if "pitch" in over else [known.pitch]
         places += [known.model_copy(update={"gap": gap, "pitch": pitch}) for pitch in pitches]
     return places
 
 
-def _gaps(g: RobotGeometry, radius: float, pitch: float) -> list[float]:
-    room = largest_gap(g.body, radius, pitch)
+def _gaps(g: RobotGeometry, radius: float, pitch: float, yaw: float) -> list[float]:
+    room = largest_gap(g.body, radius, pitch, yaw)
     ends = [min(share * 0.5 * g.body_diameter, room) for share in GAP_BAND]
     return [float(gap) for gap in np.geomspace(ends[1], ends[0], PLACES_PER_FIELD)]
 
 
 @lru_cache(maxsize=4096)
-def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float) -> float:
+def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: float) -> float:
     """Pitch at which tail or coupling keep no more than the clearance, rad; 0 where even a level robot does not.
 
     The tail stands for all that it sweeps in a turn, so that tails which differ in wavelength and hand alone share it.
@@ -157,6 +157,7 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float) -> float
         coupling=g.outlines.get("coupling"),
         tail_drop=drop,
         clearance=_SLACK * WIRE_FILM * wire,
+        yaw=yaw,
     )
     return 0.0 if np.isnan(found) else found
 

@@ -76,7 +76,7 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
         if wires:
             link = _Link.of(solids, wires, drop)
             strengths = _conjugate_gradients(link, link.motion - solids.wrenches(solids.moving, link.sent))
-            answer = [solids.solve(parity, link.sent[parity] @ strengths) for parity in (0, 1)]
+            answer = solids.solve([family @ strengths for family in link.sent])
             matrix = matrix + link.motion.T @ strengths - solids.wrenches(answer)
             matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
             even, odd = (moving - lost for moving, lost in zip(solids.moving, answer, strict=True))
@@ -157,13 +157,13 @@ class _Link:
             return cls(solids, lines, system, mobility, motion, ())
         sent = _sent_unbounded(solids, lines, system)
         waves = solids.waves(0.5 * (solids.gap + distance), placed)
-        for family, wall in zip(sent, solids.rings.sent(waves, solids.rows, placed), strict=True):
+        for family, wall in zip(sent, solids.sent(waves, placed), strict=True):
             family[:, :forces] -= wall @ along
         return cls(solids, lines, system, mobility, motion, sent)
 
     def apply(self, strengths: Samples) -> Samples:
         """Velocities at the stations from forces and moments there, the solids held."""
-        answer = [self.solids.solve(parity, self.sent[parity] @ strengths) for parity in (0, 1)]
+        answer = self.solids.solve([family @ strengths for family in self.sent])
         velocities: Samples = self.mobility @ strengths - self.solids.wrenches(answer, self.sent)
         return velocities
 

@@ -58,6 +58,8 @@ def placement_answer(batch: RobotBatch) -> dict[str, Any]:
         "pitch": quantity(seat.pitch, "rad"),
         "ends": batch.placement.ends_of(number_of(batch.channel_length, 0)),
     }
+    if seat.yaw:
+        found["yaw"] = quantity(seat.yaw, "rad")
     if seat.tail_drop:
         note = "a surrogate: no rigid tail on a revolute joint does it"
         found["tail_drop"] = quantity(seat.tail_drop, "m", note=note)
@@ -155,7 +157,7 @@ def _films(batch: RobotBatch, part: str) -> _Films:
             continue
         outlines = g.outlines
         asked[index] = gap_of(batch.placement, g.body_diameter, radius)
-        largest[index] = largest_gap(outlines["body"], radius, batch.placement.pitch or 0.0)
+        largest[index] = largest_gap(outlines["body"], radius, batch.placement.pitch or 0.0, batch.placement.yaw)
         if not _THINNEST_GAP * g.body_diameter <= asked[index] <= largest[index]:
             continue
         seat = seat_of(batch, index)

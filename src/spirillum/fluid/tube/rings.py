@@ -18,7 +18,7 @@ from spirillum.fluid.tube.wall import Waves, each, extensions, point_waves, time
 from spirillum.fluid.wire.revolution import Panels
 from spirillum.robot.seat import Seat
 
-__all__ = ["LevelRings", "Rings", "Rows", "TiltedRings"]
+__all__ = ["LevelRings", "Rings", "Rows", "System", "TiltedRings"]
 
 _FINER = 4
 """Nodes that average waves over a panel, over its own."""
@@ -28,6 +28,8 @@ _TIER = 1.6
 """Ratio of the distances from the wall in one tier of panels."""
 _AVERAGED_TIERS = 3
 """Tiers near the wall in which waves are averaged over panels."""
+_MOST_VALUES = 500_000
+"""Values of waves around rings that are held at a time: they stay in the cache, and their memory is used again."""
 
 
 class Rows(NamedTuple):
@@ -50,28 +52,32 @@ class Rows(NamedTuple):
         return np.concatenate([values[rows] for values, rows in zip(modes, self.of_mode, strict=True)])
 
 
+System = tuple[Rows, ...]
+"""Families whose unknowns the wall couples, one after the other: each parity by itself, or both of them."""
+
+
 class Rings(ABC):
     """What the wall does to solids of revolution: their rings see its waves as Fourier modes about their own axis."""
 
     @abstractmethod
-    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """Take what the wall reflects of the solids' tractions from their single layer's matrices.
 
         Args:
             waves: those that matter between the solids.
-            rows: of both parities.
-            matrices: of both parities, (unknowns, unknowns), changed in place.
+            systems: families of unknowns that the wall couples.
+            matrices: one for each system, (unknowns, unknowns), changed in place.
         """
 
     @abstractmethod
-    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
-        """Velocities on the solids from unit forces at points, by the wall, (unknowns, 3 n) for each of `rows`.
+    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
+        """Velocities on the solids from unit forces at points, by the wall, (unknowns, 3 n) for each system.
 
         Without the minus sign.
 
         Args:
             waves: those that matter between points and solids.
-            rows: of both parities.
+            systems: families of unknowns that the wall couples.
             points: about the tube's axis, in its axes, (n, 3), m.
         """
 
@@ -94,7 +100,7 @@ class LevelRings(Rings):
         self.panels, self.offset, self.modes = panels, offset, modes
         self.reference = float(np.max(panels.rho))
 
-    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
         at_nodes, averages = self._strengths(waves), self._strengths(waves, averaged=True)
         between = self._matrices(waves)
@@ -118,7 +124,7 @@ class LevelRings(Rings):
                         columns = starts[n] + active[n]
                         matrix[lines, columns] -= (left[n] @ source.T) * family.dual[columns]
 
-        each(lessen, rows)
+        each(lessen, [family for (family,) in systems])
 
     def _bands(self, waves: Waves) -> Iterator[tuple[slice, np.ndarray]]:
         """Bands of k, each with the rows (of 3 a node) that its waves reach before they are damped, there and back."""
@@ -128,7 +134,7 @@ class LevelRings(Rings):
             if high > low:
                 yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + 3.0
 
-    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
+    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
         """See `Rings.sent`."""
         columns = 3 * len(points)
         middle = np.empty((2, self.modes, waves.k.size, 2, 3, columns))
@@ -143,7 +149,7 @@ class LevelRings(Rings):
         each(fill, range(waves.k.size))
         strengths = self._strengths(waves)
         found = []
-        for family in rows:
+        for (family,) in systems:
             parts = [
                 strengths[m][here].reshape(here.size, -1) @ middle[family.parity, m].reshape(-1, columns)
                 for m, here in enumerate(family.of_mode)
@@ -218,18 +224,33 @@ class _Tier(NamedTuple):
     """Smallest distance from the wall, m."""
     modes: int
     """Fourier modes that they bear."""
-    sample: tuple[Samples, Samples, Samples | None]
-    """x and rho of their nodes, (panels, p), and None: waves at the nodes."""
-    averaged: tuple[Samples, Samples, Samples | None]
-    """x and rho of more nodes, and averages over them; near the wall only."""
+    sample: _Sample
+    """Their nodes."""
+    averaged: _Sample
+    """More nodes, and averages over them; near the wall only."""
     rows: tuple[tuple[np.ndarray, ...], ...]
     """[parity][mode]: which of their 3 nodes bear it."""
     unknowns: tuple[np.ndarray, ...]
-    """[parity]: the unknowns that these are."""
+    """[system]: the unknowns that these are."""
+
+
+class _Sample(NamedTuple):
+    """Rings on which waves are evaluated."""
+
+    x: Samples
+    """(panels, q), m."""
+    rho: Samples
+    """(panels, q), m."""
+    average: Samples | None
+    """From them to the nodes, (panels, p, q); None where they are the nodes."""
 
 
 class TiltedRings(Rings):
-    """Rings about an axis that is pitched against the tube's: every wave is projected on every ring that it reaches."""
+    """Rings about an axis that is tilted against the tube's: every wave is projected on every ring that it reaches.
+
+    Without yaw, rings and waves are mirror images of themselves, and half circles suffice. With yaw, waves of either
+    parity move unknowns of both.
+    """
 
     def __init__(self, panels: Panels, seat: Seat, counts: np.ndarray) -> None:
         """Rings of solids.
@@ -241,7 +262,7 @@ class TiltedRings(Rings):
         """
         self.panels, self.seat, self.counts = panels, seat, counts
 
-    def _tiers(self, rows: Sequence[Rows]) -> list[_Tier]:
+    def _tiers(self, systems: Sequence[System]) -> list[_Tier]:
         fine = _finer(self.panels, _FINER_TILTED)
         distances = self.seat.distances(*fine[:2]).min(axis=1)
         step = np.floor(np.log(distances / distances.min()) / np.log(_TIER))
@@ -253,23 +274,23 @@ class TiltedRings(Rings):
             place[np.repeat(nodes, 3)] = np.arange(3 * np.count_nonzero(nodes))
             modes = int(self.counts[nodes].max())
             of_mode, unknowns = [], []
-            for family in rows:
-                local = [place[bearing] for bearing in family.of_mode]
-                of_mode.append(tuple(part[part >= 0] for part in local[:modes]))
-                unknowns.append(np.flatnonzero(np.concatenate(local) >= 0))
-            sample = self.panels.x[here], self.panels.rho[here], None
-            averaged = (fine[0][here], fine[1][here], fine[2][here]) if number < _AVERAGED_TIERS else sample
+            for system in systems:
+                local = [[place[bearing] for bearing in family.of_mode] for family in system]
+                of_mode += [tuple(part[part >= 0] for part in family[:modes]) for family in local]
+                unknowns.append(np.flatnonzero(np.concatenate([part for family in local for part in family]) >= 0))
+            sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
+            averaged = _Sample(*(values[here] for values in fine)) if number < _AVERAGED_TIERS else sample
             tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
         return tiers
 
-    def subtract(self, waves: Waves, rows: Sequence[Rows], matrices: Sequence[Samples]) -> None:
+    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
-        tiers, lock = self._tiers(rows), Lock()
+        tiers, lock = self._tiers(systems), Lock()
         blocks = {
-            (a, b, p): np.zeros((tiers[a].unknowns[p].size, tiers[b].unknowns[p].size))
+            (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size))
             for a in range(len(tiers))
             for b in range(len(tiers))
-            for p in (0, 1)
+            for s in range(len(systems))
         }
 
         def lessen(number: int) -> None:
@@ -288,85 +309,96 @@ class TiltedRings(Rings):
                 for (b, tier_b, count_b), (_, sources) in zip(reached, sides, strict=True):
                     far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
                     count = min(count_a, count_b, far)
-                    for parity in (0, 1) if count else ():
-                        left, right = pressed[parity][:, :, :count], sources[parity][:, :, :count]
+                    for s in range(len(systems)) if count else ():
+                        left, right = pressed[s][..., :count, :], sources[s][..., :count, :]
                         block = left.reshape(len(left), -1) @ right.reshape(len(right), -1).T
                         with lock:
-                            blocks[a, b, parity] += block
+                            blocks[a, b, s] += block
 
         each(lessen, range(waves.k.size))
-        for (a, b, parity), block in blocks.items():
-            columns = tiers[b].unknowns[parity]
-            matrices[parity][np.ix_(tiers[a].unknowns[parity], columns)] -= block * rows[parity].dual[columns]
+        duals = [np.concatenate([family.dual for family in system]) for system in systems]
+        for (a, b, s), block in blocks.items():
+            columns = tiers[b].unknowns[s]
+            matrices[s][np.ix_(tiers[a].unknowns[s], columns)] -= block * duals[s][columns]
 
-    def sent(self, waves: Waves, rows: Sequence[Rows], points: Samples) -> list[Samples]:
+    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
         """See `Rings.sent`."""
-        tiers = self._tiers(rows)
+        tiers = self._tiers(systems)
         away = waves.radius - float(np.max(np.hypot(points[:, 1], points[:, 2])))
-        found: list[Samples] = [np.zeros((family.dual.size, 3 * len(points))) for family in rows]
+        found = [np.zeros((sum(family.dual.size for family in system), 3 * len(points))) for system in systems]
+        parities = [[family.parity for family in system] for system in systems]
         lock = Lock()
 
         def add(number: int) -> None:
             pressed = times_layers(point_waves(points, waves, number), waves, number)
             for tier in tiers:
                 count = waves.orders_between(number, 0.5 * (tier.distance + away))
-                for parity, target in enumerate(
-                    self._on_rings(waves, number, tier, tier.sample, count) if count else ()
-                ):
-                    right = pressed[:, :, parity, :count].reshape(len(pressed), -1)
+                for s, target in enumerate(self._on_rings(waves, number, tier, tier.sample, count) if count else ()):
+                    right = pressed[:, :, parities[s], :count].reshape(len(pressed), -1)
                     block = target.reshape(len(target), -1) @ right.T
                     with lock:
-                        found[parity][tier.unknowns[parity]] += block
+                        found[s][tier.unknowns[s]] += block
 
         each(add, range(waves.k.size))
         return found
 
-    def _on_rings(
-        self,
-        waves: Waves,
-        number: int,
-        tier: _Tier,
-        sample: tuple[Samples, Samples, Samples | None],
-        orders: int,
-    ) -> list[Samples]:
-        """Waves of one k on the unknowns of a tier, even and odd, (unknowns, 2, orders, 3) each."""
+    def _on_rings(self, waves: Waves, number: int, tier: _Tier, sample: _Sample, orders: int) -> list[Samples]:
+        """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
+
+        The 2 stands for the real and the imaginary part; parities of waves are those of the system's families.
+        """
+        symmetric = self.seat.yaw == 0
+        theta = _angles(orders, tier.modes, whole=not symmetric)
+        projectors = [_projectors(theta, tier.modes, parity) for parity in (0, 1)]
+        sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
+        panels, order = len(sample.x), self.panels.order
+        modes = [np.empty((tier.modes, panels * order, 3, 2, len(waved), orders, 3)) for waved in sources]
+        some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
+        for first in range(0, panels, some):
+            chunk = slice(first, first + some)
+            nodes = slice(first * order, (first + some) * order)
+            field = self._around(waves, number, sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta, orders)
+            average = None if sample.average is None else sample.average[chunk]
+            for family, waved in enumerate(sources):
+                for column, parity in enumerate(waved):
+                    for component, projector in enumerate(projectors[family]):
+                        part = projector @ field[component, parity].reshape(theta.size, -1)
+                        if average is not None:
+                            part = np.matmul(average, part.reshape(tier.modes, *average.shape[::2], -1))
+                        shaped = part.reshape(tier.modes, -1, 2, orders, 3)
+                        modes[family][:, nodes, component, :, column] = shaped
+        flat = [values.reshape(tier.modes, -1, *values.shape[3:]) for values in modes]
+        families = [
+            np.concatenate([values[rows] for values, rows in zip(family, of_mode, strict=True)])
+            for family, of_mode in zip(flat, tier.rows, strict=True)
+        ]
+        return families if symmetric else [np.concatenate(families)]
+
+    def _around(self, waves: Waves, number: int, x: Samples, rho: Samples, theta: Samples, orders: int) -> Samples:
+        """Waves of one k around rings: component; even, odd; angle; ring; real, imaginary; order; wall component."""
         from spirillum.kernels.tube_waves import tilted_waves
 
-        x, rho, average = sample
-        theta = _angles(orders, tier.modes)
-        along = np.broadcast_to(x.ravel(), (theta.size, x.size))
-        up, side = np.cos(theta)[:, None] * rho.ravel(), np.sin(theta)[:, None] * rho.ravel()
-        placed = self.seat.placed(np.stack([along, up, side], axis=-1).reshape(-1, 3))
+        shape = theta.size, x.size
+        along = np.broadcast_to(x, shape)
+        up, right = np.cos(theta)[:, None] * rho, np.sin(theta)[:, None] * rho
+        placed = self.seat.placed(np.stack([along, up, right], axis=-1).reshape(-1, 3))
         k = float(waves.k[number])
         values = extensions(k, waves.radius, np.hypot(placed[:, 1], placed[:, 2]), orders)
-        shape = (theta.size, x.size)
         angle, phase = np.arctan2(placed[:, 2], placed[:, 1]).reshape(shape), (k * placed[:, 0]).reshape(shape)
         out = np.empty((3, 2, *shape, 2, orders, 3))
-        tilted_waves(values.reshape(*shape, orders, 3, 3), angle, phase, theta, self.seat.pitch, out)
-        found: list[Samples] = []
-        for parity, of_mode in enumerate(tier.rows):
-            projectors = _projectors(theta, tier.modes, parity)
-            parts = [
-                matrix @ field[parity].reshape(theta.size, -1) for matrix, field in zip(projectors, out, strict=True)
-            ]
-            both = np.stack([part.reshape(tier.modes, x.size, -1) for part in parts], axis=2)
-            if average is not None:
-                both = np.matmul(average, both.reshape(tier.modes, *x.shape, -1))
-            modes = both.reshape(tier.modes, -1, 2, orders, 3)
-            joined: Samples = np.concatenate([values[rows] for values, rows in zip(modes, of_mode, strict=True)])
-            found.append(joined)
-        return found
+        tilted_waves(values.reshape(*shape, orders, 3, 3), angle, phase, theta, self.seat.rotation, out)
+        return out
 
 
-def _angles(orders: int, modes: int) -> Samples:
-    """Midpoints of a half circle, as many as waves need whose modes are then cut off."""
+def _angles(orders: int, modes: int, *, whole: bool = False) -> Samples:
+    """Midpoints of a half circle, as many as waves need whose modes are then cut off, or of the whole one."""
     count = int(0.6 * (orders + modes)) + 12
-    angles: Samples = np.pi * (np.arange(count) + 0.5) / count
+    angles: Samples = np.pi * (np.arange(2 * count if whole else count) + 0.5) / count
     return angles
 
 
 def _projectors(theta: Samples, modes: int, parity: int) -> tuple[Samples, Samples, Samples]:
-    """From values (x, rho, theta) on a half circle to Fourier modes (x, rho, g), (modes, angles) each."""
+    """From values (x, rho, theta) around a circle to Fourier modes (x, rho, g), (modes, angles) each."""
     q = np.arange(modes)[:, None]
     cos, sin = (function(q * theta) * (2.0 / theta.size) for function in (np.cos, np.sin))
     cos[0] *= 0.5

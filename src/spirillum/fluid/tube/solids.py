@@ -1,8 +1,9 @@
 """Solids of revolution in a circular tube: their single layer and the wall, factored.
 
 The equations are those of `interaction`, mode by mode, plus the wall's reflection (`wall`), which couples the
-modes of a body that lies off the axis. Mirror symmetry keeps two families of modes apart, even and odd to the sides.
-Neither tails nor their phases enter: one factorisation serves all of them.
+modes of a body that lies off the axis. Mirror symmetry keeps two families of modes apart, even and odd to the sides;
+with yaw there is none, and they form one system. Neither tails nor their phases enter: one factorisation serves all of
+them.
 
 Axes are x along the robot, y up, z to the right; angles count from y.
 """
@@ -17,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, TiltedRings
+from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System, TiltedRings
 from spirillum.fluid.tube.wall import Waves, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
@@ -106,10 +107,16 @@ class Solids:
             found.append(Rows(parity, tuple(of_mode), dual))
         return found[0], found[1]
 
+    @property
+    def systems(self) -> tuple[System, ...]:
+        """Families of unknowns that are solved for together: both where the robot is yawed."""
+        even, odd = self.rows
+        return ((even, odd),) if self.seat.yaw else ((even,), (odd,))
+
     @cached_property
     def rings(self) -> Rings:
         """How the rings of the solids meet the wall's waves."""
-        if self.seat.pitch == 0:
+        if self.seat.level:
             return LevelRings(self.panels, self.seat.offset, self.modes)
         return TiltedRings(self.panels, self.seat, self.counts)
 
@@ -134,32 +141,34 @@ class Solids:
             modes = [np.zeros((3 * self.panels.size, MOTIONS)) for _ in range(self.modes)]
             for m in (0, 1):
                 modes[m][:, : MOTIONS - 1] = part[m]
-            if rows.parity == 0:
-                for m, values in enumerate(self._through_flow()):
-                    modes[m][:, MOTIONS - 1] = values
+            for m, values in enumerate(self._through_flow(rows.parity)):
+                modes[m][:, MOTIONS - 1] = values
             found.append(rows.gathered(modes))
         return found[0], found[1]
 
-    def _through_flow(self) -> list[Samples]:
-        """Even modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on pitched rings."""
+    def _through_flow(self, parity: int) -> list[Samples]:
+        """Modes 0 to 3 of the flow of unit mean velocity, which is quadratic, on tilted rings; see `kernels.rings`."""
+        if parity and not self.seat.yaw:
+            return []
         modes = min(4, self.modes)
-        theta = np.pi * (np.arange(8) + 0.5) / 8
+        theta = 2.0 * np.pi * (np.arange(16) + 0.5) / 16
         x, rho = (values.ravel()[:, None] for values in (self.panels.x, self.panels.rho))
         cos, sin = np.cos(theta), np.sin(theta)
         places = np.stack(np.broadcast_arrays(x, rho * cos, rho * sin), axis=-1)
         placed = self.seat.placed(places.reshape(-1, 3))
         speed = (2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / self.seat.radius**2).reshape(x.size, -1)
-        along, up = self.seat.rotation[0, :2]
-        parts = np.stack([speed * along, speed * up * cos, -speed * up * sin], axis=1)
+        along, up, right = self.seat.rotation[0]
+        parts = [speed * along, speed * (up * cos + right * sin), speed * (right * cos - up * sin)]
         q = np.arange(modes)[:, None]
         weights = np.where(q == 0, 1.0, 2.0) / theta.size
-        like, other = weights * np.cos(q * theta), -weights * np.sin(q * theta)
-        found = np.stack([parts[:, 0] @ like.T, parts[:, 1] @ like.T, parts[:, 2] @ other.T], axis=1)
+        c, s = weights * np.cos(q * theta), weights * np.sin(q * theta)
+        projectors = (c, c, -s) if parity == 0 else (-s, -s, -c)
+        found = np.stack([part @ matrix.T for part, matrix in zip(parts, projectors, strict=True)], axis=1)
         return [found[:, :, m].ravel() for m in range(modes)]
 
     @cached_property
     def factors(self) -> tuple[tuple[Samples, np.ndarray], ...]:
-        """LU factors of the equations, even and odd."""
+        """LU factors of the equations of each of `systems`."""
         from scipy.linalg import lu_factor
 
         def factored(matrix: Samples) -> tuple[Samples, np.ndarray]:
@@ -167,12 +176,16 @@ class Solids:
             return factors
 
         with one_thread():
-            matrices = [np.zeros((rows.dual.size, rows.dual.size), order="F") for rows in self.rows]
-            self.rings.subtract(self.waves(self.gap), self.rows, matrices)
+            sizes = [sum(family.dual.size for family in system) for system in self.systems]
+            matrices = [np.zeros((size, size), order="F") for size in sizes]
+            self.rings.subtract(self.waves(self.gap), self.systems, matrices)
             for m, free in enumerate(self._free()):
-                for rows, matrix in zip(self.rows, matrices, strict=True):
-                    here, (start, stop) = rows.of_mode[m], rows.starts[m : m + 2]
-                    matrix[start:stop, start:stop] += free[np.ix_(here, here)]
+                for system, matrix in zip(self.systems, matrices, strict=True):
+                    first = 0
+                    for family in system:
+                        here, (start, stop) = family.of_mode[m], first + family.starts[m : m + 2]
+                        matrix[start:stop, start:stop] += free[np.ix_(here, here)]
+                        first += family.dual.size
             with ThreadPoolExecutor(2) as pool:
                 return tuple(pool.map(factored, matrices))
 
@@ -194,17 +207,31 @@ class Solids:
         most = np.array([self.counts[self.panels.solid_of_node == solid].max() for solid in range(len(self.parts))])
         return [(int(last), most >= last) for last in sorted(set(most.tolist()))]
 
-    def solve(self, parity: int, velocities: Samples) -> Samples:
-        """Tractions from velocities on the surfaces, both as modes, (unknowns, n)."""
+    def solve(self, velocities: Sequence[Samples]) -> tuple[Samples, Samples]:
+        """Tractions from velocities on the surfaces, both as modes, even and odd, (unknowns, n)."""
         from scipy.linalg import lu_solve
 
-        tractions: Samples = lu_solve(self.factors[parity], velocities, check_finite=False)
-        return tractions
+        if len(self.factors) == 1:
+            both = lu_solve(self.factors[0], np.concatenate(velocities), overwrite_b=True, check_finite=False)
+            even, odd = np.split(both, [len(velocities[0])])
+        else:
+            even, odd = (lu_solve(f, v, check_finite=False) for f, v in zip(self.factors, velocities, strict=True))
+        return even, odd
+
+    def sent(self, waves: Waves, points: Samples) -> list[Samples]:
+        """Velocities on the solids from unit forces at points, by the wall, even and odd, (unknowns, 3 n).
+
+        Args:
+            waves: those that matter between points and solids.
+            points: about the tube's axis, in its axes, (n, 3), m.
+        """
+        found = self.rings.sent(waves, self.systems, points)
+        return found if len(found) > 1 else np.split(found[0], [self.rows[0].dual.size])
 
     @cached_property
     def moving(self) -> tuple[Samples, Samples]:
         """Tractions for `motion`."""
-        return self.solve(0, self.motion[0]), self.solve(1, self.motion[1])
+        return self.solve(self.motion)
 
     def wrenches(self, tractions: Sequence[Samples], against: Sequence[Samples] | None = None) -> Samples:
         """Work of tractions, even and odd, against velocities, or else against `motion`, (13 or m, n)."""

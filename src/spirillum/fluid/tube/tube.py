@@ -221,9 +221,9 @@ class Tube(SwimmerModel):
         phases = 2.0 * np.pi * np.arange(batch.options.tube.phases) / batch.options.tube.phases
         along = np.zeros((5, MOTIONS))
         along[[1, 3, 4], [3, 9, 12]] = 1.0
-        pitch = batch.placement.pitch or 0.0
+        tilt = Seat(0.0, 0.0, batch.placement.pitch or 0.0, yaw=batch.placement.yaw)
         for row, first in ((0, 0), (2, 6)):
-            along[row, first], along[row, first + 2] = np.cos(pitch), -np.sin(pitch)
+            along[row, first : first + 3] = tilt.forward
         answers, flows = np.zeros((batch.size, 5, 5)), np.zeros((batch.size, 5))
         for phase in phases:
             full = along @ self._full(batch, "robot", np.array([phase])) @ along.T

@@ -1,0 +1,131 @@
+"""Yawed robots in a tube: symmetries tie the coupled system to the decoupled one, to its mirror image, to itself."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from spirillum.fluid.algebra import axis_rotation
+from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.wire.stokeslets import Wire, wire_along
+from spirillum.robot.outline import Arc, Outline, body_outline
+from spirillum.robot.seat import Seat
+
+BODIES = {
+    "ball": Outline((Arc((0.0, 0.0), (0.4, 0.4), (0.0, np.pi)),), ()),
+    "capsule": body_outline("capsule", 0.8, 1.2, 0.0, "hemisphere", "flat"),
+}
+MIRROR = np.array([1, -1, 1, -1, 1, -1] * 2 + [1.0])  # y to -y
+
+
+def coil(phase: float = 0.0, hand: float = 1.0) -> Wire:
+    """Behind the body, in body axes: y = r cos(h k x + phase), z = r sin(h k x + phase)."""
+    x = -0.7 - np.linspace(0.0, 1.2, 200)
+    turn = hand * 2 * np.pi * x / 0.8 + phase
+    return wire_along(np.stack([x, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), 0.05)
+
+
+@lru_cache(maxsize=4)
+def solids(body: str, seat: Seat, tolerance: float = 1e-4) -> Solids:
+    wire = coil()
+    near = np.stack([wire.points[:, 0], np.hypot(*wire.points[:, 1:].T), np.full(len(wire.points), wire.blob)], axis=1)
+    return Solids([(BODIES[body], 0)], seat, Fineness(tolerance=tolerance), near)
+
+
+def thirteen(found: Held) -> np.ndarray:
+    whole = np.empty((13, 13))
+    whole[:12, :12], whole[12, 12] = found.matrix, found.drag
+    whole[:12, 12] = whole[12, :12] = found.load
+    return whole
+
+
+def robot(body: str, seat: Seat, phase: float = 0.7, hand: float = 1.0, tolerance: float = 1e-4) -> np.ndarray:
+    """R, load and drag in body axes."""
+    return thirteen(held_in_tube(solids(body, seat, tolerance), [(coil(phase, hand), 1)]))
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    scale = np.sqrt(np.diag(a))
+    return float(np.max(np.abs(a - b) / np.outer(scale, scale)))
+
+
+def in_other_axes(matrix: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    whole = np.eye(13)
+    whole[:12, :12] = np.kron(np.eye(4), rotation)
+    turned: np.ndarray = whole @ matrix @ whole.T
+    return turned
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_mirror_image(body: str) -> None:
+    """Yaw, phase and hand mirrored: so is everything."""
+    for pitch, yaw in ((0.1, 0.15), (0.0, -0.1)):
+        one = robot(body, Seat(1.0, 0.2, pitch, yaw=yaw), 0.7)
+        other = robot(body, Seat(1.0, 0.2, pitch, yaw=-yaw), np.pi - 0.7, -1.0)
+        assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-9
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
+    """Two decoupled systems against the coupled one: nose up and the tail at phi, nose to the left at phi + 90 deg."""
+    pitched = robot(body, Seat(1.0, 0.0, -0.12), 0.7)
+    yawed = robot(body, Seat(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi)
+    quarter = axis_rotation(np.array([0.5 * np.pi]))[0]  # z to -y
+    np.testing.assert_allclose(quarter @ [0, 0, 1], [0, -1, 0], atol=1e-15)
+    assert difference(yawed, in_other_axes(pitched, quarter)) < 1e-9
+
+
+def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
+    """Offset and pitch in one vertical plane: from 180 degrees further, above the axis and pitched the other way."""
+    below = robot("capsule", Seat(1.0, 0.2, 0.1, yaw=0.07), 0.7)
+    above = robot("capsule", Seat(1.0, -0.2, -0.1, yaw=-0.07), 0.7 + np.pi)
+    half = axis_rotation(np.array([np.pi]))[0]
+    assert difference(below, in_other_axes(above, half)) < 1e-9
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_reciprocal_positive_and_continuous(body: str) -> None:
+    """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
+    found = held_in_tube(solids(body, Seat(1.0, 0.2, 0.1, yaw=0.15)), [(coil(0.7), 1)])
+    whole = thirteen(found)
+    scale = np.sqrt(np.diag(whole))
+    assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
+    assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 0.005
+    pitched = robot(body, Seat(1.0, 0.2, 0.1))
+    for yaw, error in ((1e-9, 1e-8), (1e-3, 2e-3), (-1e-3, 2e-3)):
+        assert difference(pitched, robot(body, Seat(1.0, 0.2, 0.1, yaw=yaw))) < error
+    level, hardly = robot(body, Seat(1.0, 0.2)), robot(body, Seat(1.0, 0.2, yaw=1e-9))
+    assert difference(level, hardly) < 3e-4  # other rings, other averages
+
+
+def test_a_sphere_does_not_feel_its_yaw() -> None:
+    fineness, ball = Fineness(tolerance=1e-5, order=10), [(BODIES["ball"], 0)]
+    level = thirteen(held_in_tube(Solids(ball, Seat(1.0, 0.4), fineness), []))
+    seat = Seat(1.0, 0.4, -0.2, yaw=0.3)
+    yawed = thirteen(held_in_tube(Solids(ball, seat, fineness), []))
+    c, s, cos, sin = np.cos(0.2), np.sin(-0.2), np.cos(0.3), np.sin(0.3)
+    to_place = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    scale = np.sqrt(np.diag(level))
+    scale[6:12] = 1.0
+    np.testing.assert_allclose(
+        in_other_axes(yawed, to_place) / np.outer(scale, scale), level / np.outer(scale, scale), atol=1e-7
+    )
+
+
+def test_convergence_with_fineness() -> None:
+    place = Seat(1.0, 0.35, 0.1, yaw=0.1)
+    coarse, fine, finest = (robot("capsule", place, tolerance=tolerance) for tolerance in (1e-3, 1e-4, 1e-5))
+    assert difference(coarse, finest) < 3e-3
+    assert difference(fine, finest) < 0.5 * difference(coarse, finest)
+
+
+def test_several_tails_against_one_factorisation() -> None:
+    """A table's way: solids once, any tail at any phase."""
+    seat = Seat(1.0, 0.2, 0.1, yaw=0.15)
+    shared = solids("ball", seat)
+    for hand, phase in ((1.0, 0.0), (1.0, 2.0), (-1.0, 2.0)):
+        alone = Solids([(BODIES["ball"], 0)], seat, shared.fineness, np.array([[-0.7, 0.15, coil().blob]]))
+        one, other = (thirteen(held_in_tube(s, [(coil(phase, hand), 1)])) for s in (shared, alone))
+        assert difference(one, other) < 1e-3
+    assert len(shared.factors) == 1
