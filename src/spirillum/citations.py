@@ -32,6 +32,10 @@ REFERENCES: dict[str, str] = {
         "D. J. Jeffrey and Y. Onishi. The slow motion of a cylinder next to a plane wall. "
         "Quarterly Journal of Mechanics and Applied Mathematics 34:129-137, 1981."
     ),
+    "brun2001": (
+        "R. Brun, P. Reichert and H. R. Kunsch. Practical identifiability analysis of large environmental simulation "
+        "models. Water Resources Research 37:1015-1030, 2001."
+    ),
     "reynolds1886": (
         "O. Reynolds. On the theory of lubrication and its application to Mr. Beauchamp Tower's experiments. "
         "Philosophical Transactions of the Royal Society 177:157-234, 1886."

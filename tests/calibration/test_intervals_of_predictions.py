@@ -106,7 +106,8 @@ def test_every_parameter_reaches_the_prediction(
     monkeypatch.setattr("spirillum.calibration.posterior.FEWEST_EFFECTIVE", 1.0)
     few = Sampling(ensembles=2, walkers=28, warm_up=50, steps=51, kept=17, doublings=0)
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}
-    found = sp.calibrate(made(**small, seed=4), WIDE, model=model, free=free, sampling=few)
+    stated = {"motor.back_emf_constant": "20%"} if "back_emf" in free else None  # else B_eff stands for it as well
+    found = sp.calibrate(made(**small, seed=4), WIDE, model=model, free=free, sampling=few, assume_uncertainty=stated)
     write_calibration(found, tmp_path, figures=False)
     robot = found.experiment.robots[3]
     answer = sp.predict(robot, model=model, posterior=tmp_path / "posterior.nc")

@@ -39,6 +39,10 @@ class Calibrated:
     """Free numbers by label."""
     friction: tuple[Estimate, ...]
     """B_eff of every robot, N m s/rad; empty where it was not asked for, NaN where no motor rate was observed."""
+    friction_sensitivity: dict[str, Samples]
+    """Change of B_eff of every robot per relative change of a constant of fluid or motor, N m s/rad, by its field."""
+    friction_statement: str
+    """What the intervals of B_eff take as exact, in a sentence; empty where there is no B_eff."""
     predicted: dict[Quantity, tuple[Samples, Samples, Samples]]
     """Prediction for every robot with the limits of its 95 % interval, the discrepancy included."""
     discrepancy: dict[Quantity, Estimate]
@@ -50,6 +54,9 @@ class Calibrated:
     posterior: Posterior | None
     identifiability: Identifiability | None
     warnings: tuple[str, ...]
+    friction_given: tuple[Estimate, ...] = ()
+    """B_eff of every robot with its constants as they are, on which predictions of these robots rest; empty where that
+    is `friction`."""
     folder: Path | None = None
     """Folder of the files that were written, if any were."""
     files: tuple[str, ...] = ()
@@ -99,6 +106,7 @@ def _content(found: Calibrated) -> dict[str, Any]:
         "method": found.method,
         "friction": found.reading,
         "parameters": parameters,
+        **({"effective_friction_statement": found.friction_statement} if found.friction_statement else {}),
         "discrepancy": {name: quantity(v.value, "1", **_interval(v)) for name, v in found.discrepancy.items()},
         "error_of_a_trial": {name: quantity(value, "1") for name, value in found.error.items()},
         "tails": [_tail(found, place) for place in range(experiment.size)],
@@ -145,4 +153,8 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
     if found.friction:
         item = found.friction[place]
         content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
+        content["effective_friction_per_percent"] = {
+            field: quantity(0.01 * float(change[place]), "N m s/rad")
+            for field, change in found.friction_sensitivity.items()
+        }
     return content

@@ -18,15 +18,17 @@ from spirillum.calibration.fit_warnings import (
     factor_misfit_warnings,
     friction_warnings,
     misfit_warnings,
+    narrow_channel_warnings,
     outlier_warnings,
     prior_warnings,
 )
-from spirillum.calibration.identifiability import Identifiability, identified
+from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement
+from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
 from spirillum.calibration.paper_method import paper_fit
-from spirillum.calibration.parameters import free_names
+from spirillum.calibration.parameters import assumed_uncertainties, free_names
 from spirillum.calibration.posterior import Sampling, sampled
-from spirillum.calibration.problem import Problem, Progress, posed
+from spirillum.calibration.problem import Problem, Progress, posed, stated_spread
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
@@ -58,6 +60,7 @@ def fit_model(
     free: str | Sequence[str] | None = None,
     method: str = "posterior",
     friction: str = "rotor",
+    assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
     progress: Progress | None = None,
 ) -> Calibrated:
@@ -70,6 +73,9 @@ def fit_model(
         free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
         method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
         friction: reading under which B_eff follows from (18): `rotor` or `paper`.
+        assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
+            `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
+            taken as exact.
         sampling: how the posterior is sampled.
         progress: told what is being done.
 
@@ -83,13 +89,17 @@ def fit_model(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
     names = free_names(free, find_swimmer_model(model).name)
+    assumed = assumed_uncertainties(assume_uncertainty)
+    if assumed and method == "paper":
+        raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")
     experiment = read_experiment(observations, given_robots(robots))
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name != "friction")
-    problem = posed(experiment, model, names, progress)
+    problem = posed(experiment, model, names, progress, assumed)
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)
+    check_identifiable(problem, fit.z)
     check_plausible(problem, fit.z)
     report = identified(problem, fit)
     if method == "least-squares":
@@ -112,6 +122,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
     if "friction" in problem.free:
         best = problem.friction(z[None], problem.experiment.motor_rate.mean[None], reading)[0]
         friction = tuple(Estimate(float(value), nan, nan) for value in best)
+    sensitivity = friction_sensitivity(problem, z, reading)
     unknown = np.full(problem.experiment.size, nan)
     return Calibrated(
         problem=problem,
@@ -119,6 +130,8 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
         reading=reading,
         values={name: Estimate(value, nan, nan) for name, value in fit.values.items()},
         friction=friction,
+        friction_sensitivity=sensitivity,
+        friction_statement=friction_statement(problem, friction, sensitivity),
         predicted={name: (values, unknown, unknown) for name, values in problem.predicted_at(z).items()},
         discrepancy={},
         error={name: problem.ratio(name).pooled_error for name in problem.quantities},
@@ -132,6 +145,7 @@ def _by_paper(problem: Problem, reading: str) -> Calibrated:
             *prior_warnings(problem, z),
             *factor_misfit_warnings(problem, z),
             *friction_warnings(problem, z, reading),
+            *narrow_channel_warnings(problem, {name: Estimate(v, nan, nan) for name, v in fit.values.items()}),
             *common_warnings(problem, friction),
         ),
     )
@@ -143,7 +157,8 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     z, tau = drawn_fit(problem, fit, _FRICTION_DRAWS, rng)
     draws = problem.values(z)
     values = {name: _fitted(best, draws[name]) for name, best in problem.values_at(fit.z).items()}
-    friction = _friction(problem, z, fit.z, fit.error, reading, rng)
+    given, friction = _friction(problem, z, fit.z, fit.error, reading, rng)
+    sensitivity = friction_sensitivity(problem, fit.z, reading)
     predicted = _predicted(problem, fit.z, z, tau, rng)
     # Where the moments give none, as where the fit misses less than the trials' errors, the middle of what may be.
     discrepancy = {
@@ -152,6 +167,7 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     warnings = [
         *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit.left),
+        *narrow_channel_warnings(problem, values),
         *common_warnings(problem, friction),
     ]
     return Calibrated(
@@ -160,6 +176,9 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
         reading=reading,
         values=values,
         friction=friction,
+        friction_given=given,
+        friction_sensitivity=sensitivity,
+        friction_statement=friction_statement(problem, friction, sensitivity),
         predicted=predicted,
         discrepancy=discrepancy,
         error=fit.error,
@@ -187,20 +206,27 @@ def _by_posterior(
     every = {name: values.reshape(-1) for name, values in posterior.values().items()}
     tau, sigma = posterior.density.nuisances(chosen)
     discrepancy = {name: _middle(every[f"discrepancy_{name}"]) for name in problem.quantities}
-    friction = _friction(problem, own, middle, {name: float(np.median(s)) for name, s in sigma.items()}, reading, rng)
+    error = {name: float(np.median(s)) for name, s in sigma.items()}
+    given, friction = _friction(problem, own, middle, error, reading, rng)
+    sensitivity = friction_sensitivity(problem, middle, reading)
+    values = {item.label: _middle(every[item.label]) for item in problem.coordinates}
     wrong = [f"the posterior may not be used: {sentence}" for sentence in posterior.problems()]
     warnings = [
         *wrong,
         *_of_the_fit(problem, fit, report, reading),
         *misfit_warnings(problem, discrepancy, fit.left),
+        *narrow_channel_warnings(problem, values),
         *common_warnings(problem, friction),
     ]
     return Calibrated(
         problem=problem,
         method="posterior",
         reading=reading,
-        values={item.label: _middle(every[item.label]) for item in problem.coordinates},
+        values=values,
         friction=friction,
+        friction_given=given,
+        friction_sensitivity=sensitivity,
+        friction_statement=friction_statement(problem, friction, sensitivity),
         predicted=_predicted(problem, middle, own, tau, rng),
         discrepancy=discrepancy,
         error={name: float(np.median(every[f"error_{name}"])) for name in problem.quantities},
@@ -243,16 +269,30 @@ def _friction(
     error: Mapping[Quantity, float],
     reading: str,
     rng: np.random.Generator,
-) -> tuple[Estimate, ...]:
-    """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it."""
+) -> tuple[tuple[Estimate, ...], tuple[Estimate, ...]]:
+    """B_eff of every robot, with the errors of its mean motor rate and of the fitted numbers in it.
+
+    Returns:
+        With the constants of fluid and motor as they are, and with their stated uncertainties.
+    """
     if "friction" not in problem.free:
-        return ()
+        return (), ()
     ratio = problem.experiment.motor_rate
     own_error = error.get("motor_rate", ratio.pooled_error)
     relative = np.nan_to_num(own_error) / np.sqrt(np.maximum(ratio.trials, 1.0))
     rates = ratio.mean * (1.0 + relative * rng.normal(size=(z.shape[0], problem.experiment.size)))
-    draws = problem.friction(z, rates, reading)
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
+    given = _estimates(middle, problem.friction(z, rates, reading))
+    if not problem.assumed:
+        return given, given
+    own = np.random.default_rng(2)  # one fluid and one motor for all tails
+    scaled = {
+        name: np.exp(stated_spread(size) * own.normal(size=(z.shape[0], 1))) for name, size in problem.assumed.items()
+    }
+    return given, _estimates(middle, problem.friction(z, rates, reading, scaled))
+
+
+def _estimates(middle: Samples, draws: Samples) -> tuple[Estimate, ...]:
     low, high = _limits(draws)
     low, high = np.minimum(low, middle), np.maximum(high, middle)  # NaN where no motor rate was observed
     return tuple(Estimate(float(m), float(a), float(b)) for m, a, b in zip(middle, low, high, strict=True))

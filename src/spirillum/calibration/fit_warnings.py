@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +24,7 @@ __all__ = [
     "factor_misfit_warnings",
     "friction_warnings",
     "misfit_warnings",
+    "narrow_channel_warnings",
     "outlier_warnings",
     "percent",
     "prior_warnings",
@@ -195,6 +197,23 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
         f"rate (median of the tails, {known.min():.2g} to {known.max():.2g}) where the motor turns as observed: B_eff "
         "of this reading does not give the observed rates back, for the factors follow from (15) without (19)"
     ]
+
+
+def narrow_channel_warnings(problem: Problem, values: Mapping[str, Estimate]) -> list[str]:
+    """A narrower channel whose wall seems to hold the body back less than that of a wider one."""
+    drag = [(problem.experiment.channels[item.channel], item.label) for item in problem.coordinates
+            if item.parameter.name == "body_drag" and item.channel is not None]  # fmt: skip
+    found = []
+    for (_, narrow), (_, wide) in pairwise(sorted(drag)):
+        less, more = values[narrow], values[wide]
+        if less.value >= more.value:
+            continue
+        overlap = " (their intervals overlap)" if less.high >= more.low else ""
+        found.append(
+            f"{narrow} = {less.value:.3g} is less than {wide} = {more.value:.3g}{overlap}, though a narrower channel "
+            "holds a body back more: channels may be mixed up, or the factors stand for something else"
+        )
+    return found
 
 
 def synthetic_warning(source: str) -> str:

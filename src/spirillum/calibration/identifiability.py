@@ -21,15 +21,23 @@ from spirillum.calibration.least_squares import (
     weighted_residuals,
     weighted_sensitivities,
 )
+from spirillum.calibration.parameters import ASSUMABLE
 from spirillum.calibration.problem import Problem
+from spirillum.errors import InputError
 
-__all__ = ["FAR", "Identifiability", "LikelihoodProfile", "identified", "profiles"]
+__all__ = ["FAR", "Identifiability", "LikelihoodProfile", "check_identifiable", "identified", "profiles"]
 
 _UNKNOWN = 1.0
 """Singular value below which the prior says more than the observations."""
 _POOR = 3.0
 FAR = 3.0
 """Standard deviations of the prior beyond which the observations have overruled it."""
+_COLLINEAR = 1e4
+"""Collinearity index (inverse of the least singular value of the Jacobian with its columns normalised; Brun et al.
+2001) from which on numbers are the same to the observations. Sets that can be told apart have some tens at most, those
+that cannot have more than 1e7, which rounding leaves of infinity."""
+_INVOLVED = 0.05
+"""Least share of a collinear direction at which a number is named."""
 _MEMBER = 0.25
 """Least share of a direction, over that of the first, at which a number is named."""
 
@@ -54,6 +62,37 @@ class Identifiability:
     def unknown(self) -> int:
         """Number of directions of which the observations say less than the prior."""
         return int(np.count_nonzero(self.singular < _UNKNOWN))
+
+
+def check_identifiable(problem: Problem, z: Samples) -> None:
+    """Refuse free numbers that no observations of these quantities can tell apart, however exact.
+
+    A number whose uncertainty is stated is known by that, and left out.
+
+    Args:
+        problem: the fit.
+        z: coordinates of the best fit.
+
+    Raises:
+        InputError: naming the numbers.
+    """
+    kept = [n for n, item in enumerate(problem.coordinates) if item.parameter.name not in problem.assumed]
+    if len(kept) < 2:
+        return
+    columns = sensitivities(problem, z)
+    jacobian = np.concatenate([column[problem.ratio(name).seen] for name, column in columns.items()])[:, kept]
+    _, singular, directions = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)
+    if singular[-1] * _COLLINEAR > 1.0:
+        return
+    share = np.abs(directions[-1])
+    named = [problem.coordinates[kept[n]] for n in np.argsort(-share).tolist() if share[n] >= _INVOLVED]
+    fields = [place for item in named for place, name in ASSUMABLE.items() if name == item.parameter.name]
+    stated = f", or the uncertainty of one stated (--assume-uncertainty {fields[0]}=5%)" if fields else ""
+    raise InputError(
+        f"free = '{', '.join(problem.free)}': {_listed([item.label for item in named])} cannot be told apart by "
+        f"anything observed in {problem.experiment.source}, for changed together they leave every prediction as it "
+        f"is; allowed: without one of them{stated}"
+    )
 
 
 def identified(problem: Problem, fit: LeastSquares) -> Identifiability:

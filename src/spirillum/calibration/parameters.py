@@ -6,7 +6,7 @@ all directions have the same scale there, and no bound is ever hit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -16,6 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 
 __all__ = [
+    "ASSUMABLE",
     "DEFAULT_FREE",
     "PARAMETERS",
     "Coordinate",
@@ -24,6 +25,7 @@ __all__ = [
     "Parameter",
     "Prior",
     "Uniform",
+    "assumed_uncertainties",
     "free_names",
 ]
 
@@ -252,6 +254,15 @@ DEFAULT_FREE = {
 """What is free if nothing is said: what the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""
 
 
+ASSUMABLE = {
+    "fluid.viscosity": "viscosity",
+    "motor.torque_constant": "torque_constant",
+    "motor.back_emf_constant": "back_emf_constant",
+}
+"""Field of the robot to the parameter whose uncertainty may be stated: what (17) and (18) infer B_eff from."""
+_LARGEST_UNCERTAINTY = 0.5
+
+
 @dataclass(frozen=True)
 class Coordinate:
     """One free number of a fit."""
@@ -289,4 +300,47 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
             )
     if "friction" in names and "shared_friction" in names:
         raise InputError("free = 'friction' together with 'shared_friction'; allowed: one of them")
+    bound = [name for name in names if PARAMETERS[name].needs_motor] if "friction" in names else []
+    if bound:
+        fields = {name: field for field, name in ASSUMABLE.items()}
+        raise InputError(
+            f"free = 'friction' together with {' and '.join(repr(name) for name in bound)}: B_eff of each tail takes "
+            "up its motor rate, which leaves nothing observed to tell them apart; allowed: shared_friction in place of "
+            f"friction, or the uncertainty of {fields[bound[0]]} stated (--assume-uncertainty "
+            f"{fields[bound[0]]}=5%) in place of freeing it"
+        )
     return names
+
+
+def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, float]:
+    """Stated uncertainties of what a fit takes from the robot: parameter to half of its relative 95 % interval.
+
+    Args:
+        given: field of the robot (see `ASSUMABLE`) to a share, such as ``"5%"`` or 0.05; None: none.
+
+    Raises:
+        InputError: for an unknown field, or a share that is none.
+    """
+    found = {}
+    for field, share in (given or {}).items():
+        if field not in ASSUMABLE:
+            raise InputError(
+                f"assume-uncertainty = '{str(field)[:40]}'{did_you_mean(str(field), ASSUMABLE)}; allowed: "
+                f"{', '.join(ASSUMABLE)}"
+            )
+        found[ASSUMABLE[field]] = _share(field, share)
+    return found
+
+
+def _share(field: str, share: str | float) -> float:
+    text = str(share).strip()
+    try:
+        value = float(text.removesuffix("%")) * (0.01 if text.endswith("%") else 1.0)
+    except ValueError:
+        value = float("nan")
+    if isinstance(share, bool) or not 0.0 < value <= _LARGEST_UNCERTAINTY:
+        raise InputError(
+            f"assume-uncertainty {field} = '{text[:40]}'; allowed: half of its relative 95 % interval, such as 5%, up "
+            f"to {100 * _LARGEST_UNCERTAINTY:g}%"
+        )
+    return value

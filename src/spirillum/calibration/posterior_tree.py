@@ -93,6 +93,6 @@ def _friction(found: Calibrated) -> list[dict[str, Any]]:
             "low": item.low,
             "high": item.high,
         }
-        for robot, item in zip(found.experiment.robots, found.friction, strict=False)
+        for robot, item in zip(found.experiment.robots, found.friction_given, strict=False)
         if np.isfinite(item.value)
     ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,15 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
 from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, kinematics, tabulated
-from spirillum.calibration.parameters import PARAMETERS, Coordinate, LogNormal, LogUniform, Parameter, Uniform
+from spirillum.calibration.parameters import (
+    ASSUMABLE,
+    PARAMETERS,
+    Coordinate,
+    LogNormal,
+    LogUniform,
+    Parameter,
+    Uniform,
+)
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
@@ -19,7 +27,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.swimming.steady import requirements
 
-__all__ = ["Problem", "Progress", "posed"]
+__all__ = ["Problem", "Progress", "posed", "stated_spread"]
 
 Progress = Callable[[str, int, int], None]
 
@@ -46,6 +54,9 @@ class Problem:
     """Largest relative errors of tabulated resistances in what they predict."""
     fixed_friction: Samples
     """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
+    assumed: Mapping[str, float] = field(default_factory=dict)
+    """Parameter to its stated uncertainty, half of a relative 95 % interval: a prior where it is free, else a share of
+    the interval of B_eff alone."""
 
     @property
     def interpolation_error(self) -> float:
@@ -139,12 +150,25 @@ class Problem:
         """What is compared, (robots,), at one place of the coordinates, (free numbers,)."""
         return {name: values[0] for name, values in self.predicted(z[None]).items()}
 
-    def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor") -> Samples:
-        """B_eff of every robot at motor rates, N m s/rad, (draws, robots)."""
+    def friction(self, z: Samples, motor_rate: Samples, reading: str = "rotor", scaled: Draws | None = None) -> Samples:
+        """B_eff of every robot at motor rates, N m s/rad, (draws, robots).
+
+        Args:
+            z: coordinates, (draws, free numbers).
+            motor_rate: omega_m, rad/s.
+            reading: reading of the friction.
+            scaled: factors on `viscosity`, `torque_constant`, `back_emf_constant` of the robots, (draws, 1).
+        """
         seen = self.experiment
+        own = {name: factor * self._own(name) for name, factor in (scaled or {}).items()}
         with np.errstate(invalid="ignore"):
             share = seen.tail_rate / seen.motor_rate.mean
-            return self.forward.friction(self.draws(z), motor_rate, share, reading)
+            return self.forward.friction({**self.draws(z), **own}, motor_rate, share, reading)
+
+    def _own(self, name: str) -> Samples:
+        """A constant of the robots' fluid or motor, SI, (robots,) or (1,)."""
+        found: Samples = self.forward.viscosity if name == "viscosity" else getattr(self.forward.electrics, name)
+        return found
 
     def printed_turning(self, z: Samples) -> Samples:
         """Omega/omega of every robot by (19) as printed, at its observed motor rate, (draws, robots)."""
@@ -163,7 +187,13 @@ class Problem:
         return np.array([item.prior.coordinate(float(values[item.label])) for item in self.coordinates])
 
 
-def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Progress | None = None) -> Problem:
+def posed(
+    experiment: Experiment,
+    model: str,
+    free: Sequence[str],
+    progress: Progress | None = None,
+    assumed: Mapping[str, float] | None = None,
+) -> Problem:
     """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers.
 
     Args:
@@ -171,10 +201,14 @@ def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Pro
         model: name of the hydrodynamic model.
         free: names of the free parameters.
         progress: told what is being computed.
+        assumed: parameter to its stated uncertainty, half of a relative 95 % interval. Where the motor's rate is
+            compared, such a parameter is free too, with that for its prior.
 
     Raises:
         InputError: if a robot is outside the model's domain, or has not what a parameter needs.
     """
+    stated = dict(assumed or {})
+    free = _with_assumed(free, stated)
     chosen = find_swimmer_model(model)
     batch = RobotBatch.of(experiment.robots)
     _check_domain(experiment, chosen, batch)
@@ -191,6 +225,7 @@ def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Pro
         forward=forward,
         table_error=error,
         fixed_friction=np.broadcast_to(friction, (experiment.size,)),
+        assumed=stated,
     )
     laid: dict[str, list[Coordinate]] = {}
     for parameter in sorted(parameters, key=lambda item: item.name == "shared_friction"):
@@ -198,6 +233,23 @@ def posed(experiment: Experiment, model: str, free: Sequence[str], progress: Pro
         before = replace(problem, coordinates=tuple(item for items in laid.values() for item in items))
         laid[parameter.name] = _coordinates(before, parameter, batch, ranges)
     return replace(problem, coordinates=tuple(item for parameter in parameters for item in laid[parameter.name]))
+
+
+def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[str, ...]:
+    """Free parameters, with those of stated uncertainty where the motor's rate is compared.
+
+    Raises:
+        InputError: where nothing that is fitted depends on the motor.
+    """
+    if any(PARAMETERS[name].needs_motor for name in free):
+        return (*free, *(name for name in assumed if name not in free))
+    if assumed and "friction" not in free:
+        fields = ", ".join(field for field, name in ASSUMABLE.items() if name in assumed)
+        raise InputError(
+            f"assume-uncertainty = '{fields}' with free = '{', '.join(free)}': none of these depends on it; allowed: "
+            "with friction, shared_friction or a constant of the motor free"
+        )
+    return tuple(free)
 
 
 def _check_domain(experiment: Experiment, model: SwimmerModel, batch: RobotBatch) -> None:
@@ -296,7 +348,13 @@ def _prior(
     if name == "shared_friction":
         return LogNormal(_middle_friction(problem), _FRICTION_SPREAD)
     source = batch if name in ("viscosity", "wire_diameter") else batch.electrics
-    return LogNormal(float(getattr(source, name)[0]), _TOLERANCE_SPREAD)
+    spread = stated_spread(problem.assumed[name]) if name in problem.assumed else _TOLERANCE_SPREAD
+    return LogNormal(float(getattr(source, name)[0]), spread)
+
+
+def stated_spread(uncertainty: float) -> float:
+    """Standard deviation of the logarithm of a number, given half of its relative 95 % interval."""
+    return float(np.log1p(uncertainty) / 1.96)
 
 
 def _middle_friction(problem: Problem) -> float:

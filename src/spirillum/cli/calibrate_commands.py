@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,14 @@ def calibrate(
     friction: Annotated[
         str, typer.Option(help="Reading of the friction under which B_eff follows from (18): rotor or paper.")
     ] = "rotor",
+    assume_uncertainty: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FIELD=SHARE",
+            help="Uncertainty of fluid.viscosity, motor.torque_constant or motor.back_emf_constant: half of its "
+            "relative 95 % interval, such as fluid.viscosity=5%; repeatable. Else taken as exact.",
+        ),
+    ] = None,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
     ] = "spirillum-calibration",
@@ -67,6 +76,7 @@ def calibrate(
             free=free,
             method=method,
             friction=friction,
+            assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(seed=seed),
             figures=not no_figures,
             progress=progress,
@@ -74,6 +84,21 @@ def calibrate(
     renderer.show(found.to_dict(), json=json)
     if not found.converged:
         raise typer.Exit(1)
+
+
+def _stated(given: Sequence[str]) -> dict[str, str]:
+    """Field to share of `--assume-uncertainty`.
+
+    Raises:
+        InputError: for what has no field, or a field that stands twice.
+    """
+    found: dict[str, str] = {}
+    for item in given:
+        name, equals, share = item.partition("=")
+        if not equals or name.strip() in found:
+            raise InputError(f"assume-uncertainty = '{item[:60]}'; allowed: FIELD=SHARE, each field once")
+        found[name.strip()] = share
+    return found
 
 
 def rank_models(

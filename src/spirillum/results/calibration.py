@@ -111,6 +111,7 @@ def calibrate(
     free: str | Sequence[str] | None = None,
     method: str = "posterior",
     friction: str = "rotor",
+    assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
     figures: bool = True,
     progress: Progress | None = None,
@@ -126,6 +127,9 @@ def calibrate(
         free: names of the free parameters, see `spirillum.calibration.parameters`; None: what the paper fitted.
         method: `paper` (its inversion of (15) and (18)), `least-squares`, or `posterior`.
         friction: reading under which B_eff follows from (18): `rotor` or `paper`.
+        assume_uncertainty: field of the robot, `fluid.viscosity`, `motor.torque_constant` or
+            `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
+            taken as exact.
         sampling: how the posterior is sampled.
         figures: draw figures too, which takes some seconds.
         progress: told what is being done.
@@ -146,6 +150,7 @@ def calibrate(
         free=free,
         method=method,
         friction=friction,
+        assume_uncertainty=assume_uncertainty,
         sampling=sampling,
         progress=progress,
     )

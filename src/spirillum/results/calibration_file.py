@@ -139,7 +139,7 @@ def _placement_tables(found: Calibrated) -> list[str]:
 
 
 def _friction_tables(found: Calibrated) -> list[str]:
-    lines = []
+    lines = ["", f"# {found.friction_statement}"] if found.friction_statement else []
     for robot, item in zip(found.experiment.robots, found.friction, strict=False):
         if not np.isfinite(item.value) or robot.channel is None:
             continue

@@ -70,6 +70,7 @@ def _show_friction(answer: Answer, console: Console) -> None:
             highlight=False,
             soft_wrap=True,
         )
+        console.print(escape(answer.get("effective_friction_statement", "")), highlight=False, soft_wrap=True)
 
 
 def _range(values: Sequence[float]) -> str:
