@@ -7,9 +7,10 @@ of a rigid motion v = U + Omega x r (viscosity 1, wall at rest) obeys on the bod
 
 with v_t the tangential part of v, and the resistance is the dissipation of pressure and shear,
 
-    R_ij = int h^3/12 grad p_i . grad p_j + v_ti . v_tj/h dA,
+    R_ij = int h^3/12 grad p_i . grad p_j + g v_ti . v_tj/h dA,    g = 1/(1 + (h/0.2 a)^2),
 
-which is symmetric and positive definite. The edges of the film are fixed on the body: the half circle that faces the
+which is symmetric and positive definite. Shear counts where the film is thin: with all of the half circle's, the rest of
+a robot's resistance without its film would not be positive definite. The edges of the film are fixed on the body: the half circle that faces the
 wall, along the straight side and 0.7 rad of rounded ends; a spheroid's film is a patch about its nearest point.
 
 p is expanded in polynomials (Galerkin) of coordinates that stretch the bottom line, the shoulders and the nearest
@@ -40,6 +41,8 @@ _HALF = 0.5 * np.pi
 _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
 _TOUCHES = "the body touches the wall of the tube"
+_SHEARED = 0.2
+"""Thickness, over the body's radius, above which what shears in the tube is no film: its shear is left out there."""
 _PATCH = 1.2
 """Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
 
@@ -315,7 +318,8 @@ def _assembled(place: _Place, surface: _Surface, along: _Basis, around: _Basis) 
         + tested(half * (motions @ to_v[..., None])[..., 0], along.values, around.slopes)
         + tested(element[..., None] * through[..., 0], along.values, around.values)
     )
-    sheared = (tangential * np.sqrt(element / h)[..., None, None]).swapaxes(0, 2).reshape(6, -1)
+    thin = 1.0 / (1.0 + (h / (_SHEARED * place.body.radius)) ** 2)
+    sheared = (tangential * np.sqrt(element * thin / h)[..., None, None]).swapaxes(0, 2).reshape(6, -1)
     return stiffness, loads, sheared @ sheared.T
 
 
