@@ -21,13 +21,13 @@ from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.problem import Problem
 
-__all__ = ["DISCREPANCY_SCALE", "ERROR_SCALE", "Density", "half_normal"]
+__all__ = ["DISCREPANCY_SCALE", "ERROR_SCALE", "LEAST_RELATIVE", "Density", "half_normal"]
 
 DISCREPANCY_SCALE = 0.3
 """Scale of the half-normal prior of a discrepancy: models of this kind miss by up to some tens of per cent."""
 ERROR_SCALE = 0.05
 """Scale of the half-normal prior of a trial's relative error: more than a tenth would be a poor measurement."""
-_ROUNDING = 1e-4
+LEAST_RELATIVE = 1e-4
 """Relative error below which no mean is taken for known: observations are written with a few digits."""
 _NOTHING = -1e30
 """Log density where there is none: finite, for the sampler takes differences."""
@@ -100,9 +100,9 @@ class Density:
             s, t = sigma[name][:, None], tau[name][:, None]
             residual[name] = np.where(ratio.seen, ratio.mean - values, 0.0)
             noise[name] = s * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
-            floor = max(_ROUNDING, self.problem.interpolation_error)
+            floor = max(LEAST_RELATIVE, self.problem.interpolation_error)
             variance[name] = noise[name] ** 2 + (t * values) ** 2 + (floor * ratio.scale) ** 2
-            trial = s**2 + _ROUNDING**2
+            trial = s**2 + LEAST_RELATIVE**2
             total += -0.5 * (ratio.freedom * np.log(trial) + ratio.squares / trial)
         for name in predicted:
             if name != "turning" or "advance" not in predicted:

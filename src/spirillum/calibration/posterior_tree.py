@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.calibration.likelihood import LEAST_RELATIVE
 from spirillum.fitted.posterior_file import SCHEMA, posterior_checksum
 from spirillum.version import versions
 
@@ -55,6 +56,7 @@ def posterior_tree(found: Calibrated) -> xr.DataTree:
         ),
         "friction_reading": found.reading,
         "friction": json.dumps(_friction(found)),
+        "tails": json.dumps(_tails(found), allow_nan=False),
         "r_hat": json.dumps(posterior.rhat),
         "effective_draws": json.dumps(posterior.effective),
         "quantities": json.dumps(list(problem.quantities)),
@@ -81,6 +83,30 @@ def _tree(posterior: Posterior, logs: Samples, observed: Mapping[Quantity, Sampl
         coords={"tail": np.array(tails, dtype=str)},
     )
     return tree
+
+
+def _tails(found: Calibrated) -> list[dict[str, Any]]:
+    """What was observed of every robot, and how well."""
+    problem, experiment = found.problem, found.experiment
+    tails = []
+    for place, robot in enumerate(experiment.robots):
+        seen = {
+            name: {key: float(getattr(problem.ratio(name), key)[place]) for key in ("mean", "trials", "scale")}
+            for name in problem.quantities
+            if problem.ratio(name).seen[place]
+        }
+        tails.append(
+            {
+                "channel_diameter": robot.channel.diameter if robot.channel else None,
+                "wavelength": robot.tail.wavelength,
+                "amplitude": robot.tail.amplitude,
+                "seen": seen,
+                "by_motor": bool(experiment.by_motor[place]),
+                "correlation": experiment.correlation,
+                "floor": max(LEAST_RELATIVE, problem.interpolation_error),
+            }
+        )
+    return tails
 
 
 def _friction(found: Calibrated) -> list[dict[str, Any]]:

@@ -13,9 +13,9 @@ from spirillum.cli.options import (
     Calibration,
     Friction,
     Json,
-    Motion,
     NoCalibration,
     Output,
+    Posterior,
     RobotArgument,
     Settings,
     complete_models,
@@ -27,15 +27,25 @@ if TYPE_CHECKING:
 __all__ = ["magnetic_sweep", "simulate"]
 
 _FullModel = Annotated[
-    str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: rft or slender; held also sbt, tube.")
+    str | None,
+    typer.Option(
+        autocompletion=complete_models,
+        help="Hydrodynamic model: rft or slender; held also sbt, tube. Else that of the calibration, or rft.",
+    ),
+]
+_RunMotion = Annotated[
+    str | None,
+    typer.Option(
+        help="free (lateral motion and tilt released) or held; else free, if the model of the calibration can be."
+    ),
 ]
 
 
 def simulate(
     robot: RobotArgument,
     output: Output,
-    model: _FullModel = "rft",
-    motion: Motion = "free",
+    model: _FullModel = None,
+    motion: _RunMotion = None,
     friction: Friction = None,
     turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail (of the field).")] = 3.0,
     duration: Annotated[
@@ -72,6 +82,10 @@ def simulate(
     ] = None,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,
+    posterior: Posterior = None,
+    draws: Annotated[
+        int, typer.Option(help="With --posterior: draws that are run for the intervals of the means, 20 to 1000.")
+    ] = 100,
     accuracy: Accuracy = None,
     settings: Settings = None,
     json: Json = False,
@@ -105,6 +119,8 @@ def simulate(
             },
             calibrated=not no_calibration,
             calibration=calibration,
+            posterior=posterior,
+            draws=draws,
             resolution={"accuracy": accuracy},
             placement=placement_from(gap, eccentricity, pitch, None, None, None),
             weight=not no_weight,

@@ -24,6 +24,7 @@ __all__ = [
     "Picture",
     "Pitch",
     "Posterior",
+    "PosteriorFor",
     "RobotArgument",
     "Settings",
     "TailDrop",
@@ -137,6 +138,14 @@ Calibration = Annotated[
 Posterior = Annotated[
     Path | None,
     typer.Option(metavar="FILE", help="Posterior of a calibration: its middle replaces the robot's values; intervals."),
+]
+PosteriorFor = Annotated[
+    str,
+    typer.Option(
+        "--for",
+        metavar="new|measured",
+        help="With --posterior: intervals of a new tail like those fitted, or of this one, which was measured.",
+    ),
 ]
 Settings = Annotated[
     list[str] | None,

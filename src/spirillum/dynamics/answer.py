@@ -48,13 +48,26 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         "duration": quantity(float(last["time"]), "s"),
     }
     scalars = [str(name) for name, variable in dataset.data_vars.items() if variable.ndim == 0]
-    content |= {name: quantity(float(dataset[name]), str(dataset[name].attrs["units"])) for name in scalars}
+    content |= {
+        name: quantity(float(dataset[name]), str(dataset[name].attrs["units"]), **_interval(dataset, name))
+        for name in scalars
+        if not name.endswith(("_low", "_high"))
+    }
+    if "draws" in dataset.attrs:
+        content["draws"] = int(dataset.attrs["draws"])
     content |= {
         f"final_{name}": quantity(last[name].values.tolist(), str(last[name].attrs["units"]))
         for name in _ENDS
         if name in dataset
     }
     return envelope("simulation", content, _warnings(dataset))
+
+
+def _interval(dataset: xr.Dataset, name: str) -> dict[str, Any]:
+    if f"{name}_low" not in dataset:
+        return {}
+    low, high = float(dataset[f"{name}_low"]), float(dataset[f"{name}_high"])
+    return {"low": low, "high": high, "kind": "interval", "level": float(dataset.attrs["level"])}
 
 
 def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:

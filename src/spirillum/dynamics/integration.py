@@ -18,7 +18,7 @@ from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.kernels import two_links as kernel
 
-__all__ = ["BATTERY_EMPTY", "INTEGRATOR", "TOLERANCE", "Event", "Reach", "Trajectory", "integrate"]
+__all__ = ["BATTERY_EMPTY", "INTEGRATOR", "TOLERANCE", "Event", "Progress", "Reach", "Trajectory", "integrate"]
 
 TOLERANCE = 1e-8
 """Relative tolerance of a step."""

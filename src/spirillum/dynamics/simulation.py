@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,20 +10,25 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
+from spirillum.dynamics.fitted_runs import DRAWS, chosen_model, with_intervals
 from spirillum.dynamics.held import held_run
-from spirillum.dynamics.integration import BATTERY_EMPTY, integrate
+from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.start import reach_of, start_state
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
+from spirillum.fitted.posterior_file import read_posterior
+from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels import two_links as kernel
+from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady import friction_reading
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
@@ -35,17 +40,19 @@ __all__ = ["simulate"]
 def simulate(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str = "rft",
-    motion: str = "free",
+    model: str | None = None,
+    motion: str | None = None,
     friction: str | None = None,
     calibrated: bool = True,
     calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    draws: int = DRAWS,
     timing: Timing | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
     roughness: str | float | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate swimming from rest.
 
@@ -54,11 +61,16 @@ def simulate(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
-        model: `rft` or `slender`; with `motion="held"` also `sbt` or `tube`.
-        motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive.
+        model: `rft` or `slender`; with `motion="held"` also `sbt` or `tube`. None: the model to which the posterior or
+            the calibration was fitted, or `rft` without one.
+        motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
+            `free`, but `held` where the model is that of a posterior or calibration and cannot be free.
         friction: reading of the friction; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose factors replace the robot's.
+        posterior: file of a calibration's posterior: its middle replaces the robot's values, and mean speed and rates
+            have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
+        draws: how many draws of the posterior are run for these, 20 to 1000.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, on throughout.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
@@ -76,23 +88,53 @@ def simulate(
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
+    known = None
+    if posterior is not None:
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        known = read_posterior(posterior, *([] if model is None else [model]))
     placed, times = Placement.of(placement), Timing.of(timing)
+    model, motion, said = chosen_model(model, motion, calibration, known)
     held = motion_of(motion) == "held"
     if held:
         _check_held(placed, roughness, weight=weight)
     else:
         check_full(find_swimmer_model(model))
-    steady = predict(
-        robot,
-        model=model,
-        friction=friction,
-        calibrated=calibrated,
-        calibration=calibration,
-        resolution=resolution,
-        progress=progress,
-    )
-    if held:
-        return held_run(steady, times)
+
+    def run(one: Robot, timing: Timing, tell: Progress | None = None) -> xr.Dataset:
+        steady = predict(
+            one,
+            model=model,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            resolution=resolution,
+            progress=tell,
+        )
+        return held_run(steady, timing) if held else _free_run(steady, timing, placed, roughness, weight, tell)
+
+    own = load(robot)
+    central = own if known is None else known.central(own)
+    dataset = run(central, times, progress)
+    if known is not None:
+        reading = friction_reading(friction or central.friction.reading)
+        said += fitted_of(None, known).run_warnings(central, find_swimmer_model(model), reading)
+        same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
+        tell = progress or (lambda _what, _done, _total: None)
+        dataset = with_intervals(dataset, known, central, lambda one: run(one, same_length), draws, tell)
+    warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]))
+
+
+def _free_run(
+    steady: Prediction,
+    times: Timing,
+    placed: Placement,
+    roughness: str | float | None,
+    weight: bool,  # noqa: FBT001 - one of the run's settings
+    progress: Progress | None,
+) -> xr.Dataset:
+    """A run with six degrees of freedom."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     end, time, switches = times.timetable(2.0 * np.pi / _turning(steady), own)
     links = _links(steady, roughness, weight=weight)

@@ -35,6 +35,8 @@ _DRAWS = 1000
 _WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
 _TAIL = ("channel_diameter", "wavelength", "amplitude")
 _CHECKED = ("schema", "model", "channels", "parameters", "friction", "friction_reading", "quantities")
+_CHECKED_LATER = ("tails",)
+"""Attributes that older files do not have."""
 _MAY_BE_ZERO = ("pitch",)
 
 
@@ -63,6 +65,18 @@ class PosteriorFile:
     """B_eff tail by tail, with `low` and `high`."""
     friction_reading: str = ""
     """Reading of the friction under which it was inferred."""
+    tails: tuple[Mapping[str, Any], ...] = ()
+    """What was observed of every robot: channel and tail, `seen` (quantity to `mean`, `trials`, `scale`), `by_motor`,
+    `correlation` of the errors of advance and turning, `floor` of all relative errors; empty in older files."""
+
+    def measured(self, robot: Robot) -> Mapping[str, Any] | None:
+        """What was observed of a robot; None if it was not."""
+        diameter = robot.channel.diameter if robot.channel else np.inf
+        own = (diameter, robot.tail.wavelength, robot.tail.amplitude, robot.body.diameter, robot.body.length)
+        for tail in self.tails:
+            if np.allclose(own, (*(tail[key] for key in _TAIL), *self.body), rtol=1e-6, atol=0.0):
+                return tail
+        return None
 
     def central(self, robot: Robot) -> Robot:
         """The robot with the middle of the posterior in place of its own values."""
@@ -86,6 +100,46 @@ class PosteriorFile:
             calibration={self.model: tuple(entries)} if entries else {},
             fitted=FittedValues.model_construct(**values),
             friction=self.frictions,
+        )
+        return calibrated_robot(robot, file)
+
+    def drawn(self, robot: Robot, count: int, rng: np.random.Generator) -> list[Robot]:
+        """The robot with the values of some draws in place of its own, evenly among them.
+
+        Args:
+            robot: the robot.
+            count: number of draws.
+            rng: source of chance, for B_eff of a tail.
+        """
+        draws = self.of(robot, rng)
+        return [self._at({name: float(values[n]) for name, values in draws.items()}, robot) for n in self.places(count)]
+
+    def places(self, count: int) -> list[int]:
+        """Places of some draws, evenly among them."""
+        size = next(iter(self.draws.values())).shape[0]
+        found: list[int] = np.linspace(0, size - 1, min(count, size)).round().astype(int).tolist()
+        return found
+
+    def _at(self, values: Mapping[str, float], robot: Robot) -> Robot:
+        """The robot with some fitted numbers in place of its own."""
+        own = robot.calibration.get(self.model)
+        factors: dict[str, Any] = {
+            name: values.get(name, getattr(own, name, 1.0)) for name in ("body_drag", "body_rotation")
+        }
+        entry = Calibration.model_construct(
+            **factors,
+            source=self.source,
+            fitted_to=FittedTo.model_construct(
+                channel_diameter=self.channels[nearest_channel(robot, self.channels)],
+                body_diameter=self.body[0],
+                body_length=self.body[1],
+            ),
+        )
+        friction = values.get("friction", values.get("shared_friction"))
+        fields: dict[str, Any] = {name: value for name, value in values.items() if name in FittedValues.model_fields}
+        file = CalibrationFile.model_construct(
+            calibration={self.model: (entry,)} if factors.keys() & values.keys() else {},
+            fitted=FittedValues.model_construct(**(fields | {"friction": friction})),
         )
         return calibrated_robot(robot, file)
 
@@ -152,7 +206,7 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
         values: draws by label.
     """
     found = hashlib.sha256()
-    for name in _CHECKED:
+    for name in (*_CHECKED, *(name for name in _CHECKED_LATER if name in attributes)):
         found.update(f"{name}={attributes[name]}\n".encode())
     for name in sorted(values):
         found.update(f"{name}\n".encode() + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
@@ -244,6 +298,7 @@ def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Sample
         error={name: flat[f"error_{name}"][kept] for name in quantities},
         friction=tuple(json.loads(attributes["friction"])),
         friction_reading=str(attributes["friction_reading"]),
+        tails=tuple(json.loads(attributes.get("tails", "[]"))),
     )
 
 

@@ -118,6 +118,21 @@ class Fitted:
             "for another torque: rates and speeds of the robot's own drive do not follow from the observations there"
         ]
 
+    def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[str]:
+        """All that has to be said of a robot that is driven by its own motor.
+
+        Args:
+            robot: the robot.
+            model: the hydrodynamic model.
+            reading: reading of the friction.
+        """
+        return [
+            *self.tail_warnings(robot),
+            *self.reading_warnings([reading]),
+            *self.model_warnings([model.name], [reading]),
+            *self.origin_warnings([robot], [model]),
+        ]
+
     def tail_warnings(self, robot: Robot) -> list[str]:
         """Whose B_eff a robot that is driven by its own motor has."""
         own, others = friction_of_tails(robot, self.friction)

@@ -3,8 +3,9 @@
 A posterior file (`posterior.nc` of `spirillum calibrate`) holds draws of fitted parameters and of the model's
 discrepancy, its relative misfit from tail to tail. Every draw is a robot of its own; a batch of them swims at once. The
 discrepancy then goes onto speed and rates, independently for each draw, for a tail that was not observed may be missed
-by as much as those that were; torques, currents, powers and efficiencies are computed from the rates and speeds that it
-leaves. An interval is of the robot's own motion, not of a single measured trial.
+by as much as those that were (of one that was observed it is known better, see `spirillum.swimming.discrepancy`).
+Torques, currents, powers and efficiencies are computed from the rates and speeds that it leaves. An interval is of the
+robot's own motion, not of a single measured trial.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.balance import friction_torques
+from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.steady import friction_reading, swim
 
@@ -40,6 +42,8 @@ class Intervals:
 
     low: Mapping[str, float]
     high: Mapping[str, float]
+    middle: Mapping[str, float]
+    """Medians of the draws."""
 
     def of(self, name: str) -> dict[str, Any]:
         """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
@@ -55,6 +59,7 @@ def intervals_of(
     *,
     tail_rate: float | None,
     friction: str,
+    posterior_for: PosteriorFor = "new",
 ) -> Intervals:
     """Swim every draw of a posterior and take the limits of 95 % intervals.
 
@@ -64,6 +69,7 @@ def intervals_of(
         posterior: its draws.
         tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
         friction: reading of the friction.
+        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
     """
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
@@ -72,14 +78,20 @@ def intervals_of(
     drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
     rates = None if tail_rate is None else np.full(size, tail_rate)
     swum = swim(batch, drawn, tail_rate=rates, friction=friction)
-    values = _with_discrepancy(swum, batch, posterior, rng, own_drive=tail_rate is None, friction=friction)
-    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
+    predicted = {
+        "advance": swum.advance_per_radian,
+        "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
+        "motor_rate": swum.motor_rotation_rate,
+    }
+    off = drawn_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
+    values = _with_discrepancy(swum, batch, off, own_drive=tail_rate is None, friction=friction)
+    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL, 0.5]
     limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
     nan = float("nan")
-    return Intervals(
-        {name: float(limits[name][0]) if name in limits else nan for name in values},
-        {name: float(limits[name][1]) if name in limits else nan for name in values},
+    low, high, middle = (
+        {name: float(limits[name][place]) if name in limits else nan for name in values} for place in range(3)
     )
+    return Intervals(low, high, middle)
 
 
 def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile) -> dict[str, Samples]:
@@ -195,22 +207,16 @@ class _Drawn(SwimmerModel):
 def _with_discrepancy(
     swum: Swimming,
     batch: RobotBatch,
-    posterior: PosteriorFile,
-    rng: np.random.Generator,
+    off: Mapping[str, Samples],
     *,
     own_drive: bool,
     friction: str,
 ) -> dict[str, Samples]:
     """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
     values = {item.name: getattr(swum, item.name) for item in STEADY}
-    size = swum.forward_velocity.size
-    one = np.ones(size)
+    one = np.ones(swum.forward_velocity.size)
 
-    def off(name: str) -> Samples:
-        tau = posterior.discrepancy.get(name)
-        return one if tau is None else 1.0 + tau * rng.normal(size=size)
-
-    advance, turning, motor = off("advance"), off("turning"), off("motor_rate")
+    advance, turning, motor = off["advance"], off["turning"], off["motor_rate"]
     # A fixed joint turns body and tail alike, and a drive that prescribes the rate is not missed by the model.
     turning = one if batch.joint == "fixed" else turning
     pace = motor if own_drive and batch.drive == "dc-motor" else one

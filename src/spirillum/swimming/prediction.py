@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import calibrated_placement, with_calibration
-from spirillum.fitted.posterior_file import read_posterior
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model
@@ -26,6 +26,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import Band, band_of
+from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.intervals import Intervals, intervals_of
@@ -72,6 +73,8 @@ class Prediction:
     """Band over the places that the placement leaves open; None where there are none, or none was asked for."""
     motion: Motion = "held"
     """Lateral motion and tilt held, or released."""
+    interval_of: str = ""
+    """Whose the intervals are, in half a sentence; empty without a posterior."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -105,6 +108,7 @@ class Prediction:
             "calibrated": self.calibrated,
             "motion": self.motion,
             **quantities,
+            **({"interval_of": self.interval_of} if self.interval_of else {}),
             "placement": self.placement,
             **({"band": band.to_dict()} if band else {}),
             "error_estimate": quantity(self.error_estimate, "1", statement=self.model.stated_error(self.robot.model)),
@@ -129,6 +133,7 @@ def predict(
     calibrated: bool = True,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
+    posterior_for: str = "new",
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     band: bool = True,
@@ -152,6 +157,8 @@ def predict(
         calibration: calibration file whose factors replace the robot's.
         posterior: file of a calibration's posterior: its middle replaces the robot's values, and every quantity has a
             95 % interval, the model's discrepancy included.
+        posterior_for: whose discrepancy the intervals hold: `new`, a tail like those that were fitted, or `measured`, a
+            robot that was, of which the values are then the middle of what is known of it.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
@@ -200,15 +207,46 @@ def predict(
     error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
-    known = None if drawn is None else intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading)
+    whose = posterior_for_of(posterior_for, drawn, ready)
+    known = None
+    if drawn is not None:
+        known = intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose)
+        if whose == "measured":
+            middles = {name: np.array([middle]) for name, middle in known.middle.items() if np.isfinite(middle)}
+            result = replace(result, **middles)
     fitted = fitted_of(calibration, drawn)
     warnings += fitted.idle_warnings([ready], [chosen])
     if rate is None:
-        warnings += [*fitted.tail_warnings(ready), *fitted.reading_warnings([reading])]
-        warnings += fitted.model_warnings([chosen.name], [reading])
-    warnings += fitted.origin_warnings([ready], [chosen])
+        warnings += fitted.run_warnings(ready, chosen, reading)
+    else:
+        warnings += fitted.origin_warnings([ready], [chosen])
     return Prediction(
-        ready, chosen, reading, applied, batch, result, error, (*warnings, *left_out), known, over, motion_of(motion)
+        ready,
+        chosen,
+        reading,
+        applied,
+        batch,
+        result,
+        error,
+        (*warnings, *left_out),
+        known,
+        over,
+        motion_of(motion),
+        _interval_statement(drawn, ready, whose),
+    )
+
+
+def _interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: PosteriorFor) -> str:
+    """Whose intervals they are, in half a sentence; empty without a posterior."""
+    if posterior is None:
+        return ""
+    if whose == "measured":
+        return "of this robot, which was measured: its own observations say how far the model misses it"
+    if posterior.measured(robot) is None:
+        return "of a tail like those that were fitted, which the model may miss by as much as these"
+    return (
+        "of a tail like those that were fitted, which the model may miss by as much as these; this one was measured "
+        "itself: --for measured"
     )
 
 

@@ -26,6 +26,7 @@ def table(answer: Answer, console: Console) -> None:
     if answer["forward_velocity"].get("kind") == "interval":
         level = answer["forward_velocity"]["level"]
         console.print(f"low and high: {100 * level:g} % interval of the robot's own motion", highlight=False)
+        console.print(f"interval {answer['interval_of']}", highlight=False, soft_wrap=True)
     if "band" in answer:
         places = len(answer["band"]["gap"]["value"])
         console.print(

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.answer import quantity
-from spirillum.cli.tables.parts import Answer, add_quantities, grid, show_error
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -23,6 +23,16 @@ def table(answer: Answer, console: Console) -> None:
     add_quantities(rows, dict(_rows(answer)))
     console.print(rows)
     console.print(_averages(answer))
+    if "draws" in answer:
+        bands = grid("", "mean", "value", "low", "high", "unit")
+        add_bands(bands, {name: item for name, item in answer.items() if isinstance(item, Mapping) and "low" in item})
+        console.print(bands)
+        console.print(
+            f"low and high: 95 % interval over {answer['draws']} draws, of a tail like those that were fitted, which "
+            "the model may miss by as much as these",
+            highlight=False,
+            soft_wrap=True,
+        )
     for event in answer["events"]:
         console.print(f"{event['time']:.4g} s: {escape(event['what'])}", highlight=False)
     show_error(answer["error_estimate"], console)

@@ -1,0 +1,139 @@
+"""Runs with what a calibration has found: model and motion that go with it, and intervals over a posterior's draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from numbers import Integral
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import read_calibration
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.robot import Robot
+from spirillum.swimming.discrepancy import drawn_discrepancy
+from spirillum.swimming.intervals import LEVEL
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["DRAWS", "chosen_model", "with_intervals"]
+
+DRAWS = 100
+"""Draws of a posterior that are run."""
+_FEWEST, _MOST = 20, 1000
+_DEFAULT = "rft"
+_FACTORS = {
+    "mean_forward_velocity": ("advance", "motor_rate"),
+    "mean_tail_rotation_rate": ("motor_rate",),
+    "mean_body_rotation_rate": ("turning", "motor_rate"),
+}
+"""Averages that have intervals, and the quantities whose discrepancy goes onto each."""
+_OVER = ("", "_on", "_steady")
+
+
+def chosen_model(
+    model: str | None, motion: str | None, calibration: str | Path | None, posterior: PosteriorFile | None
+) -> tuple[str, str, list[str]]:
+    """Model and motion of a run: those that are asked for, else those that go with what was fitted.
+
+    Args:
+        model: name of the model; None: that of the posterior or calibration, or `rft` without one.
+        motion: `free` or `held`; None: `held` for a model of the axial entries or of one place, else `free`.
+        calibration: calibration file; None without one.
+        posterior: posterior; None without one.
+
+    Returns:
+        Both, and what was chosen instead of the usual, a sentence each.
+    """
+    source = "" if posterior is None else posterior.source
+    fitted = [] if posterior is None else [posterior.model]
+    if calibration is not None:
+        file = read_calibration(calibration)
+        source = str(calibration)
+        fitted = [file.provenance.model] if file.provenance.model else list(file.calibration)
+    said = []
+    name = model
+    if name is None:
+        name = fitted[0] if len(fitted) == 1 else _DEFAULT
+        if name != _DEFAULT:
+            said.append(f"the run takes model '{name}', to which {source} was fitted")
+    elif fitted and name not in fitted:
+        said.append(
+            f"{source} was fitted with model '{fitted[0]}' and the run takes '{name}', on which its factors do not "
+            f"act; allowed: also --model {fitted[0]}"
+        )
+    chosen = find_swimmer_model(name)
+    if motion is not None:
+        return name, motion, said
+    if chosen.axial_only or chosen.placed:
+        why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
+        if model is None:
+            said.append(f"model '{name}' {why}: the run is held, with two degrees of freedom")
+            return name, "held", said
+    return name, "free", said
+
+
+def with_intervals(
+    dataset: xr.Dataset,
+    posterior: PosteriorFile,
+    robot: Robot,
+    run: Callable[[Robot], xr.Dataset],
+    draws: int,
+    tell: Callable[[str, int, int], None],
+) -> xr.Dataset:
+    """A run with 95 % intervals of its mean speed and rates, as scalars `..._low` and `..._high`.
+
+    Args:
+        dataset: the run with the middle of the posterior.
+        posterior: its draws.
+        robot: the robot, as `PosteriorFile.central` gives it.
+        run: runs a robot for as long.
+        draws: how many draws are run.
+        tell: told how many are done, and of how many.
+
+    Raises:
+        InputError: for a number of draws that tells nothing, or that takes too long.
+    """
+    if not isinstance(draws, Integral) or not _FEWEST <= draws <= _MOST:
+        raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
+    rng = np.random.default_rng(1)
+    found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}
+    drawn = posterior.drawn(robot, draws, rng)
+    for number, one in enumerate(drawn):
+        tell("draws of the posterior", number, len(drawn))
+        answer = run(one)
+        for name, values in found.items():
+            values.append(float(answer[name]))
+    kept = posterior.places(draws)
+    thinned = replace(posterior, discrepancy={name: tau[kept] for name, tau in posterior.discrepancy.items()})
+    off = drawn_discrepancy(thinned, {"advance": np.zeros(len(drawn))}, rng)
+    if robot.drive is not None and robot.drive.joint == "fixed":
+        off["turning"] = np.ones(len(drawn))
+    if robot.drive is None or robot.drive.kind != "dc-motor":
+        off["motor_rate"] = np.ones(len(drawn))
+    scalars: dict[str, Any] = {}
+    for name, factors in _FACTORS.items():
+        for over in _OVER:
+            values = np.array(found[name + over]) * np.prod([off[factor] for factor in factors], axis=0)
+            scalars |= _limits(name + over, values, dataset)
+    return dataset.assign(scalars).assign_attrs(draws=len(drawn), level=LEVEL)
+
+
+def _limits(name: str, values: Sequence[float] | np.ndarray, dataset: xr.Dataset) -> dict[str, Any]:
+    """Limits of an average; none where too many draws have none."""
+    known = np.asarray(values)[np.isfinite(values)]
+    middle = float(dataset[name])
+    if known.size < LEVEL * len(values) or not np.isfinite(middle):
+        return {}
+    ends = np.quantile(known, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    kept = {"units": dataset[name].attrs["units"], "source": "posterior of a calibration, discrepancy included"}
+    words = str(dataset[name].attrs["long_name"])
+    return {
+        f"{name}_{which}": ((), float(end), {**kept, "long_name": f"{words}, {side} limit of the 95 % interval"})
+        for which, side, end in zip(("low", "high"), ("lower", "upper"), ends, strict=True)
+    }
