@@ -9,9 +9,10 @@ with v_t the tangential part of v, and the resistance is the dissipation of pres
 
     R_ij = int h^3/12 grad p_i . grad p_j + g v_ti . v_tj/h dA,    g = 1/(1 + (h/0.2 a)^2),
 
-which is symmetric and positive definite. Shear counts where the film is thin: with all of the half circle's, the rest of
-a robot's resistance without its film would not be positive definite. The edges of the film are fixed on the body: the half circle that faces the
-wall, along the straight side and 0.7 rad of rounded ends; a spheroid's film is a patch about its nearest point.
+which is symmetric and positive definite. Shear counts where the film is thin: with that of the whole half circle taken
+away, the rest of a robot's resistance would not be positive definite. The edges of the film are fixed on the body: the
+half circle that faces the wall, along the straight side and 0.7 rad of rounded ends; a spheroid's film is a patch about
+its nearest point.
 
 p is expanded in polynomials (Galerkin) of coordinates that stretch the bottom line, the shoulders and the nearest
 point, so that films of any thickness cost the same.
@@ -22,6 +23,7 @@ the axis is (cos p cos psi, cos p sin psi, sin p) in (along the tube, to the sid
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -31,73 +33,24 @@ from scipy.linalg import cholesky, solve_triangular
 
 from spirillum.arrays import Matrix6, Samples
 from spirillum.errors import InputError
-from spirillum.robot.outline import Arc, Line, Outline
+from spirillum.fluid.tube.film_surface import TOUCHES, Cuts, FilmBody, Place, Surface, film_surface, frame
+from spirillum.kernels import film_table as table
+from spirillum.robot.outline import Outline
 
-__all__ = ["ROUNDED", "FilmBody", "film_resistance", "frame"]
+__all__ = ["FilmTable", "film_resistance"]
 
-ROUNDED = 0.7
-"""Angle of a rounded end that belongs to the film, rad."""
-_HALF = 0.5 * np.pi
 _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
-_TOUCHES = "the body touches the wall of the tube"
 _SHEARED = 0.2
 """Thickness, over the body's radius, above which what shears in the tube is no film: its shear is left out there."""
-_PATCH = 1.2
-"""Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
-
-
-@dataclass(frozen=True)
-class FilmBody:
-    """What a film knows of a body of revolution about its mid-length; lengths in m."""
-
-    radius: float
-    """a."""
-    half: float
-    """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
-    rear: tuple[float, float]
-    """Where the straight side ends behind, x, and the radius f of the rounded end there: 0 flat, a hemisphere."""
-    front: tuple[float, float]
-    """Where the straight side ends in front, x, and the radius f of the rounded end there."""
-
-    @classmethod
-    def of(cls, outline: Outline) -> FilmBody:
-        """Read an outline.
-
-        Raises:
-            InputError: the outline is neither an ellipse nor a straight side between two ends.
-        """
-        sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Line) and p.start[1] == p.end[1] > 0]
-        arcs = [piece for piece in outline.pieces if isinstance(piece, Arc)]
-        if len(sides) == 1:
-            side = outline.pieces[sides[0]]
-            ends = [p.points(np.array([t]))[0][0] for p, t in ((side, 1.0), (side, 0.0))]
-            rounded = [0.0, 0.0]
-            for neighbour, place in ((sides[0] + 1, 0), (sides[0] - 1, 1)):
-                piece = outline.pieces[neighbour]
-                rounded[place] = piece.semi_axes[1] if isinstance(piece, Arc) else 0.0
-            radius = float(side.points(np.zeros(1))[1][0])
-            return cls(radius, 0.0, (float(ends[0]), rounded[0]), (float(ends[1]), rounded[1]))
-        if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
-            return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
-        raise InputError("the film of a body without a straight side is known for spheres and spheroids only")
-
-
-def frame(pitch: float, yaw: float) -> Samples:
-    """Axes of F as columns, in (along the tube, to the side, towards the tube's axis)."""
-    (c, s), (cy, sy) = (np.cos(pitch), np.sin(pitch)), (np.cos(yaw), np.sin(yaw))
-    return np.array([[c * cy, -sy, -s * cy], [c * sy, cy, -s * sy], [s, 0.0, c]])
-
-
-class _Surface(NamedTuple):
-    """Part of a body's surface at a grid of coordinates (u, v), each (n_u, n_v, 3), in F about the body's middle."""
-
-    points: Samples
-    normals: Samples
-    along: Samples
-    """Derivative of the points by u."""
-    across: Samples
-    """Derivative of the points by v."""
+_THINNEST, _INTERVALS, _YAWS = 1e-4, 14, 4
+"""Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
+_STEEPEST = 0.5
+"""Largest sine of pitch at the nodes of a table."""
+_SHORTEST = 0.3
+"""Shortest straight side over the body's radius for which a table's coordinates serve."""
+_SPHEROID_PITCH = 0.6
+"""Largest pitch of a spheroid's table, rad."""
 
 
 class _Basis(NamedTuple):
@@ -151,73 +104,6 @@ def _halves(degree: int) -> _Basis:
     return _Basis.of(nodes, weights, *grids)
 
 
-class _Stretched(NamedTuple):
-    """A coordinate as a function of one on [-1, 1], and its derivative."""
-
-    at: Samples
-    slope: Samples
-
-
-def _stretched(unit: Samples, low: float, high: float, marks: tuple[tuple[float, float], ...]) -> _Stretched:
-    """Coordinate from `low` to `high` whose nodes gather at marks (where, over which length)."""
-
-    def progress(s: Samples) -> Samples:
-        return np.sum([np.arcsinh((s - where) / scale) for where, scale in marks], axis=0)
-
-    def rate(s: Samples) -> Samples:
-        return np.sum([1.0 / np.hypot(s - where, scale) for where, scale in marks], axis=0)
-
-    first, last = progress(np.array([low, high]))
-    wanted = first + 0.5 * (last - first) * (1.0 + unit)
-    below, above = np.full_like(unit, low), np.full_like(unit, high)
-    s = 0.5 * (below + above)
-    for _ in range(100):
-        error = progress(s) - wanted
-        below, above = np.where(error < 0, s, below), np.where(error > 0, s, above)
-        step = s - error / rate(s)
-        step = np.where((step > below) & (step < above), step, 0.5 * (below + above))
-        if np.max(np.abs(step - s)) < 1e-13 * (high - low):
-            break
-        s = step
-    return _Stretched(s, 0.5 * (last - first) / rate(s))
-
-
-@dataclass(frozen=True)
-class _Place:
-    """A body at a place in a tube."""
-
-    body: FilmBody
-    tube: float
-    """R, m."""
-    offset: float
-    axes: Samples
-    """Axes of F as columns."""
-
-    def clearance(self, points: Samples) -> Samples:
-        """H of points in F, m."""
-        side = points @ self.axes[1]
-        height = points @ self.axes[2] - self.offset
-        return self.tube - np.hypot(side, height)
-
-    def bottom(self, x: Samples) -> tuple[Samples, Samples]:
-        """Angle at which the straight side faces the wall at x, rad, and its derivative by x.
-
-        It is 0 near the tube's axis, where no side does.
-        """
-        side, height = x * self.axes[1, 0], self.offset - x * self.axes[2, 0]
-        size = side**2 + height**2 + (0.1 * self.body.radius) ** 2
-        angle = side * height / size
-        d_size = 2.0 * (side * self.axes[1, 0] - height * self.axes[2, 0])
-        slope = (self.axes[1, 0] * height - side * self.axes[2, 0] - angle * d_size) / size
-        return angle, slope
-
-    def gap(self, x: float) -> float:
-        """H of the straight side at x."""
-        angle = float(self.bottom(np.array([x]))[0][0])
-        point = np.array([x, self.body.radius * np.sin(angle), -self.body.radius * np.cos(angle)])
-        return float(self.clearance(point))
-
-
 class _Resolution(NamedTuple):
     """Degree of polynomials along and around the body; elements of equal length in the stretched coordinates."""
 
@@ -254,10 +140,13 @@ def film_resistance(
 
 def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float, *, fineness: float = 1.0) -> Matrix6:
     """Resistance of the film of a body that was read already; arguments and answer of `film_resistance`."""
-    place = _Place(body, radius, e, frame(p, psi))
+    place = Place(body, radius, e, frame(p, psi))
     grid = _STANDARD._replace(along=round(fineness * _STANDARD.along), around=round(fineness * _STANDARD.around))
-    surface = _spheroid(place, grid) if body.half else _with_side(place, grid)
-    stiffness, loads, resistance = _assembled(place, surface, _element(grid.along), _halves(grid.around))
+    along, around = _element(grid.along), _halves(grid.around)
+    pieces = (grid.side, grid.rounded, 2 * grid.rounded)
+    points = [_cut(along, count)[0] for count in pieces]
+    cuts = Cuts(points[0], pieces[0], points[1], pieces[1], points[2], pieces[2], around.nodes)
+    stiffness, loads, resistance = _assembled(place, film_surface(place, cuts), along, around)
     elements, rows, columns = loads.shape[:3]
     inner = (rows - 2) * columns  # unknowns that no other element has
     size = rows * columns
@@ -280,12 +169,12 @@ def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float,
     return np.asarray(resistance + flow.T @ flow)
 
 
-def _assembled(place: _Place, surface: _Surface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
+def _assembled(place: Place, surface: Surface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
     """Stiffness (elements, n_u, n_v, n_u, n_v), loads (elements, n_u, n_v, 6) and the shear's resistance."""
     points, normals, by_u, by_v = surface
     h = place.clearance(points)
     if not h.min() > 0:
-        raise InputError(_TOUCHES)
+        raise InputError(TOUCHES)
     normal = np.cross(by_u, by_v)
     squared = np.einsum("abi,abi->ab", normal, normal)
     to_u, to_v = np.cross(by_v, normal), np.cross(normal, by_u)  # gradients of u and v
@@ -323,112 +212,152 @@ def _assembled(place: _Place, surface: _Surface, along: _Basis, around: _Basis) 
     return stiffness, loads, sheared @ sheared.T
 
 
-def _with_side(place: _Place, grid: _Resolution) -> _Surface:
-    """The film of a body with a straight side, from the rear to the front."""
-    body = place.body
-    a, lift = body.radius, place.axes[2, 0]
-    reduced = a * place.tube / (place.tube - a)
-    shoulders = (body.rear, body.front)
-    gaps = [place.gap(x) for x, _ in shoulders]
-    # of the rounded ends too, which may be turned to the wall
-    nearest = [
-        gap - f * (1.0 - np.sqrt(1.0 - min(outward * lift, 0.0) ** 2))
-        for (_, f), gap, outward in zip(shoulders, gaps, (-1.0, 1.0), strict=True)
-    ]
-    if not min(*gaps, *nearest) > 0:
-        raise InputError(_TOUCHES)
-    thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
-    width = float(np.sqrt(2.0 * thinnest * reduced) / a)
-    around = _stretched(_halves(grid.around).nodes, -_HALF, _HALF, ((0.0, width),))
-    element = _element(grid.along)
-    marks = tuple(
-        (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(lift) / gap)))
-        for (x, _), gap in zip(shoulders, gaps, strict=True)
-    )
-    nodes = _cut(element, grid.side)[0]
-    x = _stretched(nodes, body.rear[0], body.front[0], marks)
-    zero, one = np.zeros_like(nodes), np.ones_like(nodes)
-    parts = [_revolved(place, around, x.slope / grid.side, (x.at, a * one), (one, zero), (zero, one))]
-    for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
-        if f == 0:
-            continue
-        low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
-        mark = (-float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
-        angle = _stretched(_cut(element, grid.rounded)[0], low, high, (mark,))
-        sin, cos = np.sin(angle.at), np.cos(angle.at)
-        outline = (joint + f * sin, a - f + f * cos)
-        end = _revolved(place, around, angle.slope / grid.rounded, outline, (f * cos, -f * sin), (sin, cos))
-        parts.insert(0 if outward < 0 else len(parts), end)
-    return _Surface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+@dataclass(frozen=True)
+class FilmTable:
+    """Resistance of a body's film in a tube, tabulated over offset, pitch and yaw."""
+
+    packed: Samples
+    """What `kernels.film_table.film_at` takes: a head, then the splines' coefficients in single precision."""
+
+    @classmethod
+    def of(
+        cls,
+        outline: Outline,
+        radius: float,
+        *,
+        yaw: float = 0.12,
+        pitch: float = 0.2,
+        intervals: int = _INTERVALS,
+        step: Callable[[float], None] | None = None,
+    ) -> FilmTable:
+        """Tabulate the film of a body, in some fifteen seconds of one core.
+
+        Args:
+            outline: outline of the body.
+            radius: R of the tube, m.
+            yaw: largest yaw, rad; less if the body has not that much room.
+            pitch: largest pitch for which clearances are within the splines, rad.
+            intervals: intervals of the splines, to show their convergence.
+            step: called with the share that is done.
+
+        Raises:
+            InputError: the body does not fit, or its straight side is too short.
+        """
+        body = FilmBody.of(outline)
+        head = _head(body, radius, yaw, pitch, intervals)
+        places = np.concatenate([[0.0, 1 / 3], np.arange(1, intervals), [intervals - 1 / 3, intervals]])
+        grids = [low + (high - low) * places / intervals for low, high in (head[7:9], head[10:12])]
+        etas = np.cos((np.arange(_YAWS) + 0.5) * 0.5 * np.pi / _YAWS)
+        nodes = np.empty((places.size, places.size, _YAWS, table.ENTRIES))
+        for i, first in enumerate(grids[0]):
+            for j, second in enumerate(grids[1]):
+                for k, eta in enumerate(etas):
+                    e, p, psi = _place_of(head, first, second, eta)
+                    found = np.empty(5)
+                    table.film_coordinates(head, e, p, psi, found)
+                    nodes[i, j, k] = _factors(resistance_of(body, radius, e, p, psi), body.radius, found[4])
+                    nodes[i, j, k, 0] -= found[3]
+            if step is not None:
+                step((i + 1) / places.size)
+        odd = np.array([False] * 6 + [n < 3 <= m for m in range(6) for n in range(m)])
+        nodes[..., odd] /= etas[:, None]
+        powers = np.linalg.inv(np.vander(etas**2, increasing=True))
+        splines = [
+            np.linalg.inv(_collocated(grid, low, high))
+            for grid, low, high in zip(grids, head[[7, 10]], head[[8, 11]], strict=True)
+        ]
+        found = np.einsum("ai,bj,mk,ijkn->abmn", *splines, powers, nodes, optimize=True).astype(np.float32).ravel()
+        return cls(np.concatenate([head, np.pad(found, (0, found.size % 2)).view(np.float64)]))
+
+    def at(self, e: float, p: float, psi: float) -> tuple[Matrix6, float]:
+        """Resistance at a place, as of `film_resistance`, and the body's smallest gap, m."""
+        out = np.empty((6, 6))
+        return out, float(table.film_at(self.packed, e, p, psi, out))
 
 
-def _revolved(
-    place: _Place,
-    around: _Stretched,
-    rate: Samples,
-    outline: tuple[Samples, Samples],
-    tangent: tuple[Samples, Samples],
-    normal: tuple[Samples, Samples],
-) -> _Surface:
-    """Surface of revolution of an outline (x, rho) with its tangent by s and unit normal; `rate` is ds/du."""
-    turn, turning = place.bottom(outline[0])
-    fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
-    theta = around.at + turn[:, None] * fade
-    by_v = around.slope * (1.0 - turn[:, None] * 2.0 * around.at / _HALF**2)
-    by_u = ((turning * tangent[0])[:, None] * fade) * rate[:, None]
-    sin, cos = np.sin(theta), np.cos(theta)
-    rho = outline[1][:, None]
-    zero = np.zeros_like(sin)
-    radial = np.stack([zero, sin, -cos], axis=-1)
-    hoop = np.stack([zero, cos, sin], axis=-1)
-    axis = np.array([1.0, 0.0, 0.0])
-
-    def meridian(pair: tuple[Samples, Samples]) -> Samples:
-        return pair[0][:, None, None] * axis + pair[1][:, None, None] * radial
-
-    return _Surface(
-        meridian(outline),
-        meridian(normal),
-        meridian(tangent) * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
-        (rho * by_v)[..., None] * hoop,
-    )
+def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: int) -> Samples:
+    """Head of a table."""
+    a, reach = body.radius, max(-body.rear[0], body.front[0])
+    length = body.front[0] - body.rear[0]
+    if not radius > a:
+        raise InputError("the body does not fit into the tube")
+    if not body.half and length < _SHORTEST * a:
+        raise InputError(f"films are tabulated for straight sides of at least {_SHORTEST:g} of the body's radius")
+    head = np.zeros(table.HEAD)
+    head[:7] = radius, a, body.half, *body.rear, *body.front
+    widest = min(2.0 * (radius - a), radius - a + np.sin(pitch) * reach)
+    head[table.FIRST] = table.stretched(_THINNEST * a, a)
+    head[table.LAST] = table.stretched(widest, a)
+    head[table.INTERVALS] = head[table.SECOND_INTERVALS] = intervals
+    head[10:12] = (-_SPHEROID_PITCH, _SPHEROID_PITCH) if body.half else head[7:9]
+    room = 1.0 if reach == 0 else min(0.6 * (radius - a) / reach, 1.0)
+    head[table.YAW] = min(yaw, float(np.arcsin(room)))
+    head[table.YAWS] = _YAWS
+    return head
 
 
-def _spheroid(place: _Place, grid: _Resolution) -> _Surface:
-    """The film of a spheroid: a patch of the stretched unit sphere about its nearest point."""
-    body = place.body
-    stretch = np.array([body.half, body.radius, body.radius])
-    facing = -place.axes[2]
-    nearest = stretch * facing
-    turn = np.arctan2(nearest[0], -nearest[2])
+def _clearance_of(at: float, radius: float) -> float:
+    """Inverse of `stretched`."""
+    v = 1e-4 * radius
+    for _ in range(100):
+        error = table.stretched(v, radius) - at
+        if abs(error) < 1e-13:
+            break
+        v *= np.exp(-error / (1.0 + 2.0 * v / (radius + v)))
+    return float(v)
 
-    def patch(beta: Samples, theta: Samples) -> _Surface:
-        (sb, cb), (st, ct) = (np.sin(beta)[:, None], np.cos(beta)[:, None]), (np.sin(theta), np.cos(theta))
-        zero = np.zeros(np.broadcast_shapes(sb.shape, st.shape))
-        c, s = np.cos(turn), np.sin(turn)
 
-        def turned(x: Samples, y: Samples, z: Samples) -> Samples:
-            return np.stack([zero + c * x - s * z, zero + y, zero + s * x + c * z], axis=-1)
+def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[float, float, float]:
+    """Offset, pitch and yaw of coordinates in a table; pitches are cut off at `_STEEPEST`."""
+    tube, a, half, rear, rear_round, front, front_round = head[:7]
+    if half:
+        psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[table.YAW])))))
+        e, wanted = 0.0, _clearance_of(first, a)
+        for _ in range(4):
+            e += table.clearance(head, 0.0, half, a, 0.0, e, np.sin(second), np.cos(second) * np.sin(psi)) - wanted
+        return e, float(second), psi
+    length = front - rear
+    v = np.array([_clearance_of(first, a), _clearance_of(second, a)])
+    scale = table.yaw_scale(head, *v)
+    sine = scale * np.sinh(eta * np.arcsinh(np.sin(head[table.YAW]) / scale))
+    v = np.minimum(v, v.min() + _STEEPEST * length)
 
-        sphere = turned(sb, cb * st, -cb * ct)
-        normals = sphere / stretch
-        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-        along, across = turned(cb, -sb * st, sb * ct), turned(0.0 * sb, cb * ct, cb * st)
-        return _Surface(stretch * sphere, normals, stretch * along, stretch * across)
+    def clearances(e: float, lift: float) -> Samples:
+        side = float(np.sqrt(1.0 - lift**2) * sine)
+        ends = ((rear, rear_round), (front, front_round))
+        return np.array([table.clearance(head, x, 0.0, a - f, f, e, lift, side) for x, f in ends])
 
-    step = 0.05
-    probe = np.array([-step, 0.0, step])
-    h = place.clearance(patch(probe, probe).points)
-    if h[1, 1] <= 0:
-        raise InputError(_TOUCHES)
-    bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
-    pieces = 2 * grid.rounded
-    nodes = (_cut(_element(grid.along), pieces)[0], _halves(grid.around).nodes)
-    beta, theta = (
-        _stretched(unit, -_PATCH, _PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / bend))),))
-        for unit, bend in zip(nodes, bends, strict=True)
-    )
-    surface = patch(beta.at, theta.at)
-    return surface._replace(
-        along=surface.along * beta.slope[:, None, None] / pieces, across=surface.across * theta.slope[:, None]
-    )
+    lift = (v[1] - v[0]) / length
+    e = tube - a - v[0] + rear * lift
+    step = 1e-6
+    for _ in range(50):
+        error = clearances(e, lift) - v
+        if np.max(np.abs(error) / v) < 1e-10:
+            break
+        by_e = (clearances(e + step * a, lift) - clearances(e - step * a, lift)) / (2.0 * step * a)
+        by_lift = (clearances(e, lift + step) - clearances(e, lift - step)) / (2.0 * step)
+        change = np.linalg.solve(np.column_stack([by_e, by_lift]), error)
+        e, lift = e - change[0], float(np.clip(lift - change[1], -0.9, 0.9))
+    return float(e), float(np.arcsin(lift)), float(np.arcsin(sine))
+
+
+def _factors(resistance: Matrix6, a: float, angle: float) -> Samples:
+    """Logarithms of D and the entries of M of R = M D M', R over powers of a and turned so that z' is the normal."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.eye(6)
+    turn[0, 0], turn[0, 2], turn[2, 0], turn[2, 2] = cos, -sin, sin, cos
+    sizes = np.array([1.0, 1.0, 1.0, a, a, a]) * np.sqrt(a)
+    scaled = (turn @ resistance @ turn.T) / np.outer(sizes, sizes)
+    factor = np.linalg.cholesky(scaled[np.ix_(table.ORDER, table.ORDER)])
+    roots = np.diag(factor)
+    return np.concatenate([2.0 * np.log(roots), (factor / roots)[np.tril_indices(6, -1)]])
+
+
+def _collocated(places: Samples, low: float, high: float) -> Samples:
+    """B-splines (columns) at places (rows)."""
+    count = places.size
+    matrix, weights = np.zeros((count, count)), np.empty(4)
+    for row, place in enumerate(places):
+        start = table.spline_weights(place, low, high, count - 3, weights)
+        matrix[row, start : start + 4] = weights
+    return matrix

@@ -1,0 +1,280 @@
+"""The surface under the film between a body of revolution and a tube's wall, in coordinates that stretch thin places.
+
+Frame F: x' along the body's axis, y' level, z' = x' x y', origin at the body's middle, which lies at the offset e below
+the tube's axis. The body's axis is (cos p cos psi, cos p sin psi, sin p) in (along the tube, to the side, towards the
+tube's axis). Angles around the body count from -z'.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.robot.outline import Arc, Line, Outline
+
+__all__ = ["PATCH", "ROUNDED", "TOUCHES", "Cuts", "FilmBody", "Place", "Surface", "film_surface", "frame"]
+
+ROUNDED = 0.7
+"""Angle of a rounded end that belongs to the film, rad."""
+PATCH = 1.2
+"""Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
+TOUCHES = "the body touches the wall of the tube"
+_HALF = 0.5 * np.pi
+
+
+@dataclass(frozen=True)
+class FilmBody:
+    """What a film knows of a body of revolution about its mid-length; lengths in m."""
+
+    radius: float
+    """a."""
+    half: float
+    """Half-length of a spheroid along its axis; 0 for a body with a straight side."""
+    rear: tuple[float, float]
+    """Where the straight side ends behind, x, and the radius f of the rounded end there: 0 flat, a hemisphere."""
+    front: tuple[float, float]
+    """Where the straight side ends in front, x, and the radius f of the rounded end there."""
+
+    @classmethod
+    def of(cls, outline: Outline) -> FilmBody:
+        """Read an outline.
+
+        Raises:
+            InputError: the outline is neither an ellipse nor a straight side between two ends.
+        """
+        sides = [k for k, p in enumerate(outline.pieces) if isinstance(p, Line) and p.start[1] == p.end[1] > 0]
+        arcs = [piece for piece in outline.pieces if isinstance(piece, Arc)]
+        if len(sides) == 1:
+            side = outline.pieces[sides[0]]
+            ends = [p.points(np.array([t]))[0][0] for p, t in ((side, 1.0), (side, 0.0))]
+            rounded = [0.0, 0.0]
+            for neighbour, place in ((sides[0] + 1, 0), (sides[0] - 1, 1)):
+                piece = outline.pieces[neighbour]
+                rounded[place] = piece.semi_axes[1] if isinstance(piece, Arc) else 0.0
+            radius = float(side.points(np.zeros(1))[1][0])
+            return cls(radius, 0.0, (float(ends[0]), rounded[0]), (float(ends[1]), rounded[1]))
+        if arcs and len(arcs) == len(outline.pieces) and len({(p.centre, p.semi_axes[1]) for p in arcs}) == 1:
+            return cls(arcs[0].semi_axes[1], abs(arcs[0].semi_axes[0]), (0.0, 0.0), (0.0, 0.0))
+        raise InputError("the film of a body without a straight side is known for spheres and spheroids only")
+
+
+def frame(pitch: float, yaw: float) -> Samples:
+    """Axes of F as columns, in (along the tube, to the side, towards the tube's axis)."""
+    (c, s), (cy, sy) = (np.cos(pitch), np.sin(pitch)), (np.cos(yaw), np.sin(yaw))
+    return np.array([[c * cy, -sy, -s * cy], [c * sy, cy, -s * sy], [s, 0.0, c]])
+
+
+class Surface(NamedTuple):
+    """Part of a body's surface at a grid of coordinates (u, v), each (n_u, n_v, 3), in F about the body's middle."""
+
+    points: Samples
+    normals: Samples
+    along: Samples
+    """Derivative of the points by u."""
+    across: Samples
+    """Derivative of the points by v."""
+
+
+class Cuts(NamedTuple):
+    """Points on [-1, 1] at which the surface is asked for, and the number of equal elements that they fill."""
+
+    side: Samples
+    """Along the straight side."""
+    sides: int
+    rounded: Samples
+    """Along a rounded end, and along half of a spheroid."""
+    rounds: int
+    patch: Samples
+    """Along a spheroid."""
+    patches: int
+    around: Samples
+    """Around the body."""
+
+
+class _Stretched(NamedTuple):
+    """A coordinate as a function of one on [-1, 1], and its derivative."""
+
+    at: Samples
+    slope: Samples
+
+
+def _stretched(unit: Samples, low: float, high: float, marks: tuple[tuple[float, float], ...]) -> _Stretched:
+    """Coordinate from `low` to `high` whose nodes gather at marks (where, over which length)."""
+
+    def progress(s: Samples) -> Samples:
+        return np.asarray(sum(np.arcsinh((s - where) / scale) for where, scale in marks))
+
+    def rate(s: Samples) -> Samples:
+        return np.asarray(sum(1.0 / np.hypot(s - where, scale) for where, scale in marks))
+
+    first, last = progress(np.array([low, high]))
+    wanted = first + 0.5 * (last - first) * (1.0 + unit)
+    below, above = np.full_like(unit, low), np.full_like(unit, high)
+    s = 0.5 * (below + above)
+    for _ in range(100):
+        error = progress(s) - wanted
+        below, above = np.where(error < 0, s, below), np.where(error > 0, s, above)
+        step = s - error / rate(s)
+        step = np.where((step > below) & (step < above), step, 0.5 * (below + above))
+        if np.max(np.abs(step - s)) < 1e-13 * (high - low):
+            break
+        s = step
+    return _Stretched(s, 0.5 * (last - first) / rate(s))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A body at a place in a tube."""
+
+    body: FilmBody
+    tube: float
+    """R, m."""
+    offset: float
+    axes: Samples
+    """Axes of F as columns."""
+
+    def clearance(self, points: Samples) -> Samples:
+        """H of points in F, m."""
+        side = points @ self.axes[1]
+        height = points @ self.axes[2] - self.offset
+        return np.asarray(self.tube - np.hypot(side, height))
+
+    def bottom(self, x: Samples) -> tuple[Samples, Samples]:
+        """Angle at which the straight side faces the wall at x, rad, and its derivative by x.
+
+        It is 0 near the tube's axis, where no side does.
+        """
+        side, height = x * self.axes[1, 0], self.offset - x * self.axes[2, 0]
+        size = side**2 + height**2 + (0.1 * self.body.radius) ** 2
+        angle = side * height / size
+        d_size = 2.0 * (side * self.axes[1, 0] - height * self.axes[2, 0])
+        slope = (self.axes[1, 0] * height - side * self.axes[2, 0] - angle * d_size) / size
+        return angle, slope
+
+    def gap(self, x: float) -> float:
+        """H of the straight side at x."""
+        angle = float(self.bottom(np.array([x]))[0][0])
+        point = np.array([x, self.body.radius * np.sin(angle), -self.body.radius * np.cos(angle)])
+        return float(self.clearance(point))
+
+
+def film_surface(place: Place, cuts: Cuts) -> Surface:
+    """Surface under the film, from the rear to the front.
+
+    `along` is the derivative by a coordinate that runs from -1 to 1 in every element.
+
+    Raises:
+        InputError: the body touches the wall.
+    """
+    return _spheroid(place, cuts) if place.body.half else _with_side(place, cuts)
+
+
+def _with_side(place: Place, cuts: Cuts) -> Surface:
+    """The film of a body with a straight side, from the rear to the front."""
+    body = place.body
+    a, lift = body.radius, place.axes[2, 0]
+    reduced = a * place.tube / (place.tube - a)
+    shoulders = (body.rear, body.front)
+    gaps = [place.gap(x) for x, _ in shoulders]
+    # of the rounded ends too, which may be turned to the wall
+    nearest = [
+        gap - f * (1.0 - np.sqrt(1.0 - min(outward * lift, 0.0) ** 2))
+        for (_, f), gap, outward in zip(shoulders, gaps, (-1.0, 1.0), strict=True)
+    ]
+    if not min(*gaps, *nearest) > 0:
+        raise InputError(TOUCHES)
+    thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
+    width = float(np.sqrt(2.0 * thinnest * reduced) / a)
+    around = _stretched(cuts.around, -_HALF, _HALF, ((0.0, width),))
+    marks = tuple(
+        (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(lift) / gap)))
+        for (x, _), gap in zip(shoulders, gaps, strict=True)
+    )
+    x = _stretched(cuts.side, body.rear[0], body.front[0], marks)
+    zero, one = np.zeros_like(cuts.side), np.ones_like(cuts.side)
+    parts = [_revolved(place, around, x.slope / cuts.sides, (x.at, a * one), (one, zero), (zero, one))]
+    for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
+        if f == 0:
+            continue
+        low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
+        mark = (-float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
+        angle = _stretched(cuts.rounded, low, high, (mark,))
+        sin, cos = np.sin(angle.at), np.cos(angle.at)
+        outline = (joint + f * sin, a - f + f * cos)
+        end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos))
+        parts.insert(0 if outward < 0 else len(parts), end)
+    return Surface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
+
+
+def _revolved(
+    place: Place,
+    around: _Stretched,
+    rate: Samples,
+    outline: tuple[Samples, Samples],
+    tangent: tuple[Samples, Samples],
+    normal: tuple[Samples, Samples],
+) -> Surface:
+    """Surface of revolution of an outline (x, rho) with its tangent by s and unit normal; `rate` is ds/du."""
+    turn, turning = place.bottom(outline[0])
+    fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
+    theta = around.at + turn[:, None] * fade
+    by_v = around.slope * (1.0 - turn[:, None] * 2.0 * around.at / _HALF**2)
+    by_u = ((turning * tangent[0])[:, None] * fade) * rate[:, None]
+    sin, cos = np.sin(theta), np.cos(theta)
+    rho = outline[1][:, None]
+    zero = np.zeros_like(sin)
+    radial = np.stack([zero, sin, -cos], axis=-1)
+    hoop = np.stack([zero, cos, sin], axis=-1)
+    axis = np.array([1.0, 0.0, 0.0])
+
+    def meridian(pair: tuple[Samples, Samples]) -> Samples:
+        return np.asarray(pair[0][:, None, None] * axis + pair[1][:, None, None] * radial)
+
+    return Surface(
+        meridian(outline),
+        meridian(normal),
+        meridian(tangent) * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
+        (rho * by_v)[..., None] * hoop,
+    )
+
+
+def _spheroid(place: Place, cuts: Cuts) -> Surface:
+    """The film of a spheroid: a patch of the stretched unit sphere about its nearest point."""
+    body = place.body
+    stretch = np.array([body.half, body.radius, body.radius])
+    facing = -place.axes[2]
+    nearest = stretch * facing
+    turn = np.arctan2(nearest[0], -nearest[2])
+
+    def patch(beta: Samples, theta: Samples) -> Surface:
+        (sb, cb), (st, ct) = (np.sin(beta)[:, None], np.cos(beta)[:, None]), (np.sin(theta), np.cos(theta))
+        zero = np.zeros(np.broadcast_shapes(sb.shape, st.shape))
+        c, s = np.cos(turn), np.sin(turn)
+
+        def turned(x: Samples, y: Samples, z: Samples) -> Samples:
+            return np.stack([zero + c * x - s * z, zero + y, zero + s * x + c * z], axis=-1)
+
+        sphere = turned(sb, cb * st, -cb * ct)
+        normals = sphere / stretch
+        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+        along, across = turned(cb, -sb * st, sb * ct), turned(0.0 * sb, cb * ct, cb * st)
+        return Surface(stretch * sphere, normals, stretch * along, stretch * across)
+
+    step = 0.05
+    probe = np.array([-step, 0.0, step])
+    h = place.clearance(patch(probe, probe).points)
+    if h[1, 1] <= 0:
+        raise InputError(TOUCHES)
+    bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
+    beta, theta = (
+        _stretched(unit, -PATCH, PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / bend))),))
+        for unit, bend in zip((cuts.patch, cuts.around), bends, strict=True)
+    )
+    surface = patch(beta.at, theta.at)
+    return surface._replace(
+        along=surface.along * beta.slope[:, None, None] / cuts.patches, across=surface.across * theta.slope[:, None]
+    )
