@@ -16,6 +16,7 @@ from spirillum.dynamics.integration import TOLERANCE
 from spirillum.dynamics.start import start_state
 from spirillum.dynamics.two_links import two_links
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.placement import Placement
 
@@ -48,7 +49,7 @@ def main() -> None:
         weight=True,
         roughness=None,
     )
-    data, dy = links.data, np.empty(kernel.STATES)
+    data, dy = links.data, np.empty(rigid_links.STATES)
 
     def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
         kernel.rates(dy, t, y, data)

@@ -127,6 +127,8 @@ _STEADY = (
 )  # fmt: skip
 
 _LINKS = "two rigid links, (15) with all rows"
+_TUBE = "motion in the tube"
+
 _RUNS = (
     Quantity("time", "t", "s", "time", "definition"),
     Quantity("position", "x", "m", "place of the body's mid-length; the channel's axis is y = z = 0", _LINKS),
@@ -156,6 +158,18 @@ _RUNS = (
     Quantity("time_on", "", "s", "time for which the drive is on", "remote"),
     Quantity("time_steady", "", "s", "time for which the drive is on and the motion steady", "remote, and the motion"),
     Quantity("battery_charge_used", "", "C", "charge drawn from the battery", _LINKS),
+    Quantity("offset", "e", "m", "distance of the body's mid-length from the tube's axis", "geometry"),
+    Quantity("wall_pitch", "", "rad", "angle by which the nose is away from the nearest wall", "geometry"),
+    Quantity(
+        "wall_yaw", "", "rad", "angle of the nose across the plane of tube and body, to +y at the lowest place", _TUBE
+    ),
+    Quantity("tail_gap", "", "m", "smallest distance of the wire to the wall where it is near, else NaN", "geometry"),
+    Quantity("contact_force", "N", "N", "load on asperities of the wall, summed over contacts", _TUBE),
+    Quantity("contact_friction", "F_t", "N", "force of dry friction, summed over contacts", _TUBE),
+    Quantity("contact_power", "", "W", "power lost to dry friction at the wall", _TUBE),
+    Quantity("contact_energy", "", "J", "energy lost to dry friction at the wall", _TUBE),
+    Quantity("mean_flow", "U_m", "m/s", "mean velocity of the fluid through the tube", "model tube"),
+    Quantity("flow_energy", "", "J", "work of the imposed flow on the robot", "model tube"),
 )
 
 _FIELDS = (

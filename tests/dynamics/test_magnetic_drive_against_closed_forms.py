@@ -1,5 +1,7 @@
 """A moment in a rotating field: phase lag, step-out, slip, tumbling and wobbling."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.magnetic_sweep import _settled
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.two_links import TwoLinks
-from spirillum.kernels import two_links as kernel
+from spirillum.kernels import rigid_links
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 MOMENT, FIELD = 1.0, 2.0
@@ -17,23 +19,30 @@ MOMENT, FIELD = 1.0, 2.0
 def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
     """A made-up body of revolution that feels nothing but its own rotation; SI."""
     drive = np.zeros(20)
-    drive[[kernel.KIND, kernel.FIXED, kernel.DUTY]] = kernel.MAGNETIC, 1.0, 1.0
-    drive[kernel.MOMENT : kernel.FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
-    drive[kernel.FIELD] = FIELD
+    drive[[rigid_links.KIND, rigid_links.FIXED, rigid_links.DUTY]] = rigid_links.MAGNETIC, 1.0, 1.0
+    drive[rigid_links.MOMENT : rigid_links.FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
+    drive[rigid_links.FIELD] = FIELD
     drag = np.diag([1.0, 1.0, 1.0, along, across, across, 1.0])
-    return TwoLinks(drag, np.zeros((7, 7)), np.zeros(8), np.array([np.inf, 1e-9, np.inf, 1.0]), np.zeros((0, 6)), drive)
+    return TwoLinks(
+        friction=np.zeros((7, 7)),
+        weight=np.zeros(8),
+        drive=drive,
+        drag=drag,
+        wall=np.array([np.inf, 1e-9, np.inf, 1.0]),
+        spots=np.zeros((0, 6)),
+    )
 
 
 def run_at(links: TwoLinks, rate: float, turns: float) -> np.ndarray:
     """Angle of the moment behind the field about x."""
     drive = links.drive.copy()
-    drive[kernel.FIELD_RATE] = rate
-    here = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
-    start = np.zeros(kernel.STATES)
-    start[kernel.ATTITUDE] = 1.0
+    drive[rigid_links.FIELD_RATE] = rate
+    here = replace(links, drive=drive)
+    start = np.zeros(rigid_links.STATES)
+    start[rigid_links.ATTITUDE] = 1.0
     time = np.linspace(0.0, turns * 2 * np.pi / rate, int(20 * turns))
     run = integrate(here, start, time, [Switch(0.0, 1.0)], NOWHERE)
-    return np.asarray(rate * run.time - run.states[:, kernel.ROLL])
+    return np.asarray(rate * run.time - run.states[:, rigid_links.ROLL])
 
 
 @pytest.mark.parametrize(

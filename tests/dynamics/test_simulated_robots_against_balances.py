@@ -122,10 +122,10 @@ def test_capsule_drains_as_a_line_does() -> None:
     assert gap[-1] < 0.5 * gap[0]
     links = 1.0 / np.sqrt(gap)
     slope = (links[-1] - links[len(links) // 2]) / float(run["time"][-1] - run["time"][len(links) // 2])
-    from spirillum.dynamics.two_links import _weight
+    from spirillum.dynamics.acting import weight_of
 
     length, across = 0.017, 0.009 * 0.02 / 0.011
-    expected = _weight(robot)[:2].sum() / (2 * 3 * np.sqrt(2) * np.pi * 3.5 * across**1.5 * length)
+    expected = weight_of(robot)[:2].sum() / (2 * 3 * np.sqrt(2) * np.pi * 3.5 * across**1.5 * length)
     assert slope == pytest.approx(expected, rel=0.1)
 
 
@@ -160,13 +160,14 @@ def test_film_is_lost_as_its_gradient_says() -> None:
     """By finite differences of place and attitude, for a tilted sphere-ended, an edged and an ellipsoidal ring."""
     from scipy.spatial.transform import Rotation
 
+    from spirillum.kernels import rigid_links
     from spirillum.kernels import two_links as kernel
 
     wall = np.array([0.02, 1e-6, np.inf, 1.0])
     place, attitude = np.array([0.0, 2.1e-3, -8.5e-3]), Rotation.from_euler("xyz", [0.3, 0.1, -0.07])
 
     def film(step: np.ndarray, spot: np.ndarray, gradient: np.ndarray) -> float:
-        state = np.zeros(kernel.STATES)
+        state = np.zeros(rigid_links.STATES)
         state[:3] = place + attitude.apply(step[:3])
         turned = attitude * Rotation.from_rotvec(step[3:])
         state[3:7] = turned.as_quat(scalar_first=True)

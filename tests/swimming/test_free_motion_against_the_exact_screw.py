@@ -1,5 +1,6 @@
 """A free robot in unbounded fluid moves on a screw: seen from the tail its twist is constant."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from spirillum.dynamics.integration import Reach, integrate
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import two_links as kernel
+from spirillum.kernels import rigid_links
 from spirillum.swimming.freedom import LINKS
 
 NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
@@ -87,13 +88,13 @@ def test_lateral_freedom_costs_a_little_speed() -> None:
 def test_reversed_tail_retraces_the_path() -> None:
     links = links_of(robot())
     drive = links.drive.copy()
-    drive[kernel.KIND], drive[kernel.GIVEN] = kernel.RATE, 8.0
-    there = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
+    drive[rigid_links.KIND], drive[rigid_links.GIVEN] = rigid_links.RATE, 8.0
+    there = replace(links, drive=drive)
     drive = drive.copy()
-    drive[kernel.GIVEN] = -8.0
-    back = TwoLinks(links.drag, links.friction, links.weight, links.wall, links.spots, drive)
-    start = np.zeros(kernel.STATES)
-    start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = (0.8, 0.3, -0.1, np.sqrt(1 - 0.74))
+    drive[rigid_links.GIVEN] = -8.0
+    back = replace(links, drive=drive)
+    start = np.zeros(rigid_links.STATES)
+    start[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = (0.8, 0.3, -0.1, np.sqrt(1 - 0.74))
     time = np.linspace(0.0, 40.0, 801)
     forward = integrate(there, start, time, [Switch(0.0, 1.0)], NOWHERE)
     turned = forward.states[-1].copy()
@@ -119,7 +120,7 @@ def test_unbounded_fluid_has_no_direction() -> None:
 
     links = links_of(robot())
     time = np.linspace(0.0, 3.0, 61)
-    level, turned = np.zeros(kernel.STATES), np.zeros(kernel.STATES)
+    level, turned = np.zeros(rigid_links.STATES), np.zeros(rigid_links.STATES)
     attitude = Rotation.from_euler("xyz", [0.4, -1.1, 2.0])
     level[3] = 1.0
     turned[3:7] = attitude.as_quat(scalar_first=True)

@@ -16,6 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
+from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 
 __all__ = ["BATTERY_EMPTY", "INTEGRATOR", "TOLERANCE", "Event", "Progress", "Reach", "Trajectory", "integrate"]
@@ -181,14 +182,14 @@ def _limits(links: TwoLinks, reach: Reach, *, spent: bool) -> list[_Watch]:
     if np.isfinite(reach.channel):
 
         def room(y: Samples) -> Samples:
-            w, i, j, k = y[kernel.ATTITUDE : kernel.ATTITUDE + 4]
+            w, i, j, k = y[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
             along = 1.0 - 2.0 * (j * j + k * k) / (w * w + i * i + j * j + k * k)
-            x = y[kernel.POSITION] - reach.middle
+            x = y[rigid_links.POSITION] - reach.middle
             return np.asarray(reach.channel - np.maximum(x + reach.nose * along, -x - reach.tip * along))
 
         found.append(_Watch(_END, room, last=True))
-    if np.isfinite(reach.charge) and links.drive[kernel.KIND] == kernel.MOTOR and not spent:
-        found.append(_Watch(BATTERY_EMPTY, lambda y: reach.charge - y[kernel.CHARGE], last=True))
+    if np.isfinite(reach.charge) and links.drive[rigid_links.KIND] == rigid_links.MOTOR and not spent:
+        found.append(_Watch(BATTERY_EMPTY, lambda y: reach.charge - y[rigid_links.CHARGE], last=True))
     return found
 
 
@@ -233,7 +234,7 @@ def _stretch(
     found = [
         (float(t), watch, np.array(row))
         for watch, times, rows in zip(watches, solved.t_events or (), solved.y_events or (), strict=True)
-        for t, row in zip(times, np.asarray(rows).reshape(-1, kernel.STATES), strict=True)
+        for t, row in zip(times, np.asarray(rows).reshape(-1, rigid_links.STATES), strict=True)
     ]
     end, what, last = min(
         ((t, watch.what, row) for t, watch, row in found if watch.terminal),
@@ -276,27 +277,27 @@ def _solved(links: TwoLinks, state: Samples, at: Samples, start: float, watches:
 
 def _tolerances(links: TwoLinks) -> Samples:
     """Relative tolerances of the state's components, (17,): finer for place and attitude where a film hangs on them."""
-    found = np.full(kernel.STATES, TOLERANCE)
+    found = np.full(rigid_links.STATES, TOLERANCE)
     if links.spots.size:
-        found[: kernel.PHASE] *= 1e-3
+        found[: rigid_links.PHASE] *= 1e-3
     return found
 
 
 def _scales(links: TwoLinks) -> Samples:
     """Sizes of the state's components below which nothing matters, (17,)."""
     drive, length, torque = links.drive, links.length, links.torque
-    resistance = drive[kernel.CONSTANT]
-    current = drive[kernel.VOLTAGE] / resistance if resistance > 0 else 1.0
-    electrical = max(drive[kernel.VOLTAGE] * current, torque)
-    scales = np.ones(kernel.STATES)
-    scales[kernel.POSITION : kernel.POSITION + 3] = length
-    scales[kernel.CURRENT] = scales[kernel.CHARGE] = current
-    scales[kernel.ELECTRICAL : kernel.CHARGE] = electrical
-    scales[kernel.DRIVEN :] = torque
+    resistance = drive[rigid_links.CONSTANT]
+    current = drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
+    electrical = max(drive[rigid_links.VOLTAGE] * current, torque)
+    scales = np.ones(rigid_links.STATES)
+    scales[rigid_links.POSITION : rigid_links.POSITION + 3] = length
+    scales[rigid_links.CURRENT] = scales[rigid_links.CHARGE] = current
+    scales[rigid_links.ELECTRICAL : rigid_links.CHARGE] = electrical
+    scales[rigid_links.DRIVEN :] = torque
     return scales
 
 
 def _observed(links: TwoLinks, time: Samples, states: Samples) -> Samples:
-    out = np.empty((time.size, kernel.OBSERVED))
+    out = np.empty((time.size, rigid_links.OBSERVED))
     kernel.observe(time, np.ascontiguousarray(states), links.data, out)
     return out

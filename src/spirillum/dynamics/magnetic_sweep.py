@@ -23,7 +23,7 @@ from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.kernels import two_links as kernel
+from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
 from spirillum.robot.options import Resolution
 from spirillum.robot.robot import Robot
@@ -127,7 +127,7 @@ def magnetic_sweep(
         if progress is not None:
             progress(f"field at {rate / (2 * np.pi):.3g} Hz", done, asked.size)
         mean, still = _settled(links, float(rate), _pushed(attitude), turns)
-        attitude = mean.state[kernel.ATTITUDE : kernel.ATTITUDE + 4] if mean.follows else level
+        attitude = mean.state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] if mean.follows else level
         found.append(mean)
         settled.append(still)
     return _dataset(held, asked, found, np.array(settled, dtype=float), turns)
@@ -161,10 +161,10 @@ def _rates(rates: Sequence[str | float] | Samples | None, held: Prediction) -> S
 def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> tuple[_Mean, bool]:
     """The robot in a field that turns at one rate, from an attitude on until nothing changes, or given up."""
     drive = links.drive.copy()
-    drive[kernel.FIELD_RATE] = rate
+    drive[rigid_links.FIELD_RATE] = rate
     here = replace(links, drive=drive)
-    start: Samples = np.zeros(kernel.STATES)
-    start[kernel.ATTITUDE : kernel.ATTITUDE + 4] = attitude
+    start: Samples = np.zeros(rigid_links.STATES)
+    start[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = attitude
     whole = float(max(round(turns), 1))  # so that every stretch begins with the field pointing up
     time = np.linspace(0.0, whole * 2.0 * np.pi / abs(rate), int(whole * _SAMPLES) + 1)
     before = None
@@ -180,9 +180,9 @@ def _settled(links: TwoLinks, rate: float, attitude: Samples, turns: float) -> t
 def _averaged(links: TwoLinks, rate: float, time: Samples, states: Samples) -> _Mean:
     from scipy.spatial.transform import Rotation
 
-    attitudes = Rotation.from_quat(states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4], scalar_first=True)
+    attitudes = Rotation.from_quat(states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4], scalar_first=True)
     rotation = np.asarray(attitudes.as_matrix())
-    moment = rotation @ links.drive[kernel.MOMENT : kernel.FIELD]
+    moment = rotation @ links.drive[rigid_links.MOMENT : rigid_links.FIELD]
     behind = np.unwrap(0.5 * np.pi + rate * time - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     slipped = behind - behind[0]
     follows = abs(float(slipped[-1])) < 0.5 * np.pi

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.acting import Acting
 from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.averages import STEADY, Stretch, run_averages
-from spirillum.dynamics.integration import INTEGRATOR, Reach, Trajectory
-from spirillum.dynamics.two_links import TwoLinks
-from spirillum.kernels import two_links as kernel
+from spirillum.dynamics.integration import Reach, Trajectory
+from spirillum.kernels import rigid_links
 from spirillum.quantities import attributes
 from spirillum.swimming.motor import battery_voltage, winding_resistance
 from spirillum.swimming.prediction import Prediction
@@ -21,10 +21,10 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dataset_of"]
+__all__ = ["dataset_of", "free_attributes"]
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
-_MOMENT = slice(kernel.MOMENT, kernel.FIELD)
+_MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
 
 
 _SOURCE = "two rigid links, (15) with all rows"
@@ -34,23 +34,21 @@ _MEANINGS = {"wobble_angle": "angle between the motor axis and the axis about wh
 
 def dataset_of(
     prediction: Prediction,
-    links: TwoLinks,
+    links: Acting,
     run: Trajectory,
     on: Sequence[Stretch],
-    reach: Reach,
-    title: str,
-    warnings: tuple[str, ...],
+    more: Mapping[str, Samples],
+    attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """The run of a free robot.
 
     Args:
         prediction: the robot with model, friction and calibration.
-        links: its two links.
+        links: what acts on its two links.
         run: its motion.
         on: times at constant duty in which its drive is on; their ends are among the run's samples.
-        reach: its channel.
-        title: title of the dataset.
-        warnings: what to be careful about, a sentence each.
+        more: further quantities at the samples by name, each (n,).
+        attrs: attributes of the run, see `free_attributes`.
     """
     import xarray as xr
 
@@ -60,17 +58,15 @@ def dataset_of(
         series |= _electrics(prediction, run)
     if prediction.batch.drive == "magnetic":
         series |= _magnetics(links, run, rotation)
-    if np.isfinite(links.wall[kernel.RADIUS]):
-        gap = run.observed[:, kernel.FILM] + links.wall[kernel.ROUGHNESS]
-        series["wall_gap"] = gap
-    stored = _potential(links, run, rotation) + run.observed[:, kernel.PRESSED]
+    series |= more
+    stored = _potential(links, run, rotation) + run.observed[:, rigid_links.PRESSED]
     series["potential_energy"] = stored
-    attitude = run.states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4]
+    attitude = run.states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
     attitude = attitude / np.linalg.norm(attitude, axis=1, keepdims=True)
-    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, : kernel.ROTATION])
-    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, kernel.ROTATION : kernel.JOINT])
+    velocity = np.einsum("nij,nj->ni", rotation, run.observed[:, : rigid_links.ROTATION])
+    spin = np.einsum("nij,nj->ni", rotation, run.observed[:, rigid_links.ROTATION : rigid_links.JOINT])
     vectors = {
-        "position": ("axis", run.states[:, : kernel.ATTITUDE]),
+        "position": ("axis", run.states[:, : rigid_links.ATTITUDE]),
         "velocity": ("axis", velocity),
         "angular_velocity": ("axis", spin),
         "attitude": ("quaternion", attitude),
@@ -89,14 +85,24 @@ def dataset_of(
             "axis": ("axis", list(_AXES), {"long_name": "axis of the lab"}),
             "quaternion": ("quaternion", list(_QUATERNION), {"long_name": "part of the quaternion"}),
         },
-        attrs=_attributes(prediction, run, reach, title, warnings),
+        attrs=dict(attrs),
     )
     return dataset.assign(_averages(dataset, on))
 
 
-def _attributes(
-    prediction: Prediction, run: Trajectory, reach: Reach, title: str, warnings: tuple[str, ...]
+def free_attributes(
+    prediction: Prediction, run: Trajectory, reach: Reach, title: str, integrator: str, warnings: Sequence[str]
 ) -> dict[str, Any]:
+    """Attributes of a free robot's run.
+
+    Args:
+        prediction: the robot with model, friction and calibration.
+        run: its motion.
+        reach: its channel.
+        title: title of the dataset.
+        integrator: how it was integrated, in words.
+        warnings: what to be careful about, a sentence each.
+    """
     return {
         "title": title,
         **run_attributes(prediction),
@@ -104,7 +110,7 @@ def _attributes(
         "steady": STEADY,
         "channel_middle": reach.middle,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in run.events]),
-        "integrator": INTEGRATOR,
+        "integrator": integrator,
         "warnings": "\n".join(warnings),
     }
 
@@ -113,20 +119,20 @@ def _rotations(states: Samples) -> Samples:
     """Rotation matrices, body axes to lab, (n, 3, 3)."""
     from scipy.spatial.transform import Rotation
 
-    attitude = states[:, kernel.ATTITUDE : kernel.ATTITUDE + 4]
+    attitude = states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
     return np.asarray(Rotation.from_quat(attitude, scalar_first=True).as_matrix())
 
 
 def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
     axis = rotation[:, :, 0]
-    roll, phase = states[:, kernel.ROLL], states[:, kernel.PHASE]
-    body_rate, motor_rate = rates[:, kernel.ROTATION], rates[:, kernel.JOINT]
+    roll, phase = states[:, rigid_links.ROLL], states[:, rigid_links.PHASE]
+    body_rate, motor_rate = rates[:, rigid_links.ROTATION], rates[:, rigid_links.JOINT]
     return {
         "tail_phase": phase,
         "tail_angle": roll + phase - phase[0],
         "body_angle": roll,
-        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : kernel.ROTATION], axis=1),
+        "forward_velocity": np.sum(rotation[:, 0, :] * rates[:, : rigid_links.ROTATION], axis=1),
         "tail_rotation_rate": body_rate + motor_rate,
         "body_rotation_rate": body_rate,
         "motor_rotation_rate": motor_rate,
@@ -136,34 +142,34 @@ def _motion(run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     }
 
 
-def _powers(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
+def _powers(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     rates, states = run.observed, run.states
-    drive, motor_rate = rates[:, kernel.DRIVE_TORQUE], rates[:, kernel.JOINT]
-    if links.drive[kernel.FIXED]:  # one piece, driven from outside
+    drive, motor_rate = rates[:, rigid_links.DRIVE_TORQUE], rates[:, rigid_links.JOINT]
+    if links.drive[rigid_links.FIXED]:  # one piece, driven from outside
         torque = drive + _field_torque(links, run, rotation)
-        shaft = rates[:, kernel.DRIVE_POWER]
+        shaft = rates[:, rigid_links.DRIVE_POWER]
     else:  # what is left of the motor's torque after friction in the joint
-        against_body, against_motor = links.friction[kernel.JOINT, [kernel.ROTATION, kernel.JOINT]]
-        torque = drive - against_body * rates[:, kernel.ROTATION] - against_motor * motor_rate
+        against_body, against_motor = links.friction[rigid_links.JOINT, [rigid_links.ROTATION, rigid_links.JOINT]]
+        torque = drive - against_body * rates[:, rigid_links.ROTATION] - against_motor * motor_rate
         shaft = torque * motor_rate
     return {
         "drive_torque": torque,
-        "drive_power": rates[:, kernel.DRIVE_POWER],
+        "drive_power": rates[:, rigid_links.DRIVE_POWER],
         "shaft_power": shaft,
-        "friction_power": rates[:, kernel.FRICTION_POWER],
-        "dissipated_power": rates[:, kernel.DISSIPATED_POWER],
-        "drive_energy": states[:, kernel.DRIVEN],
-        "friction_energy": states[:, kernel.FRICTION],
-        "dissipated_energy": states[:, kernel.DISSIPATED],
+        "friction_power": rates[:, rigid_links.FRICTION_POWER],
+        "dissipated_power": rates[:, rigid_links.DISSIPATED_POWER],
+        "drive_energy": states[:, rigid_links.DRIVEN],
+        "friction_energy": states[:, rigid_links.FRICTION],
+        "dissipated_energy": states[:, rigid_links.DISSIPATED],
     }
 
 
-def _field_torque(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
+def _field_torque(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
-    moment, angle = rotation @ links.drive[_MOMENT], links.drive[kernel.FIELD_RATE] * run.time
-    if links.drive[kernel.KIND] != kernel.MAGNETIC:
+    moment, angle = rotation @ links.drive[_MOMENT], links.drive[rigid_links.FIELD_RATE] * run.time
+    if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
         return np.zeros_like(angle)
-    field = links.drive[kernel.FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    field = links.drive[rigid_links.FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
 
 
@@ -172,25 +178,25 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
     assert motor is not None  # noqa: S101 - a dc-motor has one
     sign, inductance = float(motor.polarity[0]), float(motor.inductance[0])
     states = run.states
-    current = states[:, kernel.CURRENT]
+    current = states[:, rigid_links.CURRENT]
     voltage = battery_voltage(motor, current)
     return {
-        "motor_torque": run.observed[:, kernel.DRIVE_TORQUE],
+        "motor_torque": run.observed[:, rigid_links.DRIVE_TORQUE],
         "motor_current": sign * current,
         "motor_resistance": winding_resistance(motor, current),
         "battery_voltage": voltage,
         "electrical_power": run.duty * voltage * current,
-        "electrical_energy": states[:, kernel.ELECTRICAL],
-        "resistive_energy": states[:, kernel.RESISTIVE],
+        "electrical_energy": states[:, rigid_links.ELECTRICAL],
+        "resistive_energy": states[:, rigid_links.RESISTIVE],
         "magnetic_energy": 0.5 * inductance * current**2,
-        "conversion_energy": states[:, kernel.CONVERSION],
-        "battery_charge_used": states[:, kernel.CHARGE],
+        "conversion_energy": states[:, rigid_links.CONVERSION],
+        "battery_charge_used": states[:, rigid_links.CHARGE],
     }
 
 
-def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
+def _magnetics(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     """Where the moment and the robot's axis point against the field."""
-    moment, rate = rotation @ links.drive[_MOMENT], links.drive[kernel.FIELD_RATE]
+    moment, rate = rotation @ links.drive[_MOMENT], links.drive[rigid_links.FIELD_RATE]
     field = 0.5 * np.pi + rate * run.time
     behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
@@ -201,15 +207,15 @@ def _magnetics(links: TwoLinks, run: Trajectory, rotation: Samples) -> dict[str,
     }
 
 
-def _potential(links: TwoLinks, run: Trajectory, rotation: Samples) -> Samples:
+def _potential(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
     """Energy of weight less buoyancy above the state at y = z = 0 and level, J."""
-    weight, phase = links.weight, run.states[:, kernel.PHASE]
+    weight, phase = links.weight, run.states[:, rigid_links.PHASE]
     cos, sin = np.cos(phase), np.sin(phase)
-    x, y, z = weight[kernel.MOMENT_ROTOR :]
+    x, y, z = weight[rigid_links.MOMENT_ROTOR :]
     rotor = np.stack([np.full_like(phase, x), cos * y - sin * z, sin * y + cos * z], axis=-1)
-    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[kernel.MOMENT_BODY : kernel.MOMENT_ROTOR] + rotor)
-    heavy = weight[kernel.WEIGHT_BODY] + weight[kernel.WEIGHT_ROTOR]
-    return np.asarray(heavy * run.states[:, kernel.POSITION + 2] + lift)
+    lift = np.einsum("nj,nj->n", rotation[:, 2, :], weight[rigid_links.MOMENT_BODY : rigid_links.MOMENT_ROTOR] + rotor)
+    heavy = weight[rigid_links.WEIGHT_BODY] + weight[rigid_links.WEIGHT_ROTOR]
+    return np.asarray(heavy * run.states[:, rigid_links.POSITION + 2] + lift)
 
 
 def _averages(dataset: xr.Dataset, on: Sequence[Stretch]) -> dict[str, tuple[Any, ...]]:

@@ -12,8 +12,8 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
 from spirillum.dynamics.fitted_runs import DRAWS, chosen_model, with_intervals
 from spirillum.dynamics.held import held_run
-from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, integrate
-from spirillum.dynamics.record import dataset_of
+from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
+from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.start import reach_of, start_state
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.two_links import TwoLinks, two_links
@@ -21,6 +21,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
@@ -138,7 +139,7 @@ def _free_run(
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     end, time, switches = times.timetable(2.0 * np.pi / _turning(steady), own)
     links = _links(steady, roughness, weight=weight)
-    start = start_state(steady.robot, placed, lying=float(links.weight[: kernel.MOMENT_BODY].sum()) > 0)
+    start = start_state(steady.robot, placed, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     _check_clear(links, start, placed)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
@@ -149,7 +150,11 @@ def _free_run(
     said = [*steady.warnings, *_first_form(steady, links, weight=weight)]
     if all(switch.duty == 0 for switch in switches):
         said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
-    dataset = dataset_of(steady, links, run, on, reach, title, tuple(said))
+    more = {}
+    if np.isfinite(links.wall[kernel.RADIUS]):
+        more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
+    attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
+    dataset = dataset_of(steady, links, run, on, more, attrs)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach
 from spirillum.errors import InputError
-from spirillum.kernels.two_links import ATTITUDE, POSITION, STATES
+from spirillum.kernels.rigid_links import ATTITUDE, POSITION, STATES
 from spirillum.robot.links import outlines_of
 from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement

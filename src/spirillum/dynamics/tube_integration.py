@@ -1,0 +1,293 @@
+"""Integration of a robot's motion in its tube, with what happens on the way.
+
+The gap, dry friction and the motor's current are stiff: `spirillum.kernels.tube_steps` takes linearly implicit steps.
+Samples and events lie inside them on the method's continuous output, so that a step is as long as the motion allows.
+A run keeps the beginning of its last step: continued from there, it is the longer run to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Reach, Trajectory
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.kernels import rigid_links, tube_motion, tube_steps
+
+__all__ = ["INTEGRATOR", "TOLERANCE", "Checkpoint", "TubeTrajectory", "integrate_in_tube", "observed_at"]
+
+TOLERANCE = 1e-8
+"""Error of a step over the sizes of the state's components."""
+INTEGRATOR = f"Rodas5P, tolerance {TOLERANCE:g}"
+_STEPS = 64  # between two signs of life
+_FIRST = 1e-4  # first step over the time of a turn
+_END, _INTERRUPTED = "end of the channel", "interrupted"
+
+Progress = Callable[[str, int, int], None]
+
+
+class Checkpoint(NamedTuple):
+    """Where a run can be continued exactly."""
+
+    time: float
+    """Beginning of its last step, s."""
+    step: float
+    """Length of that step, s."""
+    state: tuple[float, ...]
+    """The state there, (19,)."""
+
+
+@dataclass(frozen=True)
+class TubeTrajectory(Trajectory):
+    """A run in a tube at its samples; SI. States and what is observed: see `spirillum.kernels.tube_motion`."""
+
+    last: Checkpoint
+    """From where it can be continued."""
+
+
+@dataclass
+class _Run:
+    """A run while it is computed."""
+
+    robot: TubeRobot
+    reach: Reach
+    state: Samples
+    memory: Samples
+    gaps: Samples
+    before: Samples
+    increments: Samples = field(default_factory=lambda: np.zeros((8, tube_motion.STATES)))
+
+    @property
+    def time(self) -> float:
+        return float(self.memory[tube_steps.TIME])
+
+
+def integrate_in_tube(
+    robot: TubeRobot,
+    start: Samples | Checkpoint,
+    time: Samples,
+    switches: Sequence[Switch],
+    reach: Reach,
+    progress: Progress | None = None,
+) -> TubeTrajectory:
+    """Integrate a robot's motion in its tube.
+
+    The run ends early where nose or tail reach the end of the tube, where a range of the table is left, or when it is
+    interrupted; a spent battery drives no longer.
+
+    Args:
+        robot: the robot.
+        start: state at the first sample, (19,), or the checkpoint of a run that ended there.
+        time: increasing sample times, s.
+        switches: every switching, the first not after the first sample.
+        reach: what ends the run, or its drive.
+        progress: told what is being computed, how much is done, and of how much.
+    """
+    end = float(time[-1])
+    going_on = isinstance(start, Checkpoint)
+    state = np.array(start.state if isinstance(start, Checkpoint) else start, dtype=float)
+    memory = np.zeros(tube_steps.MEMORY)
+    memory[tube_steps.TIME] = start.time if isinstance(start, Checkpoint) else time[0]
+    memory[tube_steps.STEP] = start.step if isinstance(start, Checkpoint) else _FIRST * robot.turn
+    memory[tube_steps.LAST_TIME], memory[tube_steps.LAST_STEP] = memory[tube_steps.TIME], memory[tube_steps.STEP]
+    run = _Run(robot, reach, state, memory, np.ones(len(robot.names) + tube_steps.WATCHED), state.copy())
+    pieces: list[tuple[Samples, Samples, float]] = []
+    events: list[Event] = []
+    spent = False
+    if not going_on:
+        pieces.append((time[:1], state[None].copy(), _duty(switches, float(time[0]))))
+    after = time[1:] if not going_on else time[time > time[0]]
+    stops = sorted({s.time for s in switches} | {float(t) for t in robot.flow[:, 0]})
+    while run.time < end:
+        duty = 0.0 if spent else _duty(switches, run.time)
+        stop = min((t for t in stops if t > run.time), default=np.inf)
+        inside = after[(after > run.time) & (after <= stop)] if not going_on else after[after <= stop]
+        going_on = False
+        stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=progress)
+        events += stretch.events
+        pieces.append((stretch.times, stretch.states, duty))
+        if stretch.what == BATTERY_EMPTY:
+            spent = True
+        elif stretch.what:
+            break
+    return _joined(robot, pieces, events, switches, run)
+
+
+def observed_at(robot: TubeRobot, state: Samples, time: float = 0.0) -> Samples:
+    """What `spirillum.kernels.tube_motion` observes in one state, (26,)."""
+    out = np.empty((1, tube_motion.OBSERVED))
+    tube_motion.observe(np.array([time]), state[None], robot.data, robot.table, out)
+    return out[0]
+
+
+def _duty(switches: Sequence[Switch], time: float) -> float:
+    return [switch for switch in switches if switch.time <= time][-1].duty
+
+
+class _Stretch(NamedTuple):
+    """A run between two switchings."""
+
+    times: Samples
+    states: Samples
+    events: list[Event]
+    what: str
+    """What ended it early, or nothing."""
+
+
+def _stretch(
+    run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Progress | None
+) -> _Stretch:
+    robot = run.robot.at_duty(duty)
+    data, limits = robot.data, _limits(robot, run.reach, spent=spent)
+    tube_steps.watched(run.state, 0.0, data, limits, robot.roughness, run.gaps)
+    states = np.empty((inside.size, tube_motion.STATES))
+    sizes, done = _sizes(robot), 0
+    events: list[Event] = []
+    clip = stop <= end
+    target, what = min(stop, end), ""
+    try:
+        while True:
+            watched = run.gaps.copy()
+            status, answered = tube_steps.advance(
+                target, clip, _STEPS, TOLERANCE, run.memory, run.state, run.before, run.increments, run.gaps,
+                inside[done:], states[done:], sizes, limits, robot.roughness, data, robot.table,
+            )  # fmt: skip
+            done += answered
+            if tell is not None:
+                tell("motion", int(1000 * min(run.time, end) / end), 1000)
+            if status == tube_steps.CROSSED:
+                what = _crossed(run, robot, data, limits, watched, min(end, target), events)
+                if what:
+                    done = int(np.count_nonzero(inside[:done] <= run.time))
+                    break
+            elif status == tube_steps.STUCK:
+                what = f"no step is small enough: the motion cannot be followed beyond t = {run.time:.6g} s"
+                events.append(Event(run.time, what))
+                break
+            elif status == tube_steps.DONE:
+                break
+    except KeyboardInterrupt:
+        what = _INTERRUPTED
+        events.append(Event(run.time, what))
+    times, states = inside[:done], states[:done]
+    if what and what != BATTERY_EMPTY and not (times.size and times[-1] == run.time):
+        times, states = np.append(times, run.time), np.concatenate([states, run.state[None]])
+    return _Stretch(times, states, events, what)
+
+
+def _crossed(
+    run: _Run, robot: TubeRobot, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
+) -> str:
+    """Note what happened in the last step; what ends the stretch, with the state where it does, or nothing."""
+    begin, length = float(run.memory[tube_steps.LAST_TIME]), 0.0
+    length = run.time - begin
+    new, inner, gaps = run.state.copy(), np.empty(tube_motion.STATES), np.empty_like(run.gaps)
+    dy = np.empty(tube_motion.STATES)
+
+    def at(share: float, place: int) -> float:
+        tube_steps.interpolate(share, run.before, new, run.increments, inner)
+        outside = 0.0
+        if place == gaps.size - tube_steps.WATCHED + tube_steps.INSIDE:
+            tube_motion.rates(dy, begin + share * length, inner, data, robot.table)
+            outside = float(data[tube_motion.OUTSIDE])
+        tube_steps.watched(inner, outside, data, limits, robot.roughness, gaps)
+        return float(gaps[place])
+
+    found: list[tuple[float, int]] = []
+    for place in np.flatnonzero((watched > 0) != (run.gaps > 0)):
+        low, high = 0.0, 1.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if (at(middle, int(place)) > 0) == (watched[place] > 0) else (low, middle)
+        found.append((high, int(place)))
+    sites = len(robot.names)
+    for share, place in sorted(found):
+        moment = begin + share * length
+        if moment > end:
+            break
+        if place < sites:
+            done = "touches" if watched[place] > 0 else "leaves"
+            events.append(Event(moment, f"{robot.names[place]} {done} the wall"))
+            continue
+        at(share, place)
+        if place == sites + tube_steps.CHARGE_LEFT:
+            what = BATTERY_EMPTY
+        elif place == sites + tube_steps.ROOM:
+            what = _END
+        else:
+            what = _left(robot, inner, moment, data)
+        run.state[:] = inner
+        run.memory[tube_steps.TIME] = moment
+        run.memory[tube_steps.STEP] = run.memory[tube_steps.LAST_STEP]
+        events.append(Event(moment, what))
+        return what
+    return ""
+
+
+_RANGES = {1: "offset", 2: "pitch", 3: "yaw"}
+"""What `resistance_at` says was left."""
+
+
+def _left(robot: TubeRobot, state: Samples, time: float, data: Samples) -> str:
+    """A sentence on the range of the table that was left."""
+    tube_motion.rates(np.empty(tube_motion.STATES), time, state, data, robot.table)
+    name = _RANGES.get(int(data[tube_motion.OUTSIDE]), "place")
+    offset, pitch, yaw = (data[place] for place in (tube_motion.OFFSET, tube_motion.WALL_PITCH, tube_motion.WALL_YAW))
+    return (
+        f"the range of the robot's table in {name} is left, at an offset of {1e3 * offset:.4g} mm, a pitch of "
+        f"{np.degrees(pitch):.3g} deg and a yaw of {np.degrees(yaw):.3g} deg against the wall"
+    )
+
+
+def _limits(robot: TubeRobot, reach: Reach, *, spent: bool) -> Samples:
+    found = np.empty(tube_steps.LIMITS)
+    found[tube_steps.CHANNEL], found[tube_steps.MIDDLE] = reach.channel, reach.middle
+    found[tube_steps.NOSE], found[tube_steps.TIP] = reach.nose, reach.tip
+    motor = robot.drive[rigid_links.KIND] == rigid_links.MOTOR
+    found[tube_steps.MOST_CHARGE] = reach.charge if motor and not spent else np.inf
+    return found
+
+
+def _sizes(robot: TubeRobot) -> Samples:
+    """Sizes of the state's components below which nothing matters; a small change of time; the time of a turn."""
+    drive, length, torque = robot.drive, robot.length, robot.torque
+    resistance = drive[rigid_links.CONSTANT]
+    current = drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
+    electrical = max(drive[rigid_links.VOLTAGE] * current, torque)
+    found = np.ones(tube_motion.STATES + 2)
+    found[rigid_links.POSITION : rigid_links.POSITION + 3] = length
+    found[rigid_links.CURRENT] = found[rigid_links.CHARGE] = current
+    found[rigid_links.ELECTRICAL : rigid_links.CHARGE] = electrical
+    found[rigid_links.DRIVEN : tube_motion.STATES] = torque
+    changing = drive[rigid_links.KIND] == rigid_links.MAGNETIC or len(robot.flow) > 1
+    found[-2], found[-1] = 1e-6 * robot.turn if changing else 0.0, robot.turn
+    return found
+
+
+def _joined(
+    robot: TubeRobot,
+    pieces: Sequence[tuple[Samples, Samples, float]],
+    events: list[Event],
+    switches: Sequence[Switch],
+    run: _Run,
+) -> TubeTrajectory:
+    times = np.concatenate([piece[0] for piece in pieces])
+    states = np.concatenate([piece[1] for piece in pieces])
+    duties = np.concatenate([np.full(piece[0].size, piece[2]) for piece in pieces])
+    observed = np.empty((times.size, tube_motion.OBSERVED))
+    first = 0
+    for time, inside, duty in pieces:
+        here = robot.at_duty(duty)
+        tube_motion.observe(time, np.ascontiguousarray(inside), here.data, robot.table, observed[first:])
+        first += time.size
+    switched = [Event(s.time, f"duty {s.duty:g}") for s in switches if times[0] <= s.time <= times[-1]]
+    happened = tuple(sorted([*switched, *events], key=lambda event: event.time))
+    last = Checkpoint(
+        float(run.memory[tube_steps.LAST_TIME]), float(run.memory[tube_steps.LAST_STEP]), tuple(run.before.tolist())
+    )
+    return TubeTrajectory(times, duties, states, observed, happened, last)

@@ -1,0 +1,182 @@
+"""A robot in its tube: table, walls, contacts, ends and flow, ready for the compiled equations.
+
+Sites at which body and coupling can touch the wall are the rings at the ends of their straight sides, with the ball of
+a hemisphere or fillet; a spheroid has one. The wire can touch at any of its crests and at its tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.acting import Acting, drive_of, friction_of, torque_scale, weight_of
+from spirillum.dynamics.films import ROUGHNESS_SHARE
+from spirillum.errors import InputError
+from spirillum.kernels import contacts, rigid_links
+from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.robot import Robot
+from spirillum.swimming.prediction import Prediction
+
+__all__ = ["FRICTION_COEFFICIENT", "Surroundings", "TubeRobot", "tube_robot"]
+
+FRICTION_COEFFICIENT = 0.1
+"""Coefficient of dry friction mu_c where none is given. Assumed: with a lubricant between asperities it is 0.05 to 0.15
+(F. P. Bowden, D. Tabor, The Friction and Lubrication of Solids, Oxford, 1950); a range to try is 0 to 0.3."""
+_SLIDING_SHARE = 1e-4
+"""Sliding speed below which dry friction is made smooth, over that of a body turning as fast as the tail."""
+_STATIONS_PER_TURN = 24
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What surrounds a robot in its tube."""
+
+    ends: float = kernel.CLOSED
+    """`kernel.CLOSED`, `kernel.OPEN` or `kernel.IMPOSED`."""
+    length: float = np.inf
+    """L_eff of open ends, m."""
+    flow: Samples = field(default_factory=lambda: np.zeros((1, 2)))
+    """Imposed mean flow: times, s, and velocities, m/s, (k, 2); straight between them, constant beyond."""
+    roughness: float | None = None
+    """Height of the asperities, m; None: `ROUGHNESS_SHARE` of the body's radius."""
+    coefficient: float = FRICTION_COEFFICIENT
+    """Coefficient of dry friction, 1."""
+
+
+@dataclass(frozen=True)
+class TubeRobot(Acting):
+    """What `spirillum.kernels.tube_motion` needs, SI, about the origin in body axes."""
+
+    table: Samples
+    """The robot's table, see `spirillum.kernels.tube_table`."""
+    tube: Samples
+    """The tube (8,), see `kernels.tube_motion`."""
+    wire: Samples
+    """The wire (6,), see `kernels.contacts`."""
+    sites: Samples
+    """Sites of body and coupling that can touch (n, 5), see `kernels.contacts`."""
+    stations: Samples
+    """Stations along the wire (m, 4), see `kernels.contacts`."""
+    flow: Samples
+    """Imposed mean flow (k, 2)."""
+    names: tuple[str, ...]
+    """Names of the sites, and of the tail."""
+    length: float
+    """A length of the robot's order, m."""
+    torque: float
+    """A torque of the order of those that act, N m."""
+    turn: float
+    """Time of a turn of the tail at its steady rate, s."""
+
+    @property
+    def data(self) -> Samples:
+        """All but the table in one array, for the compiled equations."""
+        return kernel.packed(
+            self.friction, self.weight, self.drive, self.tube, self.wire, self.sites, self.stations, self.flow
+        )
+
+    @property
+    def roughness(self) -> float:
+        """Height of the asperities, m."""
+        return float(self.tube[kernel.ROUGHNESS])
+
+    def gaps(self, state: Samples) -> Samples:
+        """Gap at every site, and last the smallest of the wire (infinite far from the wall), m, for a state (19,)."""
+        found = np.empty(len(self.names))
+        kernel.gaps_of(state, self.data, found)
+        return found
+
+
+def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn: float, weight: bool) -> TubeRobot:
+    """Everything that a robot's rates in its tube follow from.
+
+    Args:
+        steady: the robot with friction and drive.
+        table: the robot's table.
+        around: tube ends, flow, roughness and dry friction.
+        turn: time of a turn of the tail at its steady rate, s.
+        weight: with weight and buoyancy, if the robot's masses are known.
+
+    Raises:
+        InputError: for a robot without a channel.
+    """
+    robot, effective = steady.robot, steady.effective_friction
+    if robot.channel is None:
+        raise InputError("the robot has no channel; allowed: a robot with a [channel]")
+    heavy, drive = weight_of(robot) if weight else np.zeros(rigid_links.WEIGHT), drive_of(steady.batch)
+    a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
+    drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
+    torque = torque_scale(drag, heavy, drive)
+    load = float(heavy[: rigid_links.MOMENT_BODY].sum())
+    tube = np.zeros(kernel.TUBE - 2)
+    tube[kernel.RADIUS] = 0.5 * robot.channel.diameter
+    tube[kernel.ROUGHNESS] = ROUGHNESS_SHARE * a if around.roughness is None else around.roughness
+    tube[kernel.LOAD] = abs(load) if load != 0 else torque / half
+    tube[kernel.COEFFICIENT], tube[kernel.SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
+    tube[kernel.VISCOSITY] = robot.fluid.viscosity
+    tube[kernel.ENDS], tube[kernel.LENGTH] = around.ends, around.length
+    names, sites = _sites(robot)
+    wire = _wire(robot)
+    return TubeRobot(
+        friction=friction_of(steady.batch, steady.friction, 0.0 if np.isnan(effective) else effective),
+        weight=heavy,
+        drive=drive,
+        table=np.ascontiguousarray(table),
+        tube=tube,
+        wire=wire,
+        sites=sites,
+        stations=_stations(robot, wire),
+        flow=np.ascontiguousarray(around.flow, dtype=float),
+        names=(*names, "tail"),
+        length=half,
+        torque=torque,
+        turn=turn,
+    )
+
+
+def _sites(robot: Robot) -> tuple[list[str], Samples]:
+    """Names and rows of the sites."""
+    body, coupling = robot.body, robot.coupling
+    a, half = 0.5 * body.diameter, 0.5 * body.length
+    rows: list[Sequence[float]] = []
+    names = []
+    if body.shape in ("sphere", "spheroid"):
+        names, rows = ["body"], [(0.0, a, half, 0.0, 0.0)]
+    else:
+        balls = {"hemisphere": a, "fillet": body.fillet or 0.0}
+        for name, end, sign in (("body front", body.front_end, 1.0), ("body rear", body.rear_end, -1.0)):
+            ball = balls.get(end or "", 0.0)
+            names.append(name)
+            rows.append((sign * (half - ball), a - ball, 0.0, ball, 0.0))
+    solid = coupling.length - 2.0 * coupling.clearance
+    if coupling.length > 0 and solid > 0:
+        front = -half - coupling.clearance
+        names += ["coupling front", "coupling rear"]
+        rows += [
+            (front, 0.5 * coupling.diameter, 0.0, 0.0, 1.0),
+            (front - solid, 0.5 * coupling.diameter, 0.0, 0.0, 1.0),
+        ]
+    return names, np.array(rows)
+
+
+def _wire(robot: Robot) -> Samples:
+    tail = robot.tail
+    found = np.zeros(contacts.WIRE)
+    found[contacts.WIRE_RADIUS], found[contacts.AMPLITUDE] = 0.5 * tail.wire_diameter, tail.amplitude
+    found[contacts.TAPER] = 0.0 if tail.taper is None else tail.taper / tail.length
+    found[contacts.HAND_K] = robot.hand * 2.0 * np.pi / tail.wavelength
+    found[contacts.ROOT], found[contacts.LENGTH] = -0.5 * robot.body.length - robot.coupling.length, tail.length
+    return found
+
+
+def _stations(robot: Robot, wire: Samples) -> Samples:
+    tail = robot.tail
+    xi = np.linspace(0.0, tail.length, 1 + int(np.ceil(_STATIONS_PER_TURN * tail.length / tail.wavelength)))
+    taper = wire[contacts.TAPER]
+    r = wire[contacts.AMPLITUDE] * (1.0 - np.exp(-taper * xi) if taper > 0 else np.ones_like(xi))
+    x = wire[contacts.ROOT] - xi
+    angle = wire[contacts.HAND_K] * x
+    return np.ascontiguousarray(np.stack([xi, x, r * np.cos(angle), r * np.sin(angle)], axis=1))

@@ -1,0 +1,175 @@
+"""Swimming in a tube in time: from where a robot is laid down, with walls, film, contact, ends and flow."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.averages import stretches_on
+from spirillum.dynamics.integration import BATTERY_EMPTY, Event
+from spirillum.dynamics.record import dataset_of, free_attributes
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.timing import Timetable
+from spirillum.dynamics.tube_integration import (
+    INTEGRATOR,
+    Checkpoint,
+    Progress,
+    TubeTrajectory,
+    integrate_in_tube,
+    observed_at,
+)
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.dynamics.tube_start import Start, check_in_table, laid_down
+from spirillum.errors import InputError
+from spirillum.kernels import rigid_links
+from spirillum.kernels import tube_motion as kernel
+from spirillum.swimming.prediction import Prediction
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["tube_run"]
+
+
+def tube_run(
+    steady: Prediction,
+    robot: TubeRobot,
+    start: Start | xr.Dataset,
+    times: Timetable,
+    *,
+    wait: float = 0.0,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The run of a robot in its tube.
+
+    Time 0 is when the remote may first switch the drive on. A robot that waits before, with its drive off, does so at
+    negative times, which the run does not hold: path, energies and angles count from time 0, and what happened while
+    it waited is among the events. A flow over time has the value of its first row until then.
+
+    Args:
+        steady: the robot with friction and drive.
+        robot: what its rates in the tube follow from.
+        start: where it is laid down; or a run of the same timetable that ended early, which is continued after its
+            last sample, as if it had not ended.
+        times: length, samples and switching of the whole run.
+        wait: how long it waits with its drive off, s.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Returns:
+        Dataset over `time`, as of a free run, with `offset`, `azimuth` (unwrapped), `wall_pitch`, `wall_yaw`,
+        `wall_gap` (of the body), `tail_gap`, contact forces and energy, mean flow and its work. The attribute
+        `checkpoint` is what it can be continued from.
+
+    Raises:
+        InputError: for a start at which something cuts into the wall, outside the table, or a run that cannot be
+            continued.
+    """
+    reach, before = reach_of(steady.robot), ()
+    moments = np.union1d(times.time, [switch.time for switch in times.switches])
+    first: Samples | Checkpoint
+    if isinstance(start, Start):
+        laid = laid_down(steady.robot, robot, start)
+        check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
+        first, before = _waited(robot, laid, wait, reach, progress)
+    else:
+        first = _checkpoint(start)
+        moments = np.append(float(start["time"][-1]), moments[moments > float(start["time"][-1])])
+        if moments.size < 2:
+            raise InputError(
+                f"the run already ends at t = {moments[0]:.6g} s; allowed: a longer duration, to continue it"
+            )
+    run = integrate_in_tube(robot, first, moments, times.switches, reach, progress)
+    driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
+    on = stretches_on(times.switches, driven)
+    ended = float(run.time[-1])
+    said = [*steady.warnings]
+    if ended < times.end:
+        said.append(f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}")
+    if all(switch.duty == 0 for switch in times.switches):
+        said.append(f"the remote switches nothing on before the run ends at {times.end:.4g} s")
+    title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
+    attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
+    attrs |= _assumptions(robot, wait, (*before, *run.events))
+    attrs["checkpoint"] = json.dumps(run.last._asdict())
+    dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
+    if not isinstance(start, Start):  # angles go on counting
+        last = start.isel(time=-1)
+        begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
+        dataset["tail_angle"].values[:] = dataset["body_angle"].values + dataset["tail_phase"].values - begun
+    return dataset.isel(time=np.isin(run.time, times.time) | (run.time == ended))
+
+
+def _waited(
+    robot: TubeRobot, state: Samples, wait: float, reach: Any, progress: Progress | None
+) -> tuple[Samples, tuple[Event, ...]]:
+    """The state after waiting with the drive off, and what happened meanwhile, at negative times."""
+    if wait <= 0.0:
+        return state, ()
+    run = integrate_in_tube(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
+    if run.time[-1] < 0.0:
+        raise InputError(
+            f"wait = {wait:g} s: {run.events[-1].what} after {wait + run.time[-1]:.4g} s; allowed: a shorter time"
+        )
+    found = run.states[-1].copy()
+    found[rigid_links.ROLL] = 0.0
+    found[rigid_links.CURRENT : kernel.STATES] = 0.0
+    return found, tuple(event for event in run.events if not event.what.startswith("duty"))
+
+
+def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
+    """Where a run can be continued.
+
+    Raises:
+        InputError: if it holds no checkpoint.
+    """
+    text = dataset.attrs.get("checkpoint")
+    try:
+        found = Checkpoint(**json.loads(text))
+        state = tuple(float(value) for value in found.state)
+    except (TypeError, ValueError) as error:
+        raise InputError("the run has no checkpoint; allowed: a run in a tube by `spirillum simulate`") from error
+    if len(state) != kernel.STATES:
+        raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {kernel.STATES}")
+    return Checkpoint(float(found.time), float(found.step), state)
+
+
+def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Mapping[str, Any]:
+    ends = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed flow"}
+    ordered = sorted(events, key=lambda event: event.time)
+    return {
+        "roughness": robot.roughness,
+        "friction_coefficient": float(robot.tube[kernel.COEFFICIENT]),
+        "sliding_speed": float(robot.tube[kernel.SLIDING]),
+        "ends": ends[float(robot.tube[kernel.ENDS])],
+        "wait": wait,
+        "events": json.dumps([{"time": event.time, "what": event.what} for event in ordered]),
+    }
+
+
+def _in_the_tube(run: TubeTrajectory, start: Start | xr.Dataset) -> dict[str, Samples]:
+    """What a run in a tube has beside that of any free run."""
+    seen, states = run.observed, run.states
+    azimuth = np.unwrap(seen[:, kernel.AZIMUTH])
+    if not isinstance(start, Start):
+        turns = np.round((float(start["azimuth"][-1]) - azimuth[0]) / (2.0 * np.pi))
+        azimuth = azimuth + 2.0 * np.pi * turns
+    tail = seen[:, kernel.TAIL_GAP]
+    return {
+        "offset": seen[:, kernel.OFFSET],
+        "azimuth": azimuth,
+        "wall_pitch": seen[:, kernel.WALL_PITCH],
+        "wall_yaw": seen[:, kernel.WALL_YAW],
+        "wall_gap": seen[:, rigid_links.FILM],
+        "tail_gap": np.where(np.isfinite(tail), tail, np.nan),
+        "contact_force": seen[:, kernel.CONTACT_FORCE],
+        "contact_friction": seen[:, kernel.CONTACT_FRICTION],
+        "contact_power": seen[:, kernel.CONTACT_POWER],
+        "contact_energy": states[:, kernel.CONTACT],
+        "mean_flow": seen[:, kernel.MEAN_FLOW],
+        "flow_energy": states[:, kernel.FLOW],
+    }

@@ -1,0 +1,107 @@
+"""Where a robot is laid down in its tube."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.errors import InputError
+from spirillum.kernels import rigid_links
+from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.robot import Robot
+from spirillum.robot.seat import GAP_SHARE
+from spirillum.units import show
+
+__all__ = ["Start", "laid_down"]
+
+
+@dataclass(frozen=True)
+class Start:
+    """A place in the tube; SI, angles in rad."""
+
+    gap: float | None = None
+    """Smallest distance of the body to the wall; None: that of the eccentricity, or 1/18 of the body's radius."""
+    eccentricity: float | None = None
+    """Offset of the body's mid-length over R - a instead."""
+    pitch: float = 0.0
+    """Angle of the nose away from the nearest wall: up, at the lowest place."""
+    yaw: float = 0.0
+    """Angle of the nose across the plane of tube and body, to +y at the lowest place."""
+    azimuth: float = 0.0
+    """Azimuth of the body's mid-length about +x from the lowest place."""
+
+
+def laid_down(robot: Robot, links: TubeRobot, start: Start) -> Samples:
+    """The state of a robot at rest at a place, (19,).
+
+    Args:
+        robot: the robot.
+        links: what its rates follow from.
+        start: the place.
+
+    Raises:
+        InputError: if the robot does not fit there, touches deeper than the asperities are high, or lies outside the
+            table.
+    """
+    radius, a = float(links.tube[kernel.RADIUS]), 0.5 * robot.body.diameter
+    if start.eccentricity is not None:
+        state = _at(start, start.eccentricity * (radius - a))
+    else:
+        state = _at(start, _offset(links, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
+    gaps = links.gaps(state)
+    if gaps.min() <= 0.0:
+        name = links.names[int(np.argmin(gaps))]
+        raise InputError(
+            f"placement: the {name} would cut {show(-float(gaps.min()), 'mm')} into the wall; allowed: a larger gap, a "
+            "smaller pitch or yaw"
+        )
+    return state
+
+
+def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
+    """Refuse a start that the table does not hold.
+
+    Raises:
+        InputError: if it lies outside.
+    """
+    if outside:
+        gap = float(links.gaps(state).min())
+        raise InputError(
+            f"placement: a gap of {show(gap, 'mm')} with that pitch and yaw lies outside the robot's table; allowed: a "
+            "place nearer to level"
+        )
+
+
+def _at(start: Start, offset: float) -> Samples:
+    from scipy.spatial.transform import Rotation
+
+    state = np.zeros(kernel.STATES)
+    turned = Rotation.from_euler("XZY", [start.azimuth, start.yaw, -start.pitch])
+    state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = turned.as_quat(scalar_first=True)
+    state[rigid_links.POSITION + 1] = offset * np.sin(start.azimuth)
+    state[rigid_links.POSITION + 2] = -offset * np.cos(start.azimuth)
+    return state
+
+
+def _offset(links: TubeRobot, start: Start, gap: float, radius: float) -> float:
+    """Largest offset at which the body's smallest gap is `gap`, m."""
+    from scipy.optimize import brentq, minimize_scalar
+
+    body = [place for place, name in enumerate(links.names) if name.startswith("body")]
+
+    def spare(offset: float) -> float:
+        return float(links.gaps(_at(start, offset))[body].min()) - gap
+
+    middle = minimize_scalar(lambda e: -spare(e), bounds=(0.0, radius), options={"xatol": 1e-9 * radius})
+    best = 0.0 if spare(0.0) >= -middle.fun else float(middle.x)
+    if spare(best) < 0.0:
+        if spare(best) > -1e-9 * radius:
+            return best
+        raise InputError(
+            f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
+            f"{show(max(spare(best) + gap, 0.0), 'mm')}, or a smaller pitch or yaw"
+        )
+    return float(brentq(spare, best, radius, xtol=1e-15, rtol=1e-14))
