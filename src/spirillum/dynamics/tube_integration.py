@@ -122,7 +122,7 @@ def observed_at(robot: TubeRobot, state: Samples, time: float = 0.0) -> Samples:
     """What `spirillum.kernels.tube_motion` observes in one state, (26,)."""
     out = np.empty((1, tube_motion.OBSERVED))
     tube_motion.observe(np.array([time]), state[None], robot.data, robot.table, out)
-    return out[0]
+    return np.asarray(out[0])
 
 
 def _duty(switches: Sequence[Switch], time: float) -> float:
@@ -184,7 +184,7 @@ def _crossed(
     run: _Run, robot: TubeRobot, data: Samples, limits: Samples, watched: Samples, end: float, events: list[Event]
 ) -> str:
     """Note what happened in the last step; what ends the stretch, with the state where it does, or nothing."""
-    begin, length = float(run.memory[tube_steps.LAST_TIME]), 0.0
+    begin = float(run.memory[tube_steps.LAST_TIME])
     length = run.time - begin
     new, inner, gaps = run.state.copy(), np.empty(tube_motion.STATES), np.empty_like(run.gaps)
     dy = np.empty(tube_motion.STATES)
@@ -199,12 +199,12 @@ def _crossed(
         return float(gaps[place])
 
     found: list[tuple[float, int]] = []
-    for place in np.flatnonzero((watched > 0) != (run.gaps > 0)):
+    for place in np.flatnonzero((watched > 0) != (run.gaps > 0)).tolist():
         low, high = 0.0, 1.0
         for _ in range(60):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if (at(middle, int(place)) > 0) == (watched[place] > 0) else (low, middle)
-        found.append((high, int(place)))
+            low, high = (middle, high) if (at(middle, place) > 0) == (watched[place] > 0) else (low, middle)
+        found.append((high, place))
     sites = len(robot.names)
     for share, place in sorted(found):
         moment = begin + share * length

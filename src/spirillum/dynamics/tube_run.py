@@ -69,7 +69,8 @@ def tube_run(
         InputError: for a start at which something cuts into the wall, outside the table, or a run that cannot be
             continued.
     """
-    reach, before = reach_of(steady.robot), ()
+    reach = reach_of(steady.robot)
+    before: tuple[Event, ...] = ()
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
     if isinstance(start, Start):
@@ -127,7 +128,7 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
     Raises:
         InputError: if it holds no checkpoint.
     """
-    text = dataset.attrs.get("checkpoint")
+    text = str(dataset.attrs.get("checkpoint", ""))
     try:
         found = Checkpoint(**json.loads(text))
         state = tuple(float(value) for value in found.state)

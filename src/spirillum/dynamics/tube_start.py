@@ -32,6 +32,8 @@ class Start:
     """Angle of the nose across the plane of tube and body, to +y at the lowest place."""
     azimuth: float = 0.0
     """Azimuth of the body's mid-length about +x from the lowest place."""
+    phase: float = 0.0
+    """Phase of the tail against the body, which has not rolled from where it lies."""
 
 
 def laid_down(robot: Robot, links: TubeRobot, start: Start) -> Samples:
@@ -81,6 +83,7 @@ def _at(start: Start, offset: float) -> Samples:
     state = np.zeros(kernel.STATES)
     turned = Rotation.from_euler("XZY", [start.azimuth, start.yaw, -start.pitch])
     state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4] = turned.as_quat(scalar_first=True)
+    state[rigid_links.PHASE] = start.phase
     state[rigid_links.POSITION + 1] = offset * np.sin(start.azimuth)
     state[rigid_links.POSITION + 2] = -offset * np.cos(start.azimuth)
     return state

@@ -86,27 +86,92 @@ def _scale(a: Samples, force: Samples, loads: Samples, rows: Samples, q: Samples
 
 
 @compiled
-def _tangent(
-    a: Samples,
-    loads: Samples,
-    rows: Samples,
-    slow: float,
-    newton: bool,  # noqa: FBT001 - compiled
-    q: Samples,
-    h: Samples,
-) -> None:
-    """The derivative of the balance in q; without `newton` that of dry friction at its present coefficient."""
+def _tangent(a: Samples, loads: Samples, rows: Samples, slow: float, duals: Samples, q: Samples, h: Samples) -> None:
+    """The derivative of the balance in q, with the direction of sliding replaced by the duals w in one place.
+
+    mu_c N_c J_c' (1 - (w v' + v w')/(2 s)) J_c/s with v = J_c q, s = sqrt(|v|^2 + v_r^2), |w| <= 1: positive definite,
+    and the derivative itself where w = v/s.
+    """
     for i in range(7):
         for j in range(7):
             h[i, j] = a[i, j]
     for c in range(loads.size):
         u, v, k = sliding_force(rows[c], q, loads[c], slow)
-        less = k / (u * u + v * v + slow * slow) if newton else 0.0
+        less = 0.5 * k / math.sqrt(u * u + v * v + slow * slow)
+        w_u, w_v = duals[2 * c], duals[2 * c + 1]
+        uu, uv, vv = k - 2.0 * less * w_u * u, -less * (w_u * v + w_v * u), k - 2.0 * less * w_v * v
         for i in range(7):
-            s, t = rows[c, 0, i], rows[c, 1, i]
-            w = less * (s * u + t * v)
+            x = rows[c, 0, i] * uu + rows[c, 1, i] * uv
+            z = rows[c, 0, i] * uv + rows[c, 1, i] * vv
             for j in range(7):
-                h[i, j] += k * (s * rows[c, 0, j] + t * rows[c, 1, j]) - w * (rows[c, 0, j] * u + rows[c, 1, j] * v)
+                h[i, j] += x * rows[c, 0, j] + z * rows[c, 1, j]
+
+
+@compiled
+def _duals_moved(loads: Samples, rows: Samples, slow: float, q: Samples, step: Samples, duals: Samples) -> None:
+    """Newton's step of the duals, s w = v at the step of q, kept in the unit circle."""
+    for c in range(loads.size):
+        u, v, _ = sliding_force(rows[c], q, loads[c], slow)
+        du, dv = 0.0, 0.0
+        for i in range(7):
+            du += rows[c, 0, i] * step[i]
+            dv += rows[c, 1, i] * step[i]
+        s = math.sqrt(u * u + v * v + slow * slow)
+        change = (u * du + v * dv) / s
+        w_u, w_v = duals[2 * c], duals[2 * c + 1]
+        more_u, more_v = (u + du - w_u * change) / s - w_u, (v + dv - w_v * change) / s - w_v
+        # The largest share of the step that stays in the unit circle.
+        square, product = more_u * more_u + more_v * more_v, w_u * more_u + w_v * more_v
+        room = max(1.0 - w_u * w_u - w_v * w_v, 0.0)
+        share = 1.0
+        if square > 0.0:
+            share = min(1.0, (math.sqrt(product * product + square * room) - product) / square)
+        duals[2 * c], duals[2 * c + 1] = w_u + share * more_u, w_v + share * more_v
+
+
+@compiled
+def _along(r: Samples, step: Samples, skipped: int) -> float:
+    """Residual along a step: the derivative of the convex function."""
+    found = 0.0
+    for i in range(7):
+        if i != skipped:
+            found += r[i] * step[i]
+    return found
+
+
+@compiled
+def _stepped(
+    a: Samples,
+    force: Samples,
+    loads: Samples,
+    rows: Samples,
+    slow: float,
+    skipped: int,
+    step: Samples,
+    q: Samples,
+    r: Samples,
+    trial: Samples,
+) -> float:
+    """Move q along a step to where the residual along it is small; the residual's size. It grows along the step."""
+    begin = _along(r, step, skipped)
+    low, high, share, size = 0.0, math.inf, 1.0, 0.0
+    for _ in range(60):
+        for i in range(7):
+            trial[i] = q[i] + share * step[i]
+        size = residual(a, force, loads, rows, slow, skipped, trial, r)
+        here = _along(r, step, skipped)
+        if here <= -0.5 * abs(begin):
+            low = share
+        elif here > 0.5 * abs(begin):
+            high = share
+        else:
+            break
+        if math.isinf(high):
+            break
+        share = 0.5 * (low + high)
+    for i in range(7):
+        q[i] = trial[i]
+    return size
 
 
 @compiled
@@ -137,9 +202,9 @@ def balanced(
 ) -> float:
     """Find the rates.
 
-    Newton's step where it lessens the residual; else one with dry friction at its present coefficient, which always
-    lessens the convex function. Where the spin q_3 + q_6 is prescribed, q has it at first and keeps it, and a torque
-    along one rate is left as that row's residual.
+    Newton's method for rates and duals w, the directions of sliding (T. F. Chan, G. H. Golub, P. Mulet, SIAM J. Sci.
+    Comput. 20:1964, 1999), which converges for any v_r. Where the spin q_3 + q_6 is prescribed, q has it at first and
+    keeps it, and a torque along one rate is left as that row's residual.
 
     Args:
         a: A, (7, 7).
@@ -151,36 +216,30 @@ def balanced(
         constrained: whether the spin is prescribed.
         q: first guess, and the result, (7,).
         r: result, the residual, (7,).
-        work: (70,).
+        work: (77 + 2 n,) or more.
 
     Returns:
         What is left of the forces, over them.
     """
-    h, b, trial = work[0:49].reshape(7, 7), work[49:63].reshape(7, 2), work[63:70]
+    h, b, step, trial = work[0:49].reshape(7, 7), work[49:63].reshape(7, 2), work[63:70], work[70:77]
+    duals = work[77:]
     skipped = along if constrained else -1
     size = residual(a, force, loads, rows, slow, skipped, q, r)
     scale = max(_scale(a, force, loads, rows, q), 1e-300)
-    newton = True
+    for c in range(loads.size):
+        u, v, _ = sliding_force(rows[c], q, loads[c], slow)
+        s = math.sqrt(u * u + v * v + slow * slow)
+        duals[2 * c], duals[2 * c + 1] = u / s, v / s
     for _ in range(_ROUNDS):
         if size <= _BALANCED * scale:
             break
-        _tangent(a, loads, rows, slow, newton, q, h)
+        _tangent(a, loads, rows, slow, duals, q, h)
         _direction(h, r, along, constrained, b)
-        step, found = 1.0, math.inf
-        for _ in range(3 if newton else 1):
-            for i in range(7):
-                trial[i] = q[i] + step * b[i, 0]
-            found = residual(a, force, loads, rows, slow, skipped, trial, r)
-            if found <= (1.0 - 0.3 * step) * size:
-                break
-            step *= 0.5
-        if newton and found > 0.9 * size:
-            if size <= 1e3 * _BALANCED * scale:
-                break  # rounding
-            newton = False
-            residual(a, force, loads, rows, slow, skipped, q, r)
-            continue
-        newton, size = True, found
         for i in range(7):
-            q[i] = trial[i]
-    return residual(a, force, loads, rows, slow, skipped, q, r) / scale
+            step[i] = b[i, 0]
+        _duals_moved(loads, rows, slow, q, step, duals)
+        before = size
+        size = _stepped(a, force, loads, rows, slow, skipped, step, q, r, trial)
+        if size > 0.5 * before and size <= 1e4 * _BALANCED * scale:
+            break  # rounding
+    return size / scale

@@ -13,9 +13,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.rigid_links import ATTITUDE, CHARGE, CURRENT, PHASE, POSITION
+from spirillum.kernels.rigid_links import ATTITUDE, CHARGE, CURRENT, FILM, PHASE, POSITION
 from spirillum.kernels.rosenbrock import COEFFICIENTS, DENSE, GAMMA, NODES, STAGES, TIMES, WEIGHTS
-from spirillum.kernels.tube_motion import FILM, OUTSIDE, STATES, TAIL_GAP, gaps_of, rates
+from spirillum.kernels.tube_motion import OUTSIDE, STATES, TAIL_GAP, gaps_of, rates
 
 __all__ = ["advance", "interpolate", "watched"]
 
@@ -97,7 +97,7 @@ def _jacobian(
 def _nearness(data: Samples, sizes: Samples) -> float:
     """How much smaller than their sizes changes of place have to be where a gap is thin."""
     gap = min(data[FILM], data[TAIL_GAP])
-    return min(1.0, max(100.0 * gap / sizes[POSITION], 1e-6))
+    return float(min(1.0, max(100.0 * gap / sizes[POSITION], 1e-6)))
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""A stand-in for a robot's table: films and two-dimensional laws of a long capsule, compiled; and the engine on it.
+"""The engine of motion in a tube on a stand-in for a robot's table: films and two-dimensional laws of a long capsule.
 
 Along the straight side of the body, stations at offsets e_i and gaps h_i carry per length, over the viscosity:
 
@@ -16,6 +16,7 @@ import importlib
 import math
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -24,10 +25,9 @@ import pytest
 
 from spirillum.arrays import Samples
 
-_RADIUS, _BODY, _SLIDING, _AXIAL, _LARGEST, _FIRST, _STATION = 64, 65, 66, 67, 68, 69, 2
 _LOBATTO = ((-1.0, 1 / 20), (-math.sqrt(3 / 7), 49 / 180), (0.0, 16 / 45), (math.sqrt(3 / 7), 49 / 180), (1.0, 1 / 20))
 
-SOURCE = """
+_SOURCE = """
 import math
 import numpy as np
 from spirillum.kernels.compiled import compiled
@@ -84,20 +84,27 @@ def resistance_at(table, e, p, psi, phi, out):
 """
 
 
-def table_of(matrix: Samples, radius: float, body: float, length: float, middle: float = 0.0, **more: float) -> Samples:
-    """The stand-in's table.
+class StandIn:
+    """Makes tables; holds the equations that read them."""
 
-    Args:
-        matrix: the rest at phase 0, 8x8, over the viscosity.
-        radius: R.
-        body: a.
-        length: of the straight side.
-        middle: x of its middle.
-        more: `sliding` (R_t at h = a, per length), `axial` (R_x per length), `largest` (largest pitch).
-    """
-    sliding, axial, largest = more.get("sliding", 20.0), more.get("axial", 5.0), more.get("largest", 0.5)
-    stations = [(middle + 0.5 * length * place, length * share) for place, share in _LOBATTO]
-    return np.concatenate([np.ravel(matrix), [radius, body, sliding, axial, largest], np.ravel(stations)])
+    def __init__(self, motion: ModuleType) -> None:
+        self.motion = motion
+
+    @staticmethod
+    def table(matrix: Samples, radius: float, body: float, length: float, middle: float, **more: float) -> Samples:
+        """A table.
+
+        Args:
+            matrix: the rest at phase 0, 8x8, over the viscosity.
+            radius: R.
+            body: a.
+            length: of the straight side.
+            middle: x of its middle.
+            more: `sliding` (R_t at h = a, per length), `axial` (R_x per length), `largest` (largest pitch).
+        """
+        sliding, axial, largest = more.get("sliding", 20.0), more.get("axial", 5.0), more.get("largest", 0.5)
+        stations = [(middle + 0.5 * length * place, length * share) for place, share in _LOBATTO]
+        return np.concatenate([np.ravel(matrix), [radius, body, sliding, axial, largest], np.ravel(stations)])
 
 
 def _modules() -> dict[str, ModuleType]:
@@ -105,14 +112,14 @@ def _modules() -> dict[str, ModuleType]:
     kernels = Path(sys.modules["spirillum.kernels"].__path__[0])
     names = ("compiled", "rigid_links", "contacts", "dry_friction", "rosenbrock", "tube_motion", "tube_steps")
     texts = {name: (kernels / f"{name}.py").read_text() for name in names if (kernels / f"{name}.py").exists()}
-    key = hashlib.sha256((SOURCE + "".join(texts.values())).encode()).hexdigest()[:16]
+    key = hashlib.sha256((_SOURCE + "".join(texts.values())).encode()).hexdigest()[:16]
     folder = Path(tempfile.gettempdir()) / f"spirillum-stand-in-{key}"
     folder.mkdir(exist_ok=True)
     changes = {
         "spirillum.kernels.tube_table": f"stand_in_{key}_table",
         "spirillum.kernels.tube_motion": f"stand_in_{key}_motion",
     }
-    files = {"table": SOURCE, "motion": texts["tube_motion"], "steps": texts["tube_steps"]}
+    files = {"table": _SOURCE, "motion": texts["tube_motion"], "steps": texts["tube_steps"]}
     for name, text in files.items():
         changed = text
         for old, new in changes.items():
@@ -127,11 +134,13 @@ def _modules() -> dict[str, ModuleType]:
         sys.path.remove(str(folder))
 
 
-def use(patch: pytest.MonkeyPatch) -> ModuleType:
-    """Let the engine run on the stand-in; its equations."""
+@pytest.fixture(scope="module")
+def stand_in() -> Iterator[StandIn]:
+    """Let the engine run on the stand-in."""
     from spirillum.dynamics import tube_integration
 
     modules = _modules()
-    patch.setattr(tube_integration, "tube_motion", modules["motion"])
-    patch.setattr(tube_integration, "tube_steps", modules["steps"])
-    return modules["motion"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tube_integration, "tube_motion", modules["motion"])
+        patch.setattr(tube_integration, "tube_steps", modules["steps"])
+        yield StandIn(modules["motion"])

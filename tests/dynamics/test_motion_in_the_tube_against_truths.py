@@ -1,0 +1,395 @@
+"""The engine of motion in a tube on a stand-in table: orbits, films, contact, dry friction, energy, events, restart."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.dynamics import tube_integration
+from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
+from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
+from spirillum.dynamics.tube_run import tube_run
+from spirillum.dynamics.tube_start import Start, laid_down
+from spirillum.errors import InputError
+from spirillum.kernels import contacts, dry_friction, rigid_links
+from spirillum.kernels import tube_motion as kernel
+from spirillum.swimming.freedom import LINKS
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady import calibrated_resistance
+
+LENGTH, MIDDLE = 0.026, -0.0045  # of the straight side of the paper's body
+ROUGH = Surroundings(roughness=5e-5)
+Made = tuple[Prediction, TubeRobot, Callable[..., Any]]
+
+
+@pytest.fixture(scope="module")
+def made(stand_in: Any) -> Callable[..., Made]:
+    """The paper's robot in its tube, and its runs from a start."""
+
+    def make(
+        around: Surroundings = ROUGH,
+        overrides: dict[str, Any] | None = None,
+        *,
+        rest: float = 1.0,
+        weight: bool = True,
+        friction: str | None = None,
+        **more: float,
+    ) -> Made:
+        robot = sp.load("biorob2012-wide", **(overrides or {}))
+        steady = predict(robot, model="slender", friction=friction)
+        matrix = np.zeros((8, 8))
+        twelve = calibrated_resistance(steady.batch, steady.model, calibrated=False)[0]
+        matrix[:7, :7] = rest * LINKS.T @ twelve @ LINKS / robot.fluid.viscosity
+        matrix[0, 7] = matrix[7, 0] = 0.05
+        matrix[7, 7] = 5.0
+        table = stand_in.table(matrix, 0.02, 0.009, LENGTH, MIDDLE, **more)
+        turn = 2.0 * np.pi / abs(steady.tail_rotation_rate)
+        links = tube_robot(steady, table, around, turn=turn, weight=weight)
+
+        def run(start: Any, duration: float, *, on: Any = None, samples: int = 20, **options: Any) -> Any:
+            timing = Timing(duration=duration, on=on, samples_per_turn=samples)
+            return tube_run(steady, links, start, timing.timetable(turn, 1.0), **options)
+
+        return steady, links, run
+
+    return make
+
+
+def events(run: Any) -> dict[str, float]:
+    return {event["what"]: event["time"] for event in json.loads(run.attrs["events"])}
+
+
+def left_of_energy(run: Any) -> float:
+    """Largest error of the energy balance over the energy that was spent."""
+    if "electrical_energy" in run:
+        chemical = run["resistive_energy"] + run["magnetic_energy"] + run["conversion_energy"]
+        given = run["electrical_energy"] - chemical
+    else:
+        given = run["drive_energy"]
+    spent = run["friction_energy"] + run["dissipated_energy"] + run["contact_energy"]
+    stored = run["potential_energy"] - run["potential_energy"][0]
+    left = given + run["flow_energy"] - spent - stored
+    return float(np.abs(left - left[0]).max() / max(np.abs(spent).max(), np.abs(given).max()))
+
+
+def rolling(rate: float) -> dict[str, Any]:
+    """A robot whose joint is fixed and that is turned from outside at a rate."""
+    return {"drive": {"kind": "rate", "joint": "fixed", "rate": f"{rate} rad/s"}}
+
+
+@pytest.mark.parametrize("gap", [2e-3, 2e-4])
+@pytest.mark.parametrize("rate", [3.0, -3.0])
+def test_long_capsule_orbits_at_its_two_dimensional_law(made: Any, gap: float, rate: float) -> None:
+    """Free of force and turning at Omega: around the tube at Omega lambda^2/(1 + lambda^2), at any offset."""
+    _, _, run = made(overrides=rolling(rate), rest=1e-9, weight=False)
+    found = run(Start(gap=gap), 2.0)
+    law = rate * 0.45**2 / (1.0 + 0.45**2)
+    # The straight side does not lie about mid-length; the law is that of its middle, which is at the same offset.
+    assert float(found["azimuth"][-1]) == pytest.approx(2.0 * law, rel=1e-6)
+    assert float(found["wall_gap"][-1]) == pytest.approx(gap, rel=1e-6)
+
+
+def test_driven_around_and_free_of_torque_it_turns_as_if_glued(made: Any, stand_in: Any) -> None:
+    """From the matrix itself: Omega/v = 1/(R - a) at contact, where k e is all that its film takes."""
+    _, links, _ = made(rest=1e-12, weight=False)
+    out = np.empty((8, 8))
+    offset = 0.011 - 1e-7
+    stand_in.motion.resistance_at(links.table, offset, 0.0, 0.0, 0.0, out)
+    assert np.abs(out - out.T).max() < 1e-12 * out.max()
+    turned = -out[3, 1] / out[3, 3]
+    assert turned == pytest.approx(1.0 / 0.011, rel=1e-5)
+
+
+def test_reversed_rotation_mirrors_the_azimuth(made: Any) -> None:
+    """A body of revolution: y -> -y. The tail's phase phi mirrors to pi - phi, its hand too."""
+    runs = []
+    for hand, rate in (("right", 2.0), ("left", -2.0)):
+        overrides = {"tail.handedness": hand, "drive": {"kind": "rate", "joint": "revolute", "rate": f"{rate} rad/s"}}
+        _, _, run = made(overrides=overrides)
+        sign = 1.0 if hand == "right" else -1.0
+        phase = 0.4 if hand == "right" else np.pi - 0.4
+        runs.append(run(Start(gap=4e-4, pitch=0.01, yaw=0.02 * sign, azimuth=0.3 * sign, phase=phase), 6.0))
+    there, back = runs
+    np.testing.assert_allclose(there["azimuth"], -back["azimuth"], atol=1e-8)
+    np.testing.assert_allclose(there["wall_gap"], back["wall_gap"], rtol=1e-6)
+    np.testing.assert_allclose(there["position"][:, 0], back["position"][:, 0], atol=1e-9)
+    np.testing.assert_allclose(there["body_angle"], -back["body_angle"], atol=1e-7)
+
+
+def test_film_and_dry_contact_carry_opposite_ways(made: Any) -> None:
+    """Anticlockwise about +x at the bottom: the film carries to +y, dry contact rolls to -y."""
+    thin = {**rolling(2.0), "fluid.viscosity": "0.1 Pa s"}
+    _, _, on_film = made(Surroundings(roughness=1e-6, coefficient=0.3), rolling(2.0))
+    _, _, on_tips = made(Surroundings(roughness=4e-4, coefficient=0.3), thin)
+    film, tips = on_film(Start(gap=3e-4), 1.0), on_tips(Start(gap=3e-4), 1.0)
+    assert float(film["azimuth"][-1]) > 0.01
+    assert float(film["contact_force"].max()) == 0.0
+    assert float(tips["azimuth"][-1]) < 0.0
+    assert float(tips["contact_friction"].max()) > 1e-3
+
+
+def test_level_body_drains_its_film_as_the_inverse_square_of_time(made: Any) -> None:
+    """Weight W on R_n = c h^(-3/2): h^(-1/2) grows by W/(2 c) a second."""
+    overrides = {"drive.duty": 0.0001, "tail.density": "985 kg/m^3"}
+    steady, links, _ = made(Surroundings(roughness=1e-9), overrides, rest=1e-9)
+    centred = np.zeros(8)  # weight in the middle of the straight side, so that it stays level
+    centred[0] = 0.02
+    centred[2] = 0.02 * MIDDLE
+    links = type(links)(**{**vars(links), "weight": centred})
+    time = np.linspace(0.0, 400.0, 21)
+    from spirillum.dynamics.integration import Reach
+    from spirillum.dynamics.remote import Switch
+
+    start = laid_down(steady.robot, links, Start(gap=2e-4))
+    found = integrate_in_tube(links, start, time, [Switch(0.0, 0.0)], Reach(0.0, 0.0, np.inf, 0.0, np.inf))
+    across = 0.009 * 0.02 / 0.011
+    c = 3.5 * 3.0 * np.sqrt(2.0) * np.pi * across**1.5 * LENGTH
+    law = (2e-4**-0.5 + 0.5 * 0.02 / c * time) ** -2
+    np.testing.assert_allclose(found.observed[:, rigid_links.FILM], law, rtol=2e-6)
+
+
+def test_robot_at_rest_lies_on_its_asperities_with_its_weight(made: Any) -> None:
+    """Off, in a thin fluid, for long: the load is the weight, and nothing moves."""
+    _, links, run = made(Surroundings(roughness=1e-4), {"fluid.viscosity": "0.01 Pa s"})
+    found = run(Start(gap=2e-4), 60.0, on=[(1e3, 2e3)], samples=1)
+    heavy = float(links.weight[:2].sum())
+    assert float(found["contact_force"][-1]) == pytest.approx(heavy * np.cos(float(found["azimuth"][-1])), rel=1e-4)
+    assert float(found["wall_gap"][-1]) > 0.3e-4
+    assert abs(float(found["forward_velocity"][-1])) < 1e-9
+    assert found["contact_force"].values[0] == 0.0
+    assert left_of_energy(found) < 1e-6
+
+
+def test_load_and_energy_of_asperities() -> None:
+    """W at half their height, none beyond, without bound below; the energy is its integral."""
+    height, load = 3e-6, 0.02
+    assert contacts.asperity_load(0.5 * height, height, load) == pytest.approx(load)
+    assert contacts.asperity_load(height, height, load) == 0.0
+    gaps = np.linspace(0.02, 1.0, 4001) * height
+    loads = np.array([contacts.asperity_load(gap, height, load) for gap in gaps])
+    assert np.all(np.diff(loads) <= 0)
+    gained = np.array([contacts.asperity_energy(gap, height, load) for gap in gaps])
+    slopes = -np.gradient(gained, gaps, edge_order=2)
+    np.testing.assert_allclose(slopes[2000:-5], loads[2000:-5], rtol=2e-3, atol=1e-6 * load)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("drive", ["motor", "rate", "torque"])
+def test_energy_is_balanced_with_contact(made: Any, coefficient: float, drive: str) -> None:
+    kinds = {
+        "motor": {},
+        "rate": {"drive": {"kind": "rate", "joint": "revolute", "rate": "4 rad/s"}},
+        "torque": {"drive": {"kind": "torque", "joint": "revolute", "torque": "2e-4 N m"}},
+    }
+    _, _, run = made(Surroundings(roughness=2e-4, coefficient=coefficient), kinds[drive])
+    found = run(Start(gap=1.5e-4, pitch=0.005), 8.0)
+    assert left_of_energy(found) < 1e-6
+    assert float(found["contact_force"].max()) > 0.01
+    worked = float(found["contact_energy"][-1])
+    assert worked == 0.0 if coefficient == 0 else worked > 0.0
+    assert np.all(np.diff(found["contact_energy"]) >= -1e-16)
+    assert np.all(found["contact_friction"] <= coefficient * found["contact_force"] * (1 + 1e-12))
+
+
+def test_energy_is_balanced_in_a_flow_and_with_open_ends(made: Any) -> None:
+    flow = np.array([[0.0, 0.0], [1.0, 2e-3], [2.5, -1e-3], [4.0, 1e-3]])
+    _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.IMPOSED, flow=flow))
+    found = run(Start(gap=1.5e-4), 5.0)
+    np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], *flow.T), atol=1e-15)
+    assert left_of_energy(found) < 1e-6
+    assert abs(float(found["flow_energy"][-1])) > 1e-9
+    _, _, run = made(Surroundings(roughness=2e-4, ends=kernel.OPEN, length=0.37))
+    found = run(Start(gap=1.5e-4), 3.0)
+    assert left_of_energy(found) < 1e-6
+    speed = float(found["forward_velocity"][-1])
+    assert float(found["mean_flow"][-1]) == pytest.approx(0.05 * speed / (8 * np.pi * 0.37 + 5.0), rel=1e-2)
+
+
+def test_ends_matter_as_the_condensed_matrix_says(made: Any) -> None:
+    """Far longer than all else an open tube is a closed one."""
+    speeds = []
+    for around in (
+        Surroundings(),
+        Surroundings(ends=kernel.OPEN, length=1e9),
+        Surroundings(ends=kernel.OPEN, length=0),
+    ):
+        _, links, _ = made(around)
+        state = laid_down(made()[0].robot, links, Start(gap=5e-4))
+        state[rigid_links.CURRENT] = 0.05
+        speeds.append(observed_at(links, state)[0])
+    assert speeds[1] == pytest.approx(speeds[0], rel=1e-9)
+    assert speeds[2] > speeds[0]
+
+
+def test_run_in_two_parts_is_the_run(made: Any) -> None:
+    """Continued from where it ended, at any moment: to 1e-9 in all that a state holds."""
+    _, _, run = made(Surroundings(roughness=1e-4, coefficient=0.2))
+    start = Start(gap=3e-4, azimuth=0.2, yaw=0.01)
+    whole, first = run(start, 9.0, wait=3.0), run(start, 4.321, wait=3.0)
+    second = run(first, 9.0)
+    assert float(second["time"][0]) > float(first["time"][-1])
+    for name in ("position", "attitude", "azimuth", "tail_angle", "body_angle", "tail_phase", "motor_current"):
+        np.testing.assert_allclose(second[name][-1], whole[name][-1], atol=1e-9, err_msg=name)
+    for name in ("electrical_energy", "contact_energy", "dissipated_energy"):
+        np.testing.assert_allclose(second[name][-1], whole[name][-1], rtol=1e-9, err_msg=name)
+    again = run(start, 9.0, wait=3.0)
+    for name in ("position", "attitude", "contact_force"):
+        np.testing.assert_array_equal(again[name], whole[name])
+    with pytest.raises(InputError, match="already ends"):
+        run(whole, 9.0)
+
+
+def test_events_happen_at_their_times(made: Any) -> None:
+    """The nose at the end of the tube; touching where the gap is the asperities' height; an empty battery."""
+    _, links, run = made(Surroundings(roughness=2e-4), {"channel.length": "0.107 m"})
+    found = run(Start(gap=3e-4), 60.0)
+    happened = events(found)
+    end = happened["end of the channel"]
+    assert float(found["time"][-1]) == end < 60.0
+    place = abs(float(found["position"][-1, 0]) - float(found.attrs["channel_middle"]))
+    nose = 0.0175 * float(np.cos(found["pitch"][-1]) * np.cos(found["yaw"][-1]))
+    assert place + nose == pytest.approx(0.0535, abs=2e-7)
+    touch = happened["body rear touches the wall"]
+    state = [np.interp(touch, found["time"], found["contact_force"])]
+    assert state[0] < 1e-3
+    before, after = found["time"] < touch, found["time"] > touch
+    assert float(found["contact_force"][before.values].max()) == 0.0
+    assert float(found["contact_force"][after.values].min()) > 0.0
+    assert links.names[1] == "body rear"
+
+    _, _, run = made(overrides={"battery.capacity": "0.1 mA h"})
+    found = run(Start(gap=3e-4), 3.0)
+    assert 0 < events(found)["battery empty"] < float(found["time"][-1])
+    assert float(found["duty"][-1]) == 0.0
+    assert float(found["battery_charge_used"][-1]) == pytest.approx(0.36, rel=1e-9)
+
+
+def test_tables_range_ends_the_run_with_a_sentence(made: Any) -> None:
+    _, _, run = made(largest=0.005)
+    found = run(Start(gap=1e-3), 60.0)
+    assert abs(float(found["wall_pitch"][-1])) == pytest.approx(0.005, rel=1e-6)
+    assert "the range of the robot's table in pitch is left" in found.attrs["warnings"]
+    assert float(found["time"][-1]) < 60.0
+    with pytest.raises(InputError, match="outside the robot's table"):
+        run(Start(gap=1e-3, pitch=0.01), 1.0)
+
+
+def test_rates_solve_the_balance(made: Any) -> None:
+    """What the solution leaves of the forces, over a run with contact and dry friction, and for steep friction."""
+    steady, links, _ = made(Surroundings(roughness=4e-4, coefficient=0.3))
+    for gap in (3e-4, 1e-4, 3e-5):
+        for current in (0.0, 1e-3, 0.05):
+            state = laid_down(steady.robot, links, Start(gap=gap, pitch=0.002, yaw=0.01))
+            state[rigid_links.CURRENT] = current
+            assert observed_at(links, state)[kernel.BALANCE] < 1e-12
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        half = rng.normal(size=(7, 7)) * 10.0 ** rng.uniform(-1, 1, 7)
+        a, force = half.T @ half + np.diag(1e-6 + np.sum(half**2, axis=0)), rng.normal(size=7)
+        loads, rows = 10.0 ** rng.uniform(-2, 0.5, 4), rng.normal(size=(4, 2, 7))
+        q, r, work = np.zeros(7), np.empty(7), np.empty(85)
+        left = dry_friction.balanced(a, force, loads, rows, 1e-5, 6, False, q, r, work)
+        assert left < 1e-10
+        again = dry_friction.residual(a, force, loads, rows, 1e-5, -1, q, r)
+        assert again < 1e-9 * np.sqrt(np.sum((np.abs(force) + loads.sum()) ** 2 / np.diag(a)))
+
+
+def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
+    """By finite differences of place and attitude; so does the wire's crest, in the tail's phase too."""
+    from scipy.spatial.transform import Rotation
+
+    place, attitude = np.array([0.0, 2.1e-3, -8.5e-3]), Rotation.from_euler("xyz", [0.3, 0.1, -0.07])
+    _, links, _ = made()
+
+    def state_of(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        state = np.zeros(kernel.STATES)
+        state[:3] = place + attitude.apply(step[:3])
+        turned = attitude * Rotation.from_rotvec(step[3:6])
+        state[3:7] = turned.as_quat(scalar_first=True)
+        state[7] = 0.7 + step[6]
+        return state, np.ascontiguousarray(turned.as_matrix())
+
+    normal, point = np.empty(3), np.empty(3)
+    sites = [*links.sites, np.array([0.002, 0.006, 0.0, 0.003, 0.0]), np.array([0.0, 0.009, 0.014, 0.0, 0.0])]
+
+    def gap(step: np.ndarray, j: np.ndarray, site: Any) -> float:
+        state, rotation = state_of(step)
+        if site is not None:
+            return float(contacts.ring_gap(state, rotation, 0.02, site, normal, point, j))
+        bracket = (0.03, 0.035, 0.045)
+        return float(contacts.crest(state, rotation, 0.02, links.wire, state[7], bracket, normal, point, j))
+
+    for site in (*sites, None):
+        j = np.empty(7)
+        gap(np.zeros(7), j, site)
+        for i in range(7):
+            step = np.zeros(7)
+            step[i] = 1e-6
+            found = (gap(step, np.empty(7), site) - gap(-step, np.empty(7), site)) / 2e-6
+            assert found == pytest.approx(-j[i], abs=1e-8), (site, i)
+
+
+def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
+    """Nose up until the tip is at the wall: its gap is that of points along the wire."""
+    _, links, _ = made()
+    robot = made()[0].robot
+    for pitch in (0.07, 0.078):
+        state = laid_down(robot, links, Start(gap=3e-4, pitch=pitch))
+        smallest = np.inf
+        for phase in np.linspace(0.0, 2 * np.pi, 9):
+            state[rigid_links.PHASE] = phase
+            found = links.gaps(state)[-1]
+            xi = np.linspace(0.0, 0.06, 20001)
+            r = 0.0025 * (1 - np.exp(-100 * xi / 0.06))
+            x = -0.0275 - xi
+            angle = 2 * np.pi / 0.025 * x + phase
+            side = r * np.cos(angle)
+            up = state[2] + x * np.sin(pitch) + r * np.sin(angle) * np.cos(pitch)
+            dense = 0.02 - 0.0005 - np.hypot(side, up).max()
+            if np.isfinite(found):
+                assert found == pytest.approx(dense, abs=1e-9)
+            smallest = min(smallest, dense)
+        assert smallest < 1.5e-3
+
+
+def test_robot_on_the_axis_goes_on_smoothly(made: Any) -> None:
+    """Where the azimuth is nothing, path and attitude do not depend on it."""
+    _, _, run = made(weight=False)
+    found = [run(Start(eccentricity=e), 1.0) for e in (0.0, 1e-9)]
+    np.testing.assert_allclose(found[0]["position"], found[1]["position"], atol=1e-9)
+    assert left_of_energy(found[0]) < 1e-6
+
+
+def test_interrupted_run_keeps_what_was_done(made: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    _, _, run = made()
+    calls = []
+
+    def stop(_what: str, done: int, _total: int) -> None:
+        calls.append(done)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+
+    whole = run(Start(gap=3e-4), 20.0)
+    part = run(Start(gap=3e-4), 20.0, progress=stop)
+    assert "interrupted" in events(part)
+    assert 0 < float(part["time"][-1]) < 20.0
+    rest = run(part, 20.0)
+    np.testing.assert_allclose(rest["position"][-1], whole["position"][-1], atol=1e-9)
+    assert tube_integration.TOLERANCE == 1e-8
+
+
+def test_start_has_the_gap_pitch_yaw_and_azimuth_asked_for(made: Any) -> None:
+    steady, links, run = made()
+    found = run(Start(gap=4e-4, pitch=-0.02, yaw=0.015, azimuth=0.4), 0.01)
+    for name, value in (("wall_gap", 4e-4), ("wall_pitch", -0.02), ("wall_yaw", 0.015), ("azimuth", 0.4)):
+        assert float(found[name][0]) == pytest.approx(value, rel=1e-9), name
+    with pytest.raises(InputError, match="does not fit"):
+        laid_down(steady.robot, links, Start(gap=0.02))
+    with pytest.raises(InputError, match="cut"):
+        laid_down(steady.robot, links, Start(gap=5e-4, pitch=0.2))
