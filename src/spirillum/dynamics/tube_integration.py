@@ -7,14 +7,14 @@ A run keeps the beginning of its last step: continued from there, it is the long
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Reach, Trajectory
+from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach, Trajectory
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links, tube_motion, tube_steps
@@ -27,8 +27,6 @@ INTEGRATOR = f"Rodas5P, tolerance {TOLERANCE:g}"
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
 _END, _INTERRUPTED = "end of the channel", "interrupted"
-
-Progress = Callable[[str, int, int], None]
 
 
 class Checkpoint(NamedTuple):

@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
-from spirillum.dynamics.integration import BATTERY_EMPTY, Event
+from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.start import reach_of
@@ -18,7 +18,6 @@ from spirillum.dynamics.timing import Timetable
 from spirillum.dynamics.tube_integration import (
     INTEGRATOR,
     Checkpoint,
-    Progress,
     TubeTrajectory,
     integrate_in_tube,
     observed_at,
@@ -106,7 +105,7 @@ def tube_run(
 
 
 def _waited(
-    robot: TubeRobot, state: Samples, wait: float, reach: Any, progress: Progress | None
+    robot: TubeRobot, state: Samples, wait: float, reach: Reach, progress: Progress | None
 ) -> tuple[Samples, tuple[Event, ...]]:
     """The state after waiting with the drive off, and what happened meanwhile, at negative times."""
     if wait <= 0.0:
