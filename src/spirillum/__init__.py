@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from spirillum.swimming.comparison import compare_models as compare_models
     from spirillum.swimming.prediction import Prediction as Prediction
     from spirillum.swimming.prediction import predict as predict
+    from spirillum.swimming.preparation import Prepared as Prepared
+    from spirillum.swimming.preparation import prepare as prepare
     from spirillum.swimming.steady import swim as swim
     from spirillum.view.scene3d.film import Film as Film
     from spirillum.view.scene3d.film import film as film
@@ -61,6 +63,7 @@ _HOME = {
     "ModelComparison": "spirillum.swimming.comparison",
     "Picture3D": "spirillum.view.scene3d.show",
     "Prediction": "spirillum.swimming.prediction",
+    "Prepared": "spirillum.swimming.preparation",
     "Ranking": "spirillum.calibration.ranking",
     "Resistance": "spirillum.fluid.resistance",
     "Robot": "spirillum.robot.robot",
@@ -79,6 +82,7 @@ _HOME = {
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",
     "predict": "spirillum.swimming.prediction",
+    "prepare": "spirillum.swimming.preparation",
     "rank_models": "spirillum.calibration.ranking",
     "render": "spirillum.virtual.trial",
     "resistance": "spirillum.fluid.resistance",

@@ -64,7 +64,7 @@ def test_a_changed_byte_in_any_source_changes_the_key(tmp_path: Path, monkeypatc
     copy = tmp_path / "spirillum"
     shutil.copytree(cache._PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     monkeypatch.setattr(cache, "_PACKAGE", copy)
-    key = cache._digest.__wrapped__
+    key = cache.digest_of.__wrapped__
     before = key(MODEL)
     assert before == key(MODEL)
     for module in ("fluid/tube/wall", "kernels/tube_waves", "robot/outline"):
@@ -79,6 +79,6 @@ def test_a_changed_byte_in_any_source_changes_the_key(tmp_path: Path, monkeypatc
 
 
 def test_other_libraries_change_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = cache._digest.__wrapped__(MODEL)
+    before = cache.digest_of.__wrapped__(MODEL)
     monkeypatch.setattr(cache, "version", lambda name: f"{name} of tomorrow")
-    assert cache._digest.__wrapped__(MODEL) != before
+    assert cache.digest_of.__wrapped__(MODEL) != before

@@ -42,6 +42,7 @@ from spirillum.cli.options import (
     complete_resistance_models,
     complete_schemas,
 )
+from spirillum.cli.prepare_commands import prepare
 from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
 from spirillum.cli.setup_commands import setup_app
@@ -314,6 +315,7 @@ for _command in (
     compare_models,
     resistance,
     study,
+    prepare,
     simulate,
     settle,
     flow,

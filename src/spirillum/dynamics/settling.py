@@ -283,7 +283,8 @@ def settle(
     """
     if not _FEWEST <= gaps <= _MOST:
         raise InputError(f"gaps = {gaps}; allowed: {_FEWEST} to {_MOST}")
-    ready, model, batch = prepared(robot, MODEL, resolution=resolution, placement=_level(placement))
+    solved = Resolution.of(resolution).model_copy(update={"form": "direct"})
+    ready, model, batch = prepared(robot, MODEL, resolution=solved, placement=_level(placement))
     reference = _closed(batch)
     weight = _weight(ready)
     asked = _drain(drain, batch, gaps)

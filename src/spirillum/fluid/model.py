@@ -42,6 +42,8 @@ class ResistanceModel(ABC):
     """False for a model that solves for the flow, which takes a tenth of a second for each robot."""
     axial_only: ClassVar[bool] = False
     """True where only the entries along and about the motor axis are known; the others are NaN."""
+    form: ClassVar[str | None] = None
+    """How the answer is found, for a model that has more than one way."""
     placed: ClassVar[bool] = False
     """Whether the answer depends on where in the channel the robot lies, `batch.placement`."""
 
@@ -96,6 +98,10 @@ class SwimmerModel(ResistanceModel):
         None for a model in closed form, which has a known error only.
         """
         return None
+
+    def stated_speed_error(self, batch: RobotBatch) -> float:
+        """Relative error of the forward velocity that is known beforehand; NaN where none is."""
+        return float("nan")
 
     @abstractmethod
     def axial(self, batch: RobotBatch) -> Axial:

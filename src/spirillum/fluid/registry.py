@@ -9,10 +9,12 @@ from spirillum.fluid.closed.sbt import Sbt
 from spirillum.fluid.model import ResistanceModel, SwimmerModel
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.slender import Slender
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import field_values
+from spirillum.robot.options import SlenderOptions, TubeOptions
 from spirillum.robot.placement import Placement
 
-__all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model"]
+__all__ = ["MODELS", "SWIMMER_MODELS", "check_placement", "find_model", "find_swimmer_model", "quickest"]
 
 SWIMMER_MODELS: dict[str, SwimmerModel] = {model.name: model for model in (Sbt(), Rft(), Slender(), Tube())}
 """Models that make a robot swim."""
@@ -41,6 +43,27 @@ def find_swimmer_model(name: str) -> SwimmerModel:
         hint = did_you_mean(str(name), SWIMMER_MODELS)
         raise InputError(f"model = {name!r}{hint}; allowed: {', '.join(SWIMMER_MODELS)}")
     return SWIMMER_MODELS[name]
+
+
+def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
+    """The form of a model that answers first: `tube` from tables where they are, unless a resolution is asked for.
+
+    Raises:
+        InputError: where `model.tube.form` asks for a table that is not there.
+    """
+    from spirillum.fluid.tube.tabled import tabled
+
+    options, own = batch.options.tube, batch.options.slender.accuracy
+    if not isinstance(model, Tube) or options.form == "direct":
+        return model
+    resolved = options != TubeOptions(form=options.form) or own != SlenderOptions().accuracy
+    found = None if resolved and options.form == "auto" else tabled(batch)
+    if found is None and options.form == "table":
+        raise InputError(
+            "model.tube.form = 'table': there is no table of this robot in this tube that holds at this place; "
+            "allowed: 'direct', or after `spirillum prepare`"
+        )
+    return found or model
 
 
 def check_placement(placement: Placement, *models: ResistanceModel) -> None:

@@ -90,8 +90,15 @@ class SlenderOptions(Section):
     """Form of the wire and resolution of the surfaces."""
 
 
+TubeForm = Literal["auto", "table", "direct"]
+"""How `tube` answers: from the robot's table, by solving for the flow, or from the table where there is one."""
+
+
 class TubeOptions(Section):
     """Options of the robot in its tube; the form of the wire is that of `SlenderOptions`."""
+
+    form: TubeForm = "auto"
+    """`table` (see `spirillum prepare`), `direct` (the flow is solved for), or `auto`: the table where there is one."""
 
     tolerance: Tolerance = 0.005
     """Relative tolerance of the speed per turn, from which the resolution follows."""
@@ -125,6 +132,8 @@ class Resolution(Options):
     """Of `tube`: relative tolerance of the speed per turn, 0.0001 to 0.05."""
     phases: Annotated[int, BeforeValidator(whole(1, 64))] | None = None
     """Of `tube`: number of phases of the tail that an answer is averaged over, 1 to 64."""
+    form: Annotated[TubeForm, BeforeValidator(one_of("auto", "table", "direct"))] | None = None
+    """Of `tube`: from the robot's `table`, `direct`, or `auto`: from the table where there is one."""
 
 
 class FittedTo(Section):

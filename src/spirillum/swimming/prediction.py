@@ -16,7 +16,7 @@ from spirillum.fitted.calibration_file import calibrated_placement, with_calibra
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.registry import check_placement, find_swimmer_model
+from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, broken
@@ -104,6 +104,7 @@ class Prediction:
         content = {
             "robot": self.robot.name,
             "model": self.model.name,
+            **({} if self.model.form is None else {"form": self.model.form}),
             "friction": self.friction,
             "calibrated": self.calibrated,
             "motion": self.motion,
@@ -204,7 +205,9 @@ def predict(
     warnings += _free_warnings(ready, motion)
     applied = calibrated and chosen.name in ready.calibration
     check = chosen.checked_by(ready.model)
-    error = np.nan if check is None else float(speed_difference(answer(batch, check), result)[0])
+    error = (
+        chosen.stated_speed_error(batch) if check is None else float(speed_difference(answer(batch, check), result)[0])
+    )
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
     whose = posterior_for_of(posterior_for, drawn, ready)
@@ -275,7 +278,8 @@ def prepared(
             placement = calibrated_placement(ready, calibration)
     ready = with_resolution(ready, resolution, model)
     chosen = find_swimmer_model(model)
-    return ready, chosen, checked_batch(ready, chosen, Placement.of(placement))
+    batch = checked_batch(ready, chosen, Placement.of(placement))
+    return ready, quickest(chosen, batch), batch
 
 
 def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:

@@ -25,7 +25,7 @@ from spirillum.errors import InputError
 from spirillum.files import whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = ["cache_folder", "imported_sources", "kept_or_computed"]
+__all__ = ["cache_folder", "digest_of", "imported_sources", "kept_or_computed"]
 
 _PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ("numpy", "scipy", "numba")
@@ -63,7 +63,7 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         compute: answers it; the sources that its module imports are the other part.
     """
     folder = cache_folder()
-    code = None if folder is None else _digest(compute.__module__)
+    code = None if folder is None else digest_of(compute.__module__)
     if folder is None or code is None:
         return compute(question)
     key = hashlib.sha256(f"{code} {question!r}".encode()).hexdigest()
@@ -93,7 +93,7 @@ def _kept(path: Path) -> Samples | None:
 
 
 @lru_cache(maxsize=8)
-def _digest(module: str) -> str | None:
+def digest_of(module: str) -> str | None:
     """What stands for the code behind a module, once per process; None where its source is not at hand."""
     sources = imported_sources(module)
     if module not in sources:

@@ -37,7 +37,7 @@ from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
-__all__ = ["END_LOSS", "Tube", "held_robot"]
+__all__ = ["END_LOSS", "Tube", "held_robot", "solved"]
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -134,6 +134,18 @@ def _answer(question: _Question) -> Samples:
     return found
 
 
+def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> Samples:
+    """R, load and drag of a whole robot, (13, 13): viscosity 1, no net flux, twists about the origin in body axes.
+
+    Args:
+        geometry: of the robot.
+        seat: where it is; inside the model's domain.
+        fineness: how finely the flow is resolved.
+        phase: of the tail, rad.
+    """
+    return _answer(_Question(geometry, "robot", seat, fineness, phase))
+
+
 def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux.
 
@@ -158,6 +170,7 @@ class Tube(SwimmerModel):
     )
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
+    form = "direct"
     placed = True
 
     def __init__(self, coarser: float = 1.0) -> None:
@@ -168,7 +181,7 @@ class Tube(SwimmerModel):
         """How finely the flow is resolved with these options."""
         return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST))
 
-    def checked_by(self, options: ModelOptions) -> SwimmerModel:
+    def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
         """See `SwimmerModel.checked_by`."""
         return Tube(_COARSER)
 

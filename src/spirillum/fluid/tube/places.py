@@ -1,0 +1,183 @@
+"""Places of a robot in its tube at which a table is computed.
+
+The coordinates are those of `spirillum.kernels.tube_table`: t runs from the floor (0) to the tube's axis (1), f from
+level (0) to the largest pitch (1), at which tail or coupling come as near to the glass as the model resolves. A place
+and its mirror image are the same for a robot without a tail; nothing here has a yaw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.fluid.tube.domain import WIRE_FILM
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import YAW_SLACK, contact_offset
+from spirillum.robot.outline import Arc, Outline
+from spirillum.robot.seat import Seat
+from spirillum.units import show
+
+__all__ = ["Places", "rings_of"]
+
+_STEEPEST = (np.radians(12.0), np.radians(8.0))
+"""Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
+_THINNEST_REST = 0.08
+"""Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
+_TAIL_FILM = 1.2
+"""Clearance of the tail at the first nodes over the least that the model resolves."""
+_GROWTH = 2.0
+"""Ratio of one node t to the one before, near the floor."""
+_UPPER = (0.55, 0.78, 1.0)
+"""Nodes t far from the floor."""
+_SPACED = 1.3
+"""Least ratio of the first of these to the last of those."""
+_UP = (0.0, 0.3, 0.6, 0.85, 1.0)
+_DOWN = (0.0, 0.3, 0.65, 1.0)
+_YAW_PITCHES = (-0.5, 0.0, 0.8)
+_LEAST_PITCH = np.radians(0.2)
+_NARROWEST = 1e-6
+
+
+def rings_of(outline: Outline) -> Samples:
+    """Rings whose hull a body of revolution is, for `contact_offset`: (x, rho, semi-axis along, across), m."""
+    rows: list[tuple[float, float, float, float]] = []
+    for piece in outline.pieces:
+        if isinstance(piece, Arc):
+            rows.append((*piece.centre, abs(piece.semi_axes[0]), abs(piece.semi_axes[1])))
+        else:
+            rows += [(*piece.start, 0.0, 0.0), (*piece.end, 0.0, 0.0)]
+    kept = [row for row in dict.fromkeys(rows) if row[1] > 0 or row[2] > 0]
+    return np.array(kept, dtype=float)
+
+
+@dataclass(frozen=True)
+class Places:
+    """The places of one robot's table in one tube; m and rad."""
+
+    geometry: RobotGeometry
+    radius: float
+    """R of the tube."""
+
+    @cached_property
+    def rings(self) -> Samples:
+        """See `rings_of`."""
+        return rings_of(self.geometry.body)
+
+    @cached_property
+    def gaps(self) -> Samples:
+        """Nodes t, increasing.
+
+        Raises:
+            InputError: for a robot whose tail touches the glass long before its body does.
+        """
+        thin = self.thinnest / contact_offset(self.rings, self.radius, 0.0)
+        if thin > _UPPER[0]:
+            raise InputError(
+                f"tail.amplitude = {show(self.geometry.amplitude, 'mm')}: the tail keeps the body far from the glass "
+                f"of a tube with channel.diameter = {show(2.0 * self.radius, 'mm')}; allowed: a smaller amplitude, or "
+                "answers for one place at a time, without a table"
+            )
+        found = []
+        while thin * _SPACED < _UPPER[0]:
+            found.append(thin)
+            thin *= _GROWTH
+        return np.array([*found, *_UPPER])
+
+    @property
+    def up(self) -> Samples:
+        """Nodes f nose up."""
+        return np.array(_UP)
+
+    @property
+    def down(self) -> Samples:
+        """Nodes f nose down."""
+        return np.array(_DOWN)
+
+    @cached_property
+    def yaw_gaps(self) -> Samples:
+        """Nodes t of yawed places."""
+        return self.gaps[[0, min(2, len(self.gaps) - 2), -1]]
+
+    @property
+    def yaw_pitches(self) -> Samples:
+        """Nodes of signed f of yawed places."""
+        return np.array(_YAW_PITCHES)
+
+    @cached_property
+    def yaw(self) -> float:
+        """Yaw of yawed places: two thirds of the pitch at which the tail touches from the axis, at most 4 degrees."""
+        return float(min(np.radians(4.0), 2.0 / 3.0 * self.most[-1].min()))
+
+    @cached_property
+    def most(self) -> Samples:
+        """Largest pitch nose up and nose down at each node t, (gaps, 2), rad."""
+        return np.array([[self._steepest(float(t), sign) for sign in (1.0, -1.0)] for t in self.gaps])
+
+    def seat(self, t: float, f: float, yaw: float = 0.0) -> Seat:
+        """The seat at a place; negative f is nose down."""
+        row = int(np.argmin(np.abs(self.gaps - t)))
+        pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
+        return self._seat(t, pitch, yaw)
+
+    def seat_between(self, t: float, f: float, yaw: float = 0.0) -> Seat:
+        """The seat at any t; its largest pitch is that of the next node below."""
+        row = max(int(np.searchsorted(self.gaps, t, side="right")) - 1, 0)
+        pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
+        return self._seat(t, pitch, yaw)
+
+    @property
+    def level_gaps(self) -> Samples:
+        """Gaps of a level robot at the nodes t, m."""
+        return self.gaps * contact_offset(self.rings, self.radius, 0.0)
+
+    @property
+    def largest_yaw(self) -> float:
+        """Yaw up to which the table is used, rad."""
+        return YAW_SLACK * self.yaw
+
+    @cached_property
+    def thinnest(self) -> float:
+        """Gap of the first node of a level robot, m: the tail, too, is as far from the glass as the model resolves."""
+        wire, body = self.geometry.wire(), 0.5 * self.geometry.body_diameter
+        tail = float(np.max(np.hypot(wire.points[:, 1], wire.points[:, 2]))) + wire.radius
+        return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * WIRE_FILM * wire.radius)
+
+    def _seat(self, t: float, pitch: float, yaw: float = 0.0) -> Seat:
+        return Seat(self.radius, (1.0 - t) * contact_offset(self.rings, self.radius, pitch), pitch, yaw=yaw)
+
+    def _steepest(self, t: float, sign: float) -> float:
+        """Largest pitch in one sense at a node t."""
+        g = self.geometry
+        wire, outlines = g.wire(), g.outlines
+        film = WIRE_FILM * wire.radius
+
+        def spare(size: float) -> float:
+            seat = self._seat(t, sign * size)
+            if seat.offset < 0:
+                return -self.radius
+            floor = t / (1.0 - t) * seat.offset if t < 1 else contact_offset(self.rings, self.radius, sign * size)
+            found = seat.tail_clearance(wire.points, wire.radius).clearance - film
+            found = min(found, seat.clearance(outlines["body"]) - 0.5 * floor)
+            if "coupling" in outlines:
+                found = min(found, seat.clearance(outlines["coupling"]) - 0.5 * min(floor, film))
+            return found
+
+        return max(float(_LEAST_PITCH), _last_positive(spare, _STEEPEST[0 if sign > 0 else 1]))
+
+
+def _last_positive(spare: Callable[[float], float], most: float) -> float:
+    """The size up to which a function stays positive, at most `most`; it starts positive."""
+    sizes = np.linspace(0.0, most, 31)
+    touching = next((i for i in range(1, sizes.size) if spare(float(sizes[i])) < 0), None)
+    if touching is None:
+        return float(most)
+    low, high = float(sizes[touching - 1]), float(sizes[touching])
+    while high - low > _NARROWEST:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if spare(middle) < 0 else (middle, high)
+    return low

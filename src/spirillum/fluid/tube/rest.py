@@ -1,0 +1,170 @@
+"""What is left of a robot's resistance in its tube without the film under its body, at the places of a table.
+
+The flow is solved for at every place and phase (`tube`), the film is taken away, and what is left, which is smooth up
+to contact, is kept as a Cholesky factor with logarithms on the diagonal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.fluid.tube.solids import MOTIONS, Fineness
+from spirillum.fluid.tube.tube import solved
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import MOTIONS as RATES
+from spirillum.kernels.tube_table import cut_of_film
+from spirillum.robot.seat import Seat
+from spirillum.units import show
+
+__all__ = [
+    "PHASES",
+    "Solution",
+    "even_phases",
+    "factor_of",
+    "fourier",
+    "matrix_of",
+    "mirrored",
+    "rest_at",
+    "seen_in_mirror",
+    "solutions",
+]
+
+PHASES = 5
+"""Phases of the tail at every place: two harmonics."""
+
+Progress = Callable[[str, int, int], None]
+
+_RATES = np.zeros((MOTIONS, RATES))
+"""The 12 twists and the flow from the 8 rates (U, Omega, omega_m, mean flow)."""
+_RATES[:6, :6] = _RATES[6:12, :6] = np.eye(6)
+_RATES[9, 6] = _RATES[12, 7] = 1.0
+
+
+class Solution(NamedTuple):
+    """One place to solve for."""
+
+    tails: tuple[tuple[RobotGeometry, tuple[float, ...]], ...]
+    """Robots that differ in their tails, each with the phases of its tail, rad."""
+    seat: Seat
+    fineness: Fineness
+
+
+def matrix_of(full: Samples) -> Samples:
+    """The 8x8 over U, Omega, omega_m and the mean flow from the (13, 13) of `tube`, over leading axes."""
+    found: Samples = _RATES.T @ full @ _RATES
+    return found
+
+
+def _solve(place: Solution) -> list[Samples]:
+    """(phases, 8, 8) of every tail at one place, viscosity 1."""
+    return [
+        np.stack([matrix_of(solved(g, place.seat, place.fineness, phase)) for phase in phases])
+        for g, phases in place.tails
+    ]
+
+
+def solutions(
+    places: Sequence[Solution], what: str, progress: Progress | None = None, workers: int = 2
+) -> list[list[Samples]]:
+    """The 8x8 at every place, of every tail, (phases, 8, 8).
+
+    What was solved before is read from the cache.
+
+    Args:
+        places: where.
+        what: named to `progress`.
+        progress: told what is being solved, how many places are done, and of how many.
+        workers: number of processes.
+    """
+    tell = progress or (lambda _what, _done, _total: None)
+    found: list[list[Samples]] = [[] for _ in places]
+    tell(what, 0, len(places))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        waiting: dict[Future[list[Samples]], int] = {pool.submit(_solve, place): n for n, place in enumerate(places)}
+        try:
+            for done, future in enumerate(as_completed(waiting), start=1):
+                found[waiting[future]] = future.result()
+                tell(what, done, len(places))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return found
+
+
+_LOWER = np.tril_indices(RATES)
+_DIAGONAL = np.flatnonzero(_LOWER[0] == _LOWER[1])
+
+
+def factor_of(matrix: Samples, where: str) -> Samples:
+    """Cholesky factor of positive definite matrices as parameters, row by row, logarithms on the diagonal, (..., 36).
+
+    Args:
+        matrix: (..., 8, 8).
+        where: named where one is not positive definite.
+
+    Raises:
+        InputError: if one is not.
+    """
+    try:
+        factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"the flow in the tube is resolved too coarsely {where}: without its film the resistance is not positive "
+            "definite; allowed: a finer tolerance"
+        ) from error
+    found = factor[..., _LOWER[0], _LOWER[1]]
+    found[..., _DIAGONAL] = np.log(found[..., _DIAGONAL])
+    return found
+
+
+def fourier(values: Samples) -> Samples:
+    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0."""
+    count = len(values)
+    phase = 2.0 * np.pi * np.arange(count) / count
+    rows = [np.full(count, 1.0 / count)]
+    for harmonic in range(1, (count - 1) // 2 + 1):
+        rows += [np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count]
+    found: Samples = np.tensordot(np.stack(rows), values, axes=1)
+    return found
+
+
+def even_phases(count: int = PHASES) -> tuple[float, ...]:
+    """Evenly spread phases from 0, rad."""
+    return tuple(float(phase) for phase in 2.0 * np.pi * np.arange(count) / count)
+
+
+def mirrored(g: RobotGeometry, phases: tuple[float, ...]) -> tuple[RobotGeometry, tuple[float, ...]]:
+    """Mirror image to the side of a robot and the phases of its tail."""
+    return g._replace(hand=-g.hand), tuple((np.pi - phase) % (2.0 * np.pi) for phase in phases)
+
+
+_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+"""Sign of each rate in a mirror to the side."""
+
+
+def seen_in_mirror(matrices: Samples) -> Samples:
+    """The 8x8 of the mirror image."""
+    found: Samples = _MIRROR[:, None] * matrices * _MIRROR
+    return found
+
+
+def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
+    """Fourier coefficients of the factor of what is left without the film, (phases, 36).
+
+    Args:
+        matrices: (phases, 8, 8).
+        film: of the body at that seat, (6, 6).
+        t: of the place.
+        seat: named where the rest is not positive definite.
+    """
+    rest = matrices.copy()
+    rest[:, :6, :6] -= cut_of_film(t) * film
+    where = f"at an offset of {show(seat.offset, 'mm')} and a pitch of {show(seat.pitch, 'deg')}"
+    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where))

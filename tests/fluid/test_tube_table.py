@@ -1,0 +1,278 @@
+"""The table of a robot in its tube: interpolation, its range, its file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.fluid.tube.film import FilmTable
+from spirillum.fluid.tube.on_axis import OnAxis
+from spirillum.fluid.tube.places import Places, rings_of
+from spirillum.fluid.tube.rest import even_phases, factor_of, fourier, matrix_of, mirrored, seen_in_mirror
+from spirillum.fluid.tube.table import RESPONSES, TubeTable, key_of, response_errors, response_of
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels import tube_table as kernel
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.outline import body_outline
+from spirillum.robot.seat import Seat
+
+R = 0.02
+
+
+@pytest.fixture(scope="module")
+def geometry() -> RobotGeometry:
+    return RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
+
+
+@pytest.fixture(scope="module")
+def places(geometry: RobotGeometry) -> Places:
+    return Places(geometry, R)
+
+
+@pytest.fixture(scope="module")
+def film(geometry: RobotGeometry) -> np.ndarray:
+    return FilmTable.of(geometry.body, R).packed
+
+
+def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.ndarray:
+    """A table whose rest has given coefficients (t, signed f) -> (5, 36), and given derivatives with yaw."""
+    pitches = [*places.up, *(-places.down[1:])]
+    rest = np.array([[coefficients(t, f) for f in pitches] for t in places.gaps])
+    none = np.zeros(0)
+    turned = (none, none, none)
+    if yawed is not None:
+        values = np.array([[yawed(t, f) for f in places.yaw_pitches] for t in places.yaw_gaps])
+        turned = (places.yaw_gaps, places.yaw_pitches, values)
+    parts = (places.gaps, places.up, places.down, places.most, rest)
+    return kernel.packed(R, places.yaw, places.rings, *parts, *turned, film)
+
+
+def smooth(t: float, f: float) -> np.ndarray:
+    """Something of low degree in sqrt(t) and f on either side of level."""
+    draw = np.random.default_rng(3).normal(size=(4, 5, kernel.PARAMETERS))
+    s = np.sqrt(t)
+    return 0.2 * (draw[0] + draw[1] * s + draw[2] * s**2 * abs(f) + draw[3] * f**2)
+
+
+def at(table: np.ndarray, e: float, pitch: float, yaw: float = 0.0, phase: float = 0.0) -> tuple[np.ndarray, int]:
+    out = np.empty((8, 8))
+    return out, kernel.resistance_at(table, e, pitch, yaw, phase, out)
+
+
+def lower(coefficients: np.ndarray, phase: float) -> np.ndarray:
+    wave = np.array([1.0, np.cos(phase), np.sin(phase), np.cos(2 * phase), np.sin(2 * phase)])
+    found = np.zeros((8, 8))
+    found[np.tril_indices(8)] = wave @ coefficients
+    found[np.diag_indices(8)] = np.exp(np.diag(found))
+    return found
+
+
+def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.ndarray) -> None:
+    """Of degree 2 in sqrt(t) and in f, with the film added back."""
+    table = packed(places, film, smooth)
+    draw = np.random.default_rng(0)
+    for _ in range(40):
+        t, row = draw.uniform(places.gaps[0], 1.0), places
+        pitch = draw.uniform(-0.05, 0.05)
+        e = (1.0 - t) * kernel.contact_offset(row.rings, R, pitch)
+        side = 0 if pitch >= 0 else 1
+        nodes = np.sqrt(places.gaps)
+        most = sum(
+            places.most[i, side]
+            * np.prod([(np.sqrt(t) - nodes[m]) / (nodes[i] - nodes[m]) for m in range(6) if m != i])
+            for i in range(6)
+        )
+        f = pitch / most
+        phase = draw.uniform(0, 6)
+        found, left = at(table, e, pitch, 0.0, phase)
+        assert left == kernel.INSIDE
+        thin = np.zeros((6, 6))
+        kernel.film_at(film, e, pitch, 0.0, thin)
+        factor = lower(smooth(t, f), phase)
+        expected = factor @ factor.T
+        expected[:6, :6] += kernel.cut_of_film(t) * thin
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+
+
+def test_positive_definite_and_symmetric_everywhere(places: Places, film: np.ndarray) -> None:
+    """Also where the interpolated factor is wild, below the first node, and outside the range."""
+    table = packed(places, film, lambda t, f: 3.0 * np.sin(9.0 * smooth(t, f)), lambda t, f: np.ones((2, 5, 36)))
+    draw = np.random.default_rng(1)
+    for _ in range(300):
+        matrix, _ = at(table, draw.uniform(0, 0.01099), draw.uniform(-0.02, 0.02), draw.uniform(-0.1, 0.1), 1.0)
+        scale = np.sqrt(np.diag(matrix))
+        assert np.array_equal(matrix, matrix.T)
+        assert np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] > 0
+
+
+def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np.ndarray) -> None:
+    table = packed(places, film, smooth)
+    out = np.empty((3, 5, kernel.PARAMETERS))
+    room = kernel.contact_offset(places.rings, R, 0.0)
+    for n, t in enumerate((0.0, 0.5 * places.gaps[0], places.gaps[0])):
+        kernel.rest_coefficients(table, (1.0 - t) * room, 0.0, out[n])
+    np.testing.assert_allclose(out[1], 0.5 * (out[0] + out[2]), atol=1e-12)
+    step = 1e-7 * places.gaps[0]
+    above = np.empty_like(out[0])
+    kernel.rest_coefficients(table, (1.0 - places.gaps[0] - step) * room, 0.0, above)
+    np.testing.assert_allclose((above - out[2]) / step, (out[2] - out[0]) / places.gaps[0], rtol=1e-4, atol=1e-5)
+
+
+def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
+    table = packed(places, film, smooth)
+    assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
+    turned = packed(places, film, smooth, lambda t, f: np.zeros((2, 5, 36)))
+    assert at(turned, 0.0, 0.0, 1.1 * places.largest_yaw)[1] == kernel.TOO_FAR_YAWED
+    assert at(turned, 0.0, 0.0, 0.9 * places.largest_yaw)[1] == kernel.INSIDE
+
+
+def test_yaw_enters_by_its_derivatives(places: Places, film: np.ndarray) -> None:
+    slope = np.stack([np.full((5, 36), 0.5), np.full((5, 36), -2.0)])
+    table, straight = packed(places, film, smooth, lambda t, f: slope), packed(places, film, smooth)
+    yaw, e = 0.03, 0.006
+    turned, level = at(table, e, 0.0, yaw)[0], at(straight, e, 0.0)[0]
+    thin = np.zeros((2, 6, 6))
+    kernel.film_at(film, e, 0.0, yaw, thin[0])
+    kernel.film_at(film, e, 0.0, 0.0, thin[1])
+    w = kernel.cut_of_film(1.0 - e / kernel.contact_offset(places.rings, R, 0.0))
+    turned[:6, :6] -= w * thin[0]
+    level[:6, :6] -= w * thin[1]
+    more = 3.0 * (0.5 * yaw - 2.0 * yaw**2)  # coefficients 1, cos and cos 2 at phase 0
+    assert np.log(turned[0, 0] / level[0, 0]) == pytest.approx(2.0 * more, rel=1e-9)
+
+
+@pytest.mark.parametrize("pitch", [-0.1, 0.0, 0.05])
+@pytest.mark.parametrize(
+    "shape", [("capsule", "hemisphere", "flat"), ("capsule", "fillet", "hemisphere"), ("spheroid", None, None)]
+)
+def test_contact_offset_is_where_the_body_touches(shape: tuple, pitch: float) -> None:
+    outline = body_outline(shape[0], 0.018, 0.044, 0.003, shape[1], shape[2])
+    offset = kernel.contact_offset(rings_of(outline), R, pitch)
+    assert Seat(R, offset, pitch).clearance(outline) == pytest.approx(0.0, abs=1e-8)
+
+
+def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
+    wire = places.geometry.wire()
+    for row, t in enumerate(places.gaps):
+        for f in (-1.0, 1.0):
+            seat = places.seat(float(t), f)
+            assert seat.tail_clearance(wire.points, wire.radius).clearance > 0.7 * wire.radius
+            assert seat.clearance(places.geometry.body) > 0
+        assert places.most[row].min() > 0
+
+
+def test_a_tail_much_wider_than_its_body_has_no_table(geometry: RobotGeometry) -> None:
+    with pytest.raises(sp.InputError, match="keeps the body far from the glass"):
+        _ = Places(geometry._replace(amplitude=0.015), R).gaps
+    assert Places(geometry._replace(amplitude=0.0095), R).gaps[0] > 0.1
+
+
+def test_fourier_sums_give_the_values_back() -> None:
+    values = np.random.default_rng(2).normal(size=(5, 3))
+    phases = np.array(even_phases())
+    waves = np.stack([np.ones(5), np.cos(phases), np.sin(phases), np.cos(2 * phases), np.sin(2 * phases)], axis=1)
+    np.testing.assert_allclose(waves @ fourier(values), values, atol=1e-13)
+
+
+def test_factors_give_the_matrix_back_and_refuse_an_indefinite_one() -> None:
+    a = np.random.default_rng(4).normal(size=(8, 8))
+    matrix = a @ a.T
+    factor = lower(np.concatenate([factor_of(matrix, "here")[None], np.zeros((4, 36))]), 0.0)
+    np.testing.assert_allclose(factor @ factor.T, matrix, rtol=1e-10)
+    with pytest.raises(sp.InputError, match="too coarsely here"):
+        factor_of(matrix - 100.0 * np.eye(8), "here")
+
+
+def test_the_mirror_image_of_a_mirror_image_is_the_robot(geometry: RobotGeometry) -> None:
+    image, phases = mirrored(geometry, (0.3, 2.0))
+    back, again = mirrored(image, phases)
+    assert back == geometry
+    assert again == pytest.approx((0.3, 2.0))
+    a = np.random.default_rng(5).normal(size=(8, 8))
+    np.testing.assert_array_equal(seen_in_mirror(seen_in_mirror(a)), a)
+    # seen in the mirror, points of the wire are those of the image
+    one, other = geometry.wire().points, image.wire().points
+    np.testing.assert_allclose(one * [1, -1, 1], other @ rotation(np.pi).T, atol=1e-12)
+
+
+def rotation(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def test_rates_of_a_table_are_twists_of_both_parts() -> None:
+    full = np.random.default_rng(6).normal(size=(13, 13))
+    full = full @ full.T
+    rates = np.random.default_rng(7).normal(size=8)
+    twists = np.concatenate([rates[:6], rates[:6], rates[7:]])
+    twists[9] += rates[6]
+    assert rates @ matrix_of(full) @ rates == pytest.approx(twists @ full @ twists)
+
+
+def test_responses_of_a_diagonal_resistance_are_those_of_a_tail_that_drives_nothing() -> None:
+    matrix = np.diag(np.arange(1.0, 9.0))
+    found = response_of(matrix)
+    # the body's own torque balance: 4 Omega = 0 x tail
+    np.testing.assert_allclose(found, [0, 0, 0, 0, 0, 0, 3], atol=1e-12)
+
+
+def test_response_errors_are_relative() -> None:
+    a = np.random.default_rng(8).normal(size=(8, 8))
+    matrix = a @ a.T
+    np.testing.assert_allclose(
+        response_errors(1.01 * matrix, matrix), [0, 0, 0.01, 0.01, 0.01, 0.01][: len(RESPONSES)], atol=0.011
+    )
+    assert np.all(response_errors(matrix, matrix) == 0)
+
+
+def test_a_table_is_written_and_read(
+    tmp_path,
+    geometry: RobotGeometry,
+    places: Places,
+    film: np.ndarray,  # type: ignore[no-untyped-def]
+) -> None:
+    table = TubeTable(geometry, R, packed(places, film, smooth), dict.fromkeys(RESPONSES, 0.004), 40, 300.0)
+    table.write(tmp_path / "table.npz")
+    read = TubeTable.read(tmp_path / "table.npz")
+    assert (read.geometry, read.radius, read.key) == (geometry, R, table.key)
+    np.testing.assert_allclose(
+        read.at(0.0101, 0.01, 0.0, 0.4)[0], table.at(0.0101, 0.01, 0.0, 0.4)[0], rtol=2e-5, atol=1e-9
+    )
+    (tmp_path / "broken.npz").write_bytes((tmp_path / "table.npz").read_bytes()[:3000])
+    for path in ("broken.npz", "missing.npz"):
+        with pytest.raises(sp.InputError, match="is no table of this version"):
+            TubeTable.read(tmp_path / path)
+
+
+def test_another_robot_or_tube_has_another_key(geometry: RobotGeometry) -> None:
+    keys = {key_of(geometry, R), key_of(geometry, 0.015), key_of(geometry._replace(hand=-1.0), R)}
+    assert len(keys) == 3
+    assert key_of(geometry._replace(wavelength=geometry.wavelength * (1 + 1e-14)), R) == key_of(geometry, R)
+
+
+def test_on_the_axis_every_tilt_is_a_pitch() -> None:
+    """A resistance that is made of invariants: of the tilt's size along it, and of a tail that turns about the axis."""
+
+    def matrix(pitch: float, yaw: float, phase: float) -> np.ndarray:
+        """In the frame F of a tilted axis, from what the tube and the wire define: X and two directions of the wire."""
+        c, s = np.cos(pitch), np.sin(pitch)
+        axis = np.array([c * np.cos(yaw), c * np.sin(yaw), s])
+        side = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+        frame = np.stack([axis, side, np.cross(axis, side)])  # rows
+        along = frame @ np.array([1.0, 0.0, 0.0])
+        wire = np.array([0.3, np.cos(phase), np.sin(phase)])
+        rows = np.zeros((4, 8))
+        rows[0, :3], rows[1, 3:6], rows[1, :3], rows[2, :3] = along, along, 0.2 * wire, np.cross(wire, along)
+        rows[3, 3:6], rows[3, 6] = wire, 0.5
+        return 2.0 * np.eye(8) + rows.T @ rows
+
+    phases = np.array(even_phases(41))
+    pitches = np.linspace(0.0, 0.2, 7)
+
+    def coefficients(pitch: float, yaw: float) -> np.ndarray:
+        return fourier(factor_of(np.stack([matrix(pitch, yaw, phase) for phase in phases]), "here"))
+
+    raised = OnAxis.of(pitches, np.stack([coefficients(pitch, 0.0) for pitch in pitches]))
+    for pitch, yaw in ((0.1, 0.0), (-0.13, 0.0), (0.05, 0.08), (-0.1, 0.06), (0.0, -0.07), (0.07, -0.1)):
+        np.testing.assert_allclose(raised.coefficients(pitch, yaw), coefficients(pitch, yaw), atol=1e-6)
