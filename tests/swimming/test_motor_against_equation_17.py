@@ -105,6 +105,13 @@ def test_current_solves_17_for_every_motor_that_a_file_may_describe(
     assert drop[0] == pytest.approx(supply[0], abs=1e-11 * size)
 
 
+def test_a_winding_almost_without_resistance_at_rest(batch_of: Callable[..., Any]) -> None:
+    """R(I) = slope I and a vanishing rest: slope I^2 = V."""
+    motor = {"constant": 0.0, "decay": 5e-199, "growth": 0.0, "slope": 4.0, "voltage": 1.0, "internal_resistance": 0.0}
+    chosen = electrics(batch_of, motor)
+    assert steady_current(chosen, np.zeros(1), np.zeros(1))[0] == pytest.approx(0.5, rel=1e-12)
+
+
 def test_ohmic_motor_in_closed_form(batch_of: Callable[..., Any]) -> None:
     """With constant resistances (17) is linear: I = duty V/(R + duty r + K_b d omega_m/dI)."""
     motor = {"constant": 12.0, "decay": 0.0, "growth": 0.0, "slope": 0.0, "voltage": 3.7, "internal_resistance": 0.8}

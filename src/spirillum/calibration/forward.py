@@ -225,8 +225,8 @@ class Forward:
         """
         motor = self._motor(draws)
         body, tail = rates_per_torque(balance, friction_torques("rotor", friction, friction))
-        per_current = motor.torque_constant * (tail - body)
-        current = steady_current(motor, np.zeros(1), motor.back_emf_constant * per_current)
+        per_current = motor.joint_torque_constant * (tail - body)
+        current = steady_current(motor, np.zeros(1), motor.joint_back_emf_constant * per_current)
         found: Samples = motor.polarity * per_current * current
         return found
 
@@ -263,7 +263,7 @@ class Forward:
         own = 1.0 / (1.0 - turning)
         share = own if tail_share is None else np.where(np.isnan(tail_share), own, tail_share)
         rate = np.abs(motor_rate)
-        torque = motor.torque_constant * steady_current(motor, motor.back_emf_constant * rate, np.zeros(1))
+        torque = motor.joint_torque_constant * steady_current(motor, motor.joint_back_emf_constant * rate, np.zeros(1))
         return torque, share * rate, rate
 
     def _motor(self, draws: Draws) -> Electrics:

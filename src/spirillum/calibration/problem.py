@@ -215,7 +215,7 @@ def posed(
     _check_motor(experiment, free, batch)
     parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
     forward, ranges, error = _forward(experiment, chosen, batch, parameters, progress or (lambda _w, _d, _t: None))
-    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     friction = np.where(np.isnan(batch.effective_friction), rotor, batch.effective_friction)
     problem = Problem(
         experiment=experiment,

@@ -25,8 +25,8 @@ _KINDS = {
 }
 _ELECTRICS = {
     "polarity": rigid_links.POLARITY,
-    "torque_constant": rigid_links.TORQUE_CONSTANT,
-    "back_emf_constant": rigid_links.BACK_EMF,
+    "joint_torque_constant": rigid_links.TORQUE_CONSTANT,
+    "joint_back_emf_constant": rigid_links.BACK_EMF,
     "inductance": rigid_links.INDUCTANCE,
     "constant": rigid_links.CONSTANT,
     "decay": rigid_links.DECAY,
@@ -60,7 +60,7 @@ class Acting:
 
 def friction_of(batch: RobotBatch, reading: FrictionReading, effective: float) -> Samples:
     """The readings of (18) and (19) as torques against Omega_b about x (on the whole) and omega_m (in the joint)."""
-    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     t = friction_torques(reading, np.array([effective]), rotor)
     bb, br, rb, rr = (float(entry[0]) for entry in (t.bb, t.br, t.rb, t.rr))
     found = np.zeros((7, 7))

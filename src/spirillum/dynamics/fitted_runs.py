@@ -99,7 +99,8 @@ def with_intervals(
     Raises:
         InputError: for a number of draws that tells nothing, or that takes too long.
     """
-    if not isinstance(draws, Integral) or not _FEWEST <= draws <= _MOST:
+    given: Any = draws
+    if not isinstance(given, Integral) or not _FEWEST <= int(given) <= _MOST:
         raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}

@@ -96,7 +96,7 @@ def axial_response(batch: RobotBatch, prediction: Prediction) -> AxialResponse:
             "or `predict` for the steady motion"
         )
     s = calibrated_balance(batch, prediction.model, calibrated=prediction.calibrated)
-    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     t = friction_torques(prediction.friction, np.array([prediction.effective_friction]), rotor)
     body, tail = rates_per_torque(s, t)
     load = s.rotor_load(body, tail)
@@ -152,7 +152,7 @@ def _right_hand_side(motor: Electrics, slip: float) -> Callable[[float, Samples,
     growth, growth_rate, slope = float(motor.growth[0]), float(motor.growth_rate[0]), float(motor.slope[0])
     voltage, internal = float(motor.voltage[0]), float(motor.internal_resistance[0])
     inductance = float(motor.inductance[0])
-    emf = float(motor.back_emf_constant[0] * motor.torque_constant[0]) * slip
+    emf = float(motor.joint_back_emf_constant[0] * motor.joint_torque_constant[0]) * slip
 
     def derivative(time: float, y: Samples, duty: float) -> list[float]:  # noqa: ARG001 - the solver's form
         i = float(y[0])
@@ -228,7 +228,8 @@ def _dataset(
 ) -> xr.Dataset:
     import xarray as xr
 
-    sign, k_m, k_b = float(motor.polarity[0]), float(motor.torque_constant[0]), float(motor.back_emf_constant[0])
+    sign = float(motor.polarity[0])
+    k_m, k_b = float(motor.joint_torque_constant[0]), float(motor.joint_back_emf_constant[0])
     torque = sign * k_m * m.current
     impulse = sign * k_m * m.charge
     torque2 = k_m**2 * m.current_squared

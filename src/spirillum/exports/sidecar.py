@@ -111,7 +111,7 @@ def _fixed(robot: Robot) -> bool:
 
 def joint_friction(robot: Robot) -> float:
     """Friction inside the joint, N m s/rad; what acts on body or rotor from outside is not in it."""
-    own = robot.motor.rotor_friction if robot.motor is not None else 0.0
+    own = robot.motor.joint_rotor_friction if robot.motor is not None else 0.0
     if robot.friction.reading == "rotor":
         return own if robot.friction.effective is None else robot.friction.effective
     return own if robot.friction.reading == "body" else 0.0

@@ -75,13 +75,20 @@ class Motor(Section):
     inductance: Inductance
     """Inductance L (Table II)."""
     rotor_friction: RotaryFriction
-    """Friction B_m of the rotor alone (Table II)."""
+    """Friction B_m of the rotor alone, on the motor's shaft (Table II)."""
     resistance: MotorResistance
     """Equivalent resistance R(I) of motor and driver (Table II)."""
+    gear_ratio: Annotated[float, Field(strict=True, ge=1e-3, le=1e4, allow_inf_nan=False)] = 1.0
+    """Turns of the motor's shaft for one of the joint, G, of a gear without losses of its own; 1: driven directly."""
     polarity: Literal["forward", "reverse"] = "forward"
     """`forward` turns the tail the way that its hand swims forward, `reverse` the other way."""
     shaft_diameter: Length | None = None
     """Diameter of the shaft (Table I's rotor), for pictures and exports only; unset: the wire's."""
+
+    @property
+    def joint_rotor_friction(self) -> float:
+        """B_m G^2: friction of the rotor as the joint feels it, N m s/rad."""
+        return self.rotor_friction * self.gear_ratio**2
 
 
 class Battery(Section):
@@ -112,6 +119,6 @@ class Friction(Section):
     """The effective rotary friction of eqs (18) and (19), and how it is read."""
 
     effective: RotaryFriction | None = None
-    """B_eff, which contains B_m; unset: the rotor's own B_m alone. For the `body` reading: the wall's coefficient B."""
+    """B_eff in the joint, which contains B_m G^2; unset: that alone. For the `body` reading: B of the wall."""
     reading: FrictionReading = "rotor"
     """Where friction acts: `none`, `rotor` (inside the joint), `body` (on the wall), `paper` (as (19) is printed)."""

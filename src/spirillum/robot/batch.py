@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_
 
 import numpy as np
 
-from spirillum.arrays import Flags, PerRobot
+from spirillum.arrays import Flags, PerRobot, Values
 from spirillum.errors import InputError
 from spirillum.robot import geometry
 from spirillum.robot.actuation import DriveKind, FrictionReading
@@ -48,7 +48,11 @@ def _columns(name: str) -> dict[str, Column]:
 
 @dataclass(frozen=True)
 class Electrics:
-    """Motor and battery of every robot (Table II), SI; `polarity` is the sign of the driven rate about +x."""
+    """Motor, gear and battery of every robot (Table II), SI; `polarity` is the sign of the driven rate about +x.
+
+    The constants are those of the motor's shaft, which turns `gear_ratio` times as fast as the joint; a balance at the
+    joint takes `joint_...`.
+    """
 
     torque_constant: Annotated[PerRobot, Column("motor.torque_constant")]
     back_emf_constant: Annotated[PerRobot, Column("motor.back_emf_constant")]
@@ -64,7 +68,23 @@ class Electrics:
     internal_resistance: Annotated[PerRobot, Column("battery.internal_resistance")]
     capacity: Annotated[PerRobot, Column("battery.capacity")]
     duty: Annotated[PerRobot, Column("drive.duty", unset=1.0)]
+    gear_ratio: Annotated[PerRobot, Column("motor.gear_ratio", unset=1.0)]
     polarity: PerRobot
+
+    @property
+    def joint_torque_constant(self) -> Values:
+        """K_m G: torque in the joint per current, N m/A."""
+        return self.torque_constant * self.gear_ratio
+
+    @property
+    def joint_back_emf_constant(self) -> Values:
+        """K_b G: back-emf per rate of the joint, V s/rad."""
+        return self.back_emf_constant * self.gear_ratio
+
+    @property
+    def joint_rotor_friction(self) -> Values:
+        """B_m G^2: friction of the motor's rotor as the joint feels it, N m s/rad."""
+        return self.rotor_friction * self.gear_ratio**2
 
 
 @dataclass(frozen=True)

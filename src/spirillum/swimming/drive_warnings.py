@@ -56,7 +56,8 @@ def _unset_friction_warning(robot: Robot, reading: FrictionReading) -> list[str]
         return ["without friction the motor turns faster than any real one: the rates are upper bounds"]
     if robot.friction.effective is not None or robot.motor is None:
         return []
-    own = f"the rotor's own B_m = {robot.motor.rotor_friction:g} N m s/rad"
+    name = "B_m" if robot.motor.gear_ratio == 1 else "B_m G^2"
+    own = f"the rotor's own {name} = {robot.motor.joint_rotor_friction:g} N m s/rad"
     if reading == "body":
         return [f"friction.effective is unset: no wall friction on the body, {own} in the joint"]
     return [f"friction.effective is unset: {own} alone is used, which makes the rates upper bounds"]

@@ -44,7 +44,7 @@ class DriveState:
 
 def _joint_friction(batch: RobotBatch, friction: FrictionReading) -> tuple[PerRobot, PerRobot]:
     """(B_eff or B, B_m); unset, B_eff is the rotor's own B_m alone and the wall's B is zero."""
-    rotor = batch.electrics.rotor_friction if batch.electrics else np.zeros(1)
+    rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     if friction == "none":
         return np.zeros(1), rotor
     unset = np.isnan(batch.effective_friction)
@@ -66,10 +66,10 @@ def driven(batch: RobotBatch, s: TorqueBalance, friction: FrictionReading) -> Dr
     elif batch.drive == "dc-motor" and batch.electrics is not None:
         motor = batch.electrics
         slip = tail_per_torque - body_per_torque
-        per_current = motor.back_emf_constant * motor.torque_constant * slip
-        coasting = motor.back_emf_constant * motor.polarity * (tail_coasting - body_coasting)
+        per_current = motor.joint_back_emf_constant * motor.joint_torque_constant * slip
+        coasting = motor.joint_back_emf_constant * motor.polarity * (tail_coasting - body_coasting)
         current = motor.polarity * steady_current(motor, coasting, per_current)
-        torque = motor.torque_constant * current
+        torque = motor.joint_torque_constant * current
     else:
         raise InputError("drive is missing; allowed: a [drive] table, or a tail rate (--tail-rate)")
     # Reading `paper` pushes the tail backwards once B_eff exceeds E_x: no steady motion of that kind.
@@ -100,7 +100,7 @@ def at_rate(
     body_rate, tail = _rates_at(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
     slip = np.where(np.isnan(motor_rate), tail - body_rate, motor_rate)
     current = _current_at(motor, slip)
-    spare = motor.torque_constant * current - s.rotor_load(body_rate, tail)
+    spare = motor.joint_torque_constant * current - s.rotor_load(body_rate, tail)
     if friction == "rotor":
         inferred = spare / slip
         t = friction_torques("rotor", inferred, rotor)
@@ -121,7 +121,7 @@ def _rates_at(
 
 def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, motor_rate: PerRobot) -> DriveState:
     """Reading `paper`: the body row holds -K_m I and the flow's torque, so the current decides the body's rate."""
-    k, k_b = motor.torque_constant, motor.back_emf_constant
+    k, k_b = motor.joint_torque_constant, motor.joint_back_emf_constant
     observed = ~np.isnan(motor_rate)
     emf = k_b * motor.polarity * np.where(observed, motor_rate, tail_rate * (1.0 + s.br / s.bb) - s.t_b / s.bb)
     current = motor.polarity * steady_current(motor, emf, np.where(observed, 0.0, k_b * k / s.bb))
@@ -130,7 +130,7 @@ def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, moto
     tail = np.where(np.isnan(tail_rate), body_rate + motor_rate, tail_rate)
     slip = np.where(observed, motor_rate, tail - body_rate)
     inferred = (k * current - s.rotor_load(body_rate, tail)) / slip
-    t = friction_torques("paper", inferred, motor.rotor_friction)
+    t = friction_torques("paper", inferred, motor.joint_rotor_friction)
     body_coasting, tail_coasting = coasting_rates(s, t)
     with_motor = (tail - tail_coasting) * (slip - (tail_coasting - body_coasting)) > 0
     tail = np.where(with_motor, tail, np.nan)  # B_eff beyond E_x pushes the tail backwards: as in `driven`
@@ -139,7 +139,8 @@ def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, moto
 
 def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
     """Signed current at a given motor rate, from (17)."""
-    return motor.polarity * steady_current(motor, motor.back_emf_constant * motor.polarity * motor_rate, np.zeros(1))
+    emf = motor.joint_back_emf_constant * motor.polarity * motor_rate
+    return motor.polarity * steady_current(motor, emf, np.zeros(1))
 
 
 def one_piece(batch: RobotBatch, s: TorqueBalance, tail_rate: PerRobot) -> DriveState:

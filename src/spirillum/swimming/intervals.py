@@ -259,9 +259,9 @@ def _torques_and_powers(
         "dissipated_power": np.where(body == 0.0, drive * tail, drive * tail + on_body * pace * body),
     }
     effective, motor = swum.effective_friction, batch.electrics
-    rotor = motor.rotor_friction if motor is not None else np.zeros(1)
+    rotor = motor.joint_rotor_friction if motor is not None else np.zeros(1)
     if motor is not None and batch.drive == "dc-motor":
-        emf = motor.back_emf_constant * motor.polarity * slip
+        emf = motor.joint_back_emf_constant * motor.polarity * slip
         current = motor.polarity * steady_current(motor, emf, np.zeros(1))
         voltage = battery_voltage(motor, current)
         found |= {
@@ -270,7 +270,7 @@ def _torques_and_powers(
             "electrical_power": motor.duty * motor.polarity * current * voltage,
             "battery_run_time": run_time(motor, current),
         }
-        spare = motor.torque_constant * current - drive
+        spare = motor.joint_torque_constant * current - drive
         if not own_drive and friction in ("rotor", "paper"):
             effective = spare / slip
         elif not own_drive:

@@ -14,6 +14,9 @@ from spirillum.robot.batch import Electrics
 
 __all__ = ["battery_voltage", "run_time", "steady_current", "winding_resistance"]
 
+_LARGEST_START = 1e6
+"""Largest current at which the search for the steady one starts, A."""
+
 
 def winding_resistance(motor: Electrics, current: Values) -> Values:
     """R(I) of Table II, ohm; takes |I|."""
@@ -70,7 +73,8 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
 
     low = np.zeros(np.broadcast_shapes(drive.shape, linear.shape, motor.constant.shape))
     at_rest = motor.constant + motor.decay + motor.growth + np.maximum(linear, 0.0)
-    i = low + drive / np.where(at_rest > 0, at_rest, 1.0)
+    # A winding almost without resistance at rest would start beyond what 200 halvings come back from.
+    i = low + np.minimum(drive / np.where(at_rest > 0, at_rest, 1.0), _LARGEST_START)
     high = 2.0 * i + 1e-12
     for _ in range(60):
         short = excess(high) < 0

@@ -364,7 +364,7 @@ def effective_friction(evidence: Evidence) -> Iterator[Claim]:
         "(18) at the observed rates",
     )
     smallest = float(np.nanmin(found))
-    rotor = evidence.robot.motor.rotor_friction if evidence.robot.motor else np.nan
+    rotor = evidence.robot.motor.joint_rotor_friction if evidence.robot.motor else np.nan
     yield Claim(
         "Friction is dominated by the body-channel interaction, not by the rotor",
         "B_eff well above B_m",

@@ -133,8 +133,9 @@ class StudyView:
 
     @cached_property
     def rotor_friction(self) -> float | None:
-        """B_m if all robots share one, N m s/rad."""
-        found = {(robot.get("motor") or {}).get("rotor_friction") for robot in self.robots}
+        """B_m, with a gear B_m G^2, if all robots share one, N m s/rad."""
+        motors = [robot.get("motor") or {} for robot in self.robots]
+        found = {m.get("rotor_friction", 0.0) * m.get("gear_ratio", 1.0) ** 2 for m in motors}
         value = found.pop() if len(found) == 1 else None
         return float(value) if value else None
 
