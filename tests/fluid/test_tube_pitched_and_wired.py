@@ -6,11 +6,14 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
+from spirillum.fluid.algebra import axis_rotation
 from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.reduced import Reduced
 from spirillum.fluid.tube.solids import Fineness, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
-from spirillum.fluid.wire.interaction import Discretisation, solve
-from spirillum.fluid.wire.stokeslets import Wire, wire_along
+from spirillum.fluid.wire.interaction import Discretisation, share, solve
+from spirillum.fluid.wire.sources import Sources
+from spirillum.fluid.wire.stokeslets import Wire, wire_along, wire_system
 from spirillum.kernels.blobs import force_matrix
 from spirillum.robot.outline import Arc, Outline, body_outline
 from spirillum.robot.seat import Seat
@@ -34,6 +37,11 @@ def coil(radius: float = 0.05) -> Wire:
     xi = np.linspace(0.0, 1.2, 200)
     turn = 2 * np.pi * xi / 0.8
     return wire_along(np.stack([-0.7 - xi, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), radius)
+
+
+def turned(wire: Wire, phase: float) -> Wire:
+    turn = axis_rotation(np.array([phase]))[0]
+    return Wire(wire.points @ turn.T, wire.tangents @ turn.T, wire.lengths, wire.radius)
 
 
 def near(wire: Wire) -> np.ndarray:
@@ -285,19 +293,41 @@ def test_a_lowered_tail_turns_about_its_own_axis() -> None:
     assert dropped.matrix[8, 8] > 1.1 * level.matrix[8, 8]  # nearer to the wall
 
 
-def test_conjugate_gradients_against_a_direct_solve(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Forces on a wire that nearly touches the body: as asked for, and to the last digit."""
-    wire, solid = straight(-0.95, 1.0, 0.03), ball(0.0, 0.4)
-    fineness = Fineness(tolerance=1e-4)
-
-    def solved() -> np.ndarray:
-        return held_in_tube(Solids([(solid, 0)], Seat(1.0, 0.3), fineness, near(wire)), [(wire, 1)]).matrix
-
-    found = solved()
-    monkeypatch.setattr("spirillum.fluid.tube.confined._RESIDUAL", 1e-13)
-    wanted = solved()
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    np.testing.assert_allclose(found / scale, wanted / scale, atol=1e-6)
+@pytest.mark.parametrize("seat", [Seat(1.0, 0.3), Seat(1.0, 0.25, 0.1), Seat(1.0, 0.25, -0.05, yaw=0.1)])
+@pytest.mark.parametrize("accuracy", ["standard", "high"])
+def test_reduced_basis_against_all_fields(seat: Seat, accuracy: Literal["standard", "high"]) -> None:
+    """What a coil sends to a body that it nearly touches, at phases that are not in the basis: field by field."""
+    solids = Solids([(ball(0.0, 0.4), 0)], seat, Fineness(accuracy, tolerance=1e-4), near(coil()))
+    for phase in (0.0, 1.0):
+        wire = turned(coil(), phase)
+        found = held_in_tube(solids, [(wire, 1)])
+        inner = Wire(
+            wire.points[:, [0, 2, 1]] * [1, 1, -1], wire.tangents[:, [0, 2, 1]] * [1, 1, -1], wire.lengths, wire.radius
+        )
+        system = wire_system([(inner, 1)], accuracy)
+        sources = Sources.of((inner,), system)
+        reduced = solids.kept["reduced"]
+        assert isinstance(reduced, Reduced)
+        placed = seat.placed(inner.points)
+        along = np.kron(np.eye(len(placed)), seat.rotation)
+        away = float(np.min(seat.distances(sources.x, sources.rho)))
+        wall = solids.rings.sent(reduced.waves, solids.systems, placed, along, away)
+        free: list[list[np.ndarray]] = [[], []]
+        for m, cross in enumerate(sources.velocities(solids.panels, solids.modes)):
+            for family, turn in zip(free, (np.real, np.imag), strict=True):
+                family.append(share(m) * sources.columns(cross * turn(sources.turn(m, cross.shape[1]))))
+        fields = [rows.gathered(family) for rows, family in zip(solids.rows, free, strict=True)]
+        fields = [np.concatenate(fields)] if len(wall) == 1 else fields
+        for values, reflected in zip(fields, wall, strict=True):
+            values[:, : reflected.shape[1]] -= reflected
+        coefficients = reduced.coefficients(sources, placed, along)
+        for number, (values, few, answers) in enumerate(zip(fields, coefficients, reduced.answers, strict=True)):
+            tractions = solids.solve_system(number, values)
+            dual = np.concatenate([family.dual for family in solids.systems[number]])
+            work = values.T @ (dual[:, None] * tractions)
+            scale = np.sqrt(np.diag(work).max())
+            np.testing.assert_allclose(few.T @ answers.work @ few / scale**2, work / scale**2, atol=1e-6)
+        assert found.asymmetry < 1e-5
 
 
 def test_a_wire_alone_against_a_dense_matrix() -> None:

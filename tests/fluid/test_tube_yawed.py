@@ -63,7 +63,7 @@ def test_mirror_image(body: str) -> None:
     for pitch, yaw in ((0.1, 0.15), (0.0, -0.1)):
         one = robot(body, Seat(1.0, 0.2, pitch, yaw=yaw), 0.7)
         other = robot(body, Seat(1.0, 0.2, pitch, yaw=-yaw), np.pi - 0.7, -1.0)
-        assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-9
+        assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-8
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -73,7 +73,7 @@ def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
     yawed = robot(body, Seat(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi)
     quarter = axis_rotation(np.array([0.5 * np.pi]))[0]  # z to -y
     np.testing.assert_allclose(quarter @ [0, 0, 1], [0, -1, 0], atol=1e-15)
-    assert difference(yawed, in_other_axes(pitched, quarter)) < 1e-9
+    assert difference(yawed, in_other_axes(pitched, quarter)) < 1e-8
 
 
 def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
@@ -81,7 +81,7 @@ def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
     below = robot("capsule", Seat(1.0, 0.2, 0.1, yaw=0.07), 0.7)
     above = robot("capsule", Seat(1.0, -0.2, -0.1, yaw=-0.07), 0.7 + np.pi)
     half = axis_rotation(np.array([np.pi]))[0]
-    assert difference(below, in_other_axes(above, half)) < 1e-9
+    assert difference(below, in_other_axes(above, half)) < 1e-8
 
 
 @pytest.mark.parametrize("body", BODIES)
@@ -93,7 +93,7 @@ def test_reciprocal_positive_and_continuous(body: str) -> None:
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
     assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 0.005
     pitched = robot(body, Seat(1.0, 0.2, 0.1))
-    for yaw, error in ((1e-9, 1e-8), (1e-3, 2e-3), (-1e-3, 2e-3)):
+    for yaw, error in ((1e-9, 5e-8), (1e-3, 2e-3), (-1e-3, 2e-3)):
         assert difference(pitched, robot(body, Seat(1.0, 0.2, 0.1, yaw=yaw))) < error
     level, hardly = robot(body, Seat(1.0, 0.2)), robot(body, Seat(1.0, 0.2, yaw=1e-9))
     assert difference(level, hardly) < 3e-4  # other rings, other averages

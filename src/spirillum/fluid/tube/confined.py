@@ -1,7 +1,7 @@
 """Body, coupling and tail in a circular tube: the coupled flow with the wall, for all rigid motions at once.
 
-Solids and wall are factored once for a place in the tube (`solids`); every tail at every phase is solved against
-them by conjugate gradients on the forces along its wire, which meet the wall by the same waves.
+Solids and wall are factored once for a place in the tube (`solids`), and answer once all that a wire sends them over
+a turn (`reduced`); a phase is then a small system for the forces along the wire, which meet the wall by the same waves.
 
 Inside, axes are x along the robot, y up, z to the right; answers come in body axes.
 """
@@ -15,9 +15,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.algebra import axis_rotation
+from spirillum.fluid.tube.reduced import Answers, Reduced
 from spirillum.fluid.tube.solids import MOTIONS, Solids
 from spirillum.fluid.tube.wall import point_reflection, waves_between
-from spirillum.fluid.wire.interaction import one_thread, share
+from spirillum.fluid.wire.interaction import one_thread
 from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
 from spirillum.robot.seat import Seat
@@ -25,8 +26,6 @@ from spirillum.robot.seat import Seat
 __all__ = ["Held", "Strengths", "held_in_tube"]
 
 _EIGHT_PI = 8.0 * np.pi
-_RESIDUAL = 1e-7
-_MOST_STEPS = 200
 
 
 @dataclass(frozen=True)
@@ -75,11 +74,19 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
         lines: tuple[Wire, ...] = ()
         if wires:
             link = _Link.of(solids, wires, drop)
-            strengths = _conjugate_gradients(link, link.motion - solids.wrenches(solids.moving, link.sent))
-            answer = solids.solve([family @ strengths for family in link.sent])
-            matrix = matrix + link.motion.T @ strengths - solids.wrenches(answer)
+            answers, sent = link.answers, link.sent
+            mobility, motion = link.mobility.copy(), link.motion.copy()
+            for answer, fields in zip(answers, sent, strict=True):
+                mobility -= fields.T @ answer.work @ fields
+                motion -= fields.T @ answer.drag
+            strengths = np.linalg.solve(mobility, motion)
+            reached = [fields @ strengths for fields in sent]
+            matrix = matrix + link.motion.T @ strengths
+            for answer, fields in zip(answers, reached, strict=True):
+                matrix = matrix - answer.push @ fields
             matrix[: MOTIONS - 1, : MOTIONS - 1] += link.system.own
-            even, odd = (moving - lost for moving, lost in zip(solids.moving, answer, strict=True))
+            lost = [answer.tractions @ fields for answer, fields in zip(answers, reached, strict=True)]
+            even, odd = (moving - some for moving, some in zip(solids.moving, solids.families(lost), strict=True))
             tractions, lines = (even, odd), link.wires
             forces = strengths[: sum(line.points.size for line in lines)]
     found = Strengths(solids, (_EIGHT_PI * tractions[0], _EIGHT_PI * tractions[1]), lines, _EIGHT_PI * forces)
@@ -128,8 +135,10 @@ class _Link:
     """Of the wires with the wall, the solids not there."""
     motion: Samples
     """Velocities at the stations (and gradients along moments), (3 n + q n, 13)."""
-    sent: tuple[Samples, ...]
-    """Velocities on the solids from unit forces and moments at the stations, even and odd; nothing without solids."""
+    sent: list[Samples]
+    """Fields on the solids from unit forces and moments at the stations, for each system, (fields, 3 n + q n)."""
+    answers: tuple[Answers, ...]
+    """Of the solids to those fields; nothing without solids."""
 
     @classmethod
     def of(cls, solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float) -> _Link:
@@ -140,7 +149,7 @@ class _Link:
         seat, forces = solids.seat, 3 * len(points)
         placed = seat.placed(points)
         distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
-        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.damping)
+        own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.wire_damping)
         along = np.kron(np.eye(len(points)), seat.rotation)  # from forces in robot axes to those in the tube's
         mobility = system.mobility.copy()
         mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
@@ -154,18 +163,20 @@ class _Link:
         speed = 2.0 - 2.0 * (placed[:, 1] ** 2 + placed[:, 2] ** 2) / seat.radius**2
         motion[:forces, MOTIONS - 1] = (speed[:, None] * seat.rotation[0]).ravel()
         if solids.none:
-            return cls(solids, lines, system, mobility, motion, ())
-        sent = _sent_unbounded(solids, lines, system)
-        waves = solids.waves(0.5 * (solids.gap + distance), placed)
-        for family, wall in zip(sent, solids.sent(waves, placed), strict=True):
-            family[:, :forces] -= wall @ along
-        return cls(solids, lines, system, mobility, motion, sent)
+            return cls(solids, lines, system, mobility, motion, [], ())
+        sources = Sources.of(lines, system)
+        reduced = _reduced(solids, sources)
+        return cls(
+            solids, lines, system, mobility, motion, reduced.coefficients(sources, placed, along), reduced.answers
+        )
 
-    def apply(self, strengths: Samples) -> Samples:
-        """Velocities at the stations from forces and moments there, the solids held."""
-        answer = self.solids.solve([family @ strengths for family in self.sent])
-        velocities: Samples = self.mobility @ strengths - self.solids.wrenches(answer, self.sent)
-        return velocities
+
+def _reduced(solids: Solids, sources: Sources) -> Reduced:
+    """The last one is kept: phases of one tail come one after the other."""
+    found = solids.kept.get("reduced")
+    if not isinstance(found, Reduced) or not found.serves(sources):
+        found = solids.kept["reduced"] = Reduced.of(solids, sources)
+    return found
 
 
 def _near_wall(wire: Wire, seat: Seat) -> Samples:
@@ -207,50 +218,3 @@ def _turned(wire: Wire) -> Wire:
 
 def _lowered(wire: Wire, drop: float) -> Wire:
     return Wire(wire.points - np.array([0.0, drop, 0.0]), wire.tangents, wire.lengths, wire.radius)
-
-
-def _sent_unbounded(solids: Solids, wires: tuple[Wire, ...], system: WireSystem) -> tuple[Samples, Samples]:
-    """Velocities on the solids from unit forces and moments at the stations, without the wall."""
-    sources = Sources.of(wires, system)
-    modes: tuple[list[Samples], list[Samples]] = ([], [])
-    for last, bearing in solids.tiers:
-        cross = sources.velocities(solids.panels.of_solids(bearing), last)
-        rows = np.flatnonzero(np.repeat(bearing[solids.panels.solid_of_node], 3))
-        for m in range(len(modes[0]), last):
-            turn = sources.turn(m, cross[m].shape[1])
-            for family, phase in zip(modes, (turn.real, turn.imag), strict=True):
-                whole = np.zeros((3 * solids.panels.size, len(system.mobility)))
-                whole[rows] = sources.columns(share(m) * cross[m] * phase)
-                family.append(whole)
-    even, odd = (rows.gathered(family) for rows, family in zip(solids.rows, modes, strict=True))
-    return even, odd
-
-
-def _conjugate_gradients(link: _Link, velocities: Samples) -> Samples:
-    """Forces and moments along the wires from velocities there, solids and wall answering; every column by itself."""
-    from scipy.linalg import cho_factor, cho_solve
-
-    factor = cho_factor(link.mobility, lower=True, check_finite=False)
-
-    def dot(a: Samples, b: Samples) -> Samples:
-        product: Samples = np.einsum("ij,ij->j", a, b)
-        return product
-
-    found: Samples = cho_solve(factor, velocities, check_finite=False)
-    enough = _RESIDUAL**2 * dot(velocities, found)
-    residual = velocities - link.apply(found)
-    direction = step = cho_solve(factor, residual, check_finite=False)
-    norm = dot(residual, step)
-    for _ in range(_MOST_STEPS):
-        open_ = norm > enough
-        if not np.any(open_):
-            break
-        moved = link.apply(direction)
-        length = np.where(open_, norm / np.where(open_, dot(direction, moved), 1.0), 0.0)
-        found = found + length * direction
-        residual = residual - length * moved
-        step = cho_solve(factor, residual, check_finite=False)
-        fresh = dot(residual, step)
-        direction = step + np.where(open_, fresh / np.where(open_, norm, 1.0), 0.0) * direction
-        norm = np.where(open_, fresh, norm)
-    return found

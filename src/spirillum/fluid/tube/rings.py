@@ -51,6 +51,12 @@ class Rows(NamedTuple):
         """Values of all unknowns from values of each mode on all rows."""
         return np.concatenate([values[rows] for values, rows in zip(modes, self.of_mode, strict=True)])
 
+    def only(self, unknowns: np.ndarray) -> Rows:
+        """Some of the unknowns, in ascending order."""
+        parts = [unknowns[(unknowns >= a) & (unknowns < b)] - a for a, b in pairwise(self.starts.tolist())]
+        of_mode = tuple(rows[part] for rows, part in zip(self.of_mode, parts, strict=True))
+        return Rows(self.parity, of_mode, self.dual[unknowns])
+
 
 System = tuple[Rows, ...]
 """Families whose unknowns the wall couples, one after the other: each parity by itself, or both of them."""
@@ -70,8 +76,10 @@ class Rings(ABC):
         """
 
     @abstractmethod
-    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
-        """Velocities on the solids from unit forces at points, by the wall, (unknowns, 3 n) for each system.
+    def sent(
+        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+    ) -> list[Samples]:
+        """Velocities on the solids from forces at points, by the wall, (unknowns, columns) for each system.
 
         Without the minus sign.
 
@@ -79,6 +87,20 @@ class Rings(ABC):
             waves: those that matter between points and solids.
             systems: families of unknowns that the wall couples.
             points: about the tube's axis, in its axes, (n, 3), m.
+            forces: in columns, (3 n, columns).
+            away: smallest distance from the wall of what the points stand for, m.
+        """
+
+    @abstractmethod
+    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+        """Velocities on some unknowns from waves at points, with the wall's single layer, for each k and system.
+
+        (unknowns, 2, parities, orders, 3), to be multiplied with `point_waves`; without the minus sign.
+
+        Args:
+            waves: those that matter between points and solids.
+            systems: the unknowns.
+            away: smallest distance of the points from the wall, m.
         """
 
 
@@ -134,13 +156,15 @@ class LevelRings(Rings):
             if high > low:
                 yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + 3.0
 
-    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
+    def sent(
+        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+    ) -> list[Samples]:
         """See `Rings.sent`."""
-        columns = 3 * len(points)
+        columns = forces.shape[1]
         middle = np.empty((2, self.modes, waves.k.size, 2, 3, columns))
 
         def fill(number: int) -> None:
-            pressed = times_layers(point_waves(points, waves, number), waves, number)
+            pressed = _pressed(waves, number, points, forces)
             for parity, trace in enumerate(self._traces(waves, number)):
                 flat = trace.reshape(3 * self.modes, -1)
                 both = flat @ pressed[:, :, parity].transpose(2, 3, 1, 0).reshape(flat.shape[1], -1)
@@ -156,6 +180,22 @@ class LevelRings(Rings):
             ]
             found.append(np.concatenate(parts))
         return found
+
+    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+        """See `Rings.received`."""
+        strengths = self._strengths(waves)
+
+        def product(number: int) -> list[Samples]:
+            found = []
+            for (family,), traces in zip(systems, self._traces(waves, number), strict=True):
+                fields = [
+                    np.tensordot(values[rows, number], trace, axes=1)
+                    for values, rows, trace in zip(strengths, family.of_mode, traces, strict=True)
+                ]
+                found.append(times_layers(np.concatenate(fields)[:, :, None], waves, number))
+            return found
+
+        return each(product, range(waves.k.size))
 
     def _traces(self, waves: Waves, number: int) -> tuple[Samples, Samples]:
         """Even and odd waves of one k as modes on the reference cylinder, (modes, 3, orders, 3) each."""
@@ -262,7 +302,8 @@ class TiltedRings(Rings):
         """
         self.panels, self.seat, self.counts = panels, seat, counts
 
-    def _tiers(self, systems: Sequence[System]) -> list[_Tier]:
+    def _tiers(self, systems: Sequence[System], bearing: np.ndarray | None = None) -> list[_Tier]:
+        """Panels sorted by their distance from the wall; with `bearing` some of their nodes only, never averaged."""
         fine = _finer(self.panels, _FINER_TILTED)
         distances = self.seat.distances(*fine[:2]).min(axis=1)
         step = np.floor(np.log(distances / distances.min()) / np.log(_TIER))
@@ -270,6 +311,10 @@ class TiltedRings(Rings):
         for number in np.unique(step):
             here = step == number
             nodes = np.repeat(here, self.panels.order)
+            if bearing is not None:
+                nodes &= bearing
+                if not np.any(nodes):
+                    continue
             place = np.full(3 * self.panels.size, -1)
             place[np.repeat(nodes, 3)] = np.arange(3 * np.count_nonzero(nodes))
             modes = int(self.counts[nodes].max())
@@ -278,8 +323,12 @@ class TiltedRings(Rings):
                 local = [[place[bearing] for bearing in family.of_mode] for family in system]
                 of_mode += [tuple(part[part >= 0] for part in family[:modes]) for family in local]
                 unknowns.append(np.flatnonzero(np.concatenate([part for family in local for part in family]) >= 0))
-            sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
-            averaged = _Sample(*(values[here] for values in fine)) if number < _AVERAGED_TIERS else sample
+            if bearing is None:
+                sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
+            else:
+                sample = _Sample(self.panels.x.ravel()[nodes, None], self.panels.rho.ravel()[nodes, None], None)
+            near = bearing is None and number < _AVERAGED_TIERS
+            averaged = _Sample(*(values[here] for values in fine)) if near else sample
             tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
         return tiers
 
@@ -321,16 +370,17 @@ class TiltedRings(Rings):
             columns = tiers[b].unknowns[s]
             matrices[s][np.ix_(tiers[a].unknowns[s], columns)] -= block * duals[s][columns]
 
-    def sent(self, waves: Waves, systems: Sequence[System], points: Samples) -> list[Samples]:
+    def sent(
+        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+    ) -> list[Samples]:
         """See `Rings.sent`."""
         tiers = self._tiers(systems)
-        away = waves.radius - float(np.max(np.hypot(points[:, 1], points[:, 2])))
-        found = [np.zeros((sum(family.dual.size for family in system), 3 * len(points))) for system in systems]
+        found = [np.zeros((sum(family.dual.size for family in system), forces.shape[1])) for system in systems]
         parities = [[family.parity for family in system] for system in systems]
         lock = Lock()
 
         def add(number: int) -> None:
-            pressed = times_layers(point_waves(points, waves, number), waves, number)
+            pressed = _pressed(waves, number, points, forces)
             for tier in tiers:
                 count = waves.orders_between(number, 0.5 * (tier.distance + away))
                 for s, target in enumerate(self._on_rings(waves, number, tier, tier.sample, count) if count else ()):
@@ -342,6 +392,26 @@ class TiltedRings(Rings):
         each(add, range(waves.k.size))
         return found
 
+    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+        """See `Rings.received`."""
+        bearing = np.zeros(self.panels.size, dtype=bool)
+        for family in (family for system in systems for family in system):
+            bearing[np.concatenate(family.of_mode) // 3] = True
+        tiers = self._tiers(systems, bearing)
+        sizes = [sum(family.dual.size for family in system) for system in systems]
+
+        def on(number: int) -> list[Samples]:
+            counts = [waves.orders_between(number, 0.5 * (tier.distance + away)) for tier in tiers]
+            shapes = [(size, 2, len(system), max(1, *counts), 3) for size, system in zip(sizes, systems, strict=True)]
+            found = [np.zeros(shape) for shape in shapes]
+            for tier, count in zip(tiers, counts, strict=True):
+                fields = self._on_rings(waves, number, tier, tier.sample, count) if count else []
+                for values, unknowns, field in zip(found, tier.unknowns, fields, strict=False):
+                    values[unknowns, :, :, :count] = field
+            return [times_layers(values, waves, number) for values in found]
+
+        return each(on, range(waves.k.size))
+
     def _on_rings(self, waves: Waves, number: int, tier: _Tier, sample: _Sample, orders: int) -> list[Samples]:
         """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
 
@@ -351,7 +421,7 @@ class TiltedRings(Rings):
         theta = _angles(orders, tier.modes, whole=not symmetric)
         projectors = [_projectors(theta, tier.modes, parity) for parity in (0, 1)]
         sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
-        panels, order = len(sample.x), self.panels.order
+        panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
         modes = [np.empty((tier.modes, panels * order, 3, 2, len(waved), orders, 3)) for waved in sources]
         some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
         for first in range(0, panels, some):
@@ -388,6 +458,13 @@ class TiltedRings(Rings):
         out = np.empty((3, 2, *shape, 2, orders, 3))
         tilted_waves(values.reshape(*shape, orders, 3, 3), angle, phase, theta, self.seat.rotation, out)
         return out
+
+
+def _pressed(waves: Waves, number: int, points: Samples, forces: Samples) -> Samples:
+    """Forces at points as waves of one k, times the wall's single layer, (columns, 2, 2, orders, 3)."""
+    at_points = point_waves(points, waves, number)
+    mixed = forces.T @ at_points.reshape(len(at_points), -1)
+    return times_layers(mixed.reshape(-1, *at_points.shape[1:]), waves, number)
 
 
 def _angles(orders: int, modes: int, *, whole: bool = False) -> Samples:

@@ -48,7 +48,20 @@ class Fineness:
     @property
     def damping(self) -> float:
         """At which waves are cut off: at a gap of 0.2 mm a hundredth costs less than 1e-5, a tenth several percent."""
-        return float(min(10.0 * self.tolerance, 0.2 * np.sqrt(self.tolerance)))
+        return _damping(self.tolerance)
+
+    @property
+    def wire_damping(self) -> float:
+        """At which waves to and from wires are cut off: what pushes the robot needs more of them than what holds it."""
+        return _damping(min(self.tolerance, _WIRES))
+
+
+def _damping(tolerance: float) -> float:
+    return float(min(10.0 * tolerance, 0.2 * np.sqrt(tolerance)))
+
+
+_WIRES = 1e-3
+"""Coarsest tolerance of waves to and from wires."""
 
 
 class Solids:
@@ -67,6 +80,7 @@ class Solids:
         """
         self.seat, self.fineness = seat, fineness
         self.parts = np.array([part for _, part in solids])
+        self.kept: dict[str, object] = {}  # what others derive from the factors and want to use again
         near = np.zeros((0, 3)) if lines is None else lines
         if not solids:
             return
@@ -120,17 +134,17 @@ class Solids:
             return LevelRings(self.panels, self.seat.offset, self.modes)
         return TiltedRings(self.panels, self.seat, self.counts)
 
-    def waves(self, distance: float, points: Samples | None = None) -> Waves:
-        """The waves that matter between the solids, or solids and points about the tube's axis.
+    def waves(self, distance: float, wires: Samples | None = None) -> Waves:
+        """The waves that matter between the solids, or solids and wires.
 
         Args:
             distance: mean of the smallest distances of both from the wall, m.
-            points: (n, 3), m.
+            wires: where along the tube they are, m.
         """
-        x = self.panels.x.ravel()
-        if points is not None:
-            x = np.concatenate([x, points[:, 0]])
-        return waves_between(self.seat.radius, float(np.ptp(x)), distance, self.fineness.damping)
+        x, damping = self.panels.x.ravel(), self.fineness.damping
+        if wires is not None:
+            x, damping = np.concatenate([x, wires]), self.fineness.wire_damping
+        return waves_between(self.seat.radius, float(np.ptp(x)), distance, damping)
 
     @cached_property
     def motion(self) -> tuple[Samples, Samples]:
@@ -207,26 +221,24 @@ class Solids:
         most = np.array([self.counts[self.panels.solid_of_node == solid].max() for solid in range(len(self.parts))])
         return [(int(last), most >= last) for last in sorted(set(most.tolist()))]
 
-    def solve(self, velocities: Sequence[Samples]) -> tuple[Samples, Samples]:
-        """Tractions from velocities on the surfaces, both as modes, even and odd, (unknowns, n)."""
+    def solve_system(self, number: int, velocities: Samples) -> Samples:
+        """Tractions from velocities on the surfaces, both as modes of one of `systems`, (unknowns, n)."""
         from scipy.linalg import lu_solve
 
-        if len(self.factors) == 1:
-            both = lu_solve(self.factors[0], np.concatenate(velocities), overwrite_b=True, check_finite=False)
-            even, odd = np.split(both, [len(velocities[0])])
-        else:
-            even, odd = (lu_solve(f, v, check_finite=False) for f, v in zip(self.factors, velocities, strict=True))
+        tractions: Samples = lu_solve(self.factors[number], velocities, check_finite=False)
+        return tractions
+
+    def solve(self, velocities: Sequence[Samples]) -> tuple[Samples, Samples]:
+        """Tractions from velocities on the surfaces, both as modes, even and odd, (unknowns, n)."""
+        if len(self.systems) == 1:
+            both = self.solve_system(0, np.concatenate(velocities))
+            return self.families([both])
+        return self.families([self.solve_system(number, values) for number, values in enumerate(velocities)])
+
+    def families(self, values: Sequence[Samples]) -> tuple[Samples, Samples]:
+        """Values on the unknowns of each of `systems` as those of the even and the odd family."""
+        even, odd = values if len(values) == 2 else np.split(values[0], [self.rows[0].dual.size])
         return even, odd
-
-    def sent(self, waves: Waves, points: Samples) -> list[Samples]:
-        """Velocities on the solids from unit forces at points, by the wall, even and odd, (unknowns, 3 n).
-
-        Args:
-            waves: those that matter between points and solids.
-            points: about the tube's axis, in its axes, (n, 3), m.
-        """
-        found = self.rings.sent(waves, self.systems, points)
-        return found if len(found) > 1 else np.split(found[0], [self.rows[0].dual.size])
 
     @cached_property
     def moving(self) -> tuple[Samples, Samples]:

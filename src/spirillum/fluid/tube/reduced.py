@@ -1,0 +1,258 @@
+"""What a wire sends to the solids in a tube, and what they answer, at any phase: a reduced basis.
+
+Over a turn, all that a wire sends to the solids lies in the span of some hundred fields: those of its ring forces in
+unbounded fluid, mode by mode, and those that the wall reflects. The solids answer them once. A phase then needs only
+the coefficients of its fields: in unbounded fluid they follow by turning, for the wall from as many unknowns as there
+are fields (empirical interpolation: Chaturantabut and Sorensen, SIAM J. Sci. Comput. 32:2737, 2010; which unknowns, by
+pivoted QR: Drmac and Gugercin, SIAM J. Sci. Comput. 38:A631, 2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.rings import System
+from spirillum.fluid.tube.solids import Solids
+from spirillum.fluid.tube.wall import Waves, each, point_waves
+from spirillum.fluid.wire.interaction import share
+from spirillum.fluid.wire.sources import Sources
+
+__all__ = ["Answers", "Reduced"]
+
+_LEAST = 2e-8
+"""Fields below this share of the largest are left out."""
+_SNAPSHOTS = 300
+"""Least number of points on what the wires sweep from which the wall's fields are found; two at each station."""
+_GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
+"""Angle between the phases of neighbouring stations: together they cover what the wire sweeps."""
+_SKETCH, _WALL_SKETCH = 96, 256
+"""Random combinations from which fields of a mode, and of the wall, are found; twice as many if they do not suffice."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """One system of the solids' unknowns: the basis, fields in unbounded fluid first, and the answers to it."""
+
+    tractions: Samples
+    """That answer unit fields, (unknowns, fields)."""
+    work: Samples
+    """Of those tractions against the fields, (fields, fields)."""
+    drag: Samples
+    """Work of the moving solids' tractions against the fields, (fields, motions)."""
+    push: Samples
+    """Work of the answers against the solids' motions, (motions, fields)."""
+    free: tuple[tuple[int, int, Samples], ...]
+    """Parity, mode, and coefficients from ring sources, (fields, sources)."""
+    wall: tuple[Samples, ...]
+    """Coefficients from waves at points, for each k, (fields, 2, parities, orders, 3)."""
+    parities: tuple[int, ...]
+    """Of those waves."""
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What wires send to the solids at any phase, and what these answer."""
+
+    x: Samples
+    """Of the stations, (n,), m."""
+    rho: Samples
+    """(n,), m."""
+    waves: Waves
+    """Between wires and solids."""
+    answers: tuple[Answers, ...]
+    """For each system."""
+
+    @classmethod
+    def of(cls, solids: Solids, sources: Sources) -> Reduced:
+        """The basis of wires that turn about the solids' axis.
+
+        Args:
+            solids: solids and wall.
+            sources: the wires, at any phase.
+        """
+        seat, placed = solids.seat, solids.seat.placed(_swept(sources))
+        away = float(np.min(seat.distances(sources.x, sources.rho)))
+        along = seat.rotation[0, 0]
+        beside = sources.rho * np.sqrt(1.0 - along**2)
+        reach = np.concatenate([along * sources.x - beside, along * sources.x + beside])
+        waves = solids.waves(0.5 * (solids.gap + away), reach)
+        crossing = _unbounded(solids, sources)
+        walls, picked = [], []
+        for system, basis in zip(solids.systems, _reflected(solids, waves, placed, away), strict=True):
+            root = np.sqrt(_duals(system))[:, None]
+            walls.append(basis / root)
+            rows = _rows(root * walls[-1])
+            picked.append((rows, tuple(f.only(some) for f, some in zip(system, _split(system, rows), strict=True))))
+        received = solids.rings.received(waves, [system for _, system in picked], away)
+        found = []
+        for number, (wall, (rows, _)) in enumerate(zip(walls, picked, strict=True)):
+            gather = np.linalg.pinv(wall[rows])
+            fields = [np.tensordot(gather, values[number], axes=1) for values in received]
+            found.append(_answers(solids, number, crossing, wall, fields))
+        return cls(sources.x, sources.rho, waves, tuple(found))
+
+    def serves(self, sources: Sources) -> bool:
+        """Whether these wires are the ones of the basis, at any phase."""
+        return sources.x.shape == self.x.shape and bool(
+            np.allclose(sources.x, self.x, rtol=0.0, atol=1e-9 * self.waves.radius)
+            and np.allclose(sources.rho, self.rho, rtol=0.0, atol=1e-9 * self.waves.radius)
+        )
+
+    def coefficients(self, sources: Sources, placed: Samples, along: Samples) -> list[Samples]:
+        """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n).
+
+        Args:
+            sources: the wires at their phase.
+            placed: their stations about the tube's axis, (n, 3), m.
+            along: from forces in the robot's axes to the tube's, (3 n, 3 n).
+        """
+        at_stations = each(lambda k: point_waves(placed, self.waves, k), range(self.waves.k.size))
+        found = []
+        for answers in self.answers:
+            free = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
+            for parity, m, coefficients in answers.free:
+                turn = sources.turn(m, coefficients.shape[1])
+                free.append(sources.columns(coefficients * (turn.imag if parity else turn.real)))
+            both = np.concatenate(free)
+            wall = np.zeros((answers.wall[0].shape[0], len(along)))
+            for matrix, values in zip(answers.wall, at_stations, strict=True):
+                sent = values[:, :, answers.parities, : matrix.shape[3]].reshape(len(values), -1)
+                wall += matrix.reshape(len(matrix), sent.shape[1]) @ sent.T
+            padded = np.zeros((len(wall), both.shape[1]))
+            padded[:, : len(along)] = -wall @ along
+            found.append(np.concatenate([both, padded]))
+        return found
+
+
+def _swept(sources: Sources) -> Samples:
+    """Points on what the wires sweep in a turn, in the robot's axes, (n, 3)."""
+    times = max(2, -(-_SNAPSHOTS // len(sources.x)))
+    x, rho = np.tile(sources.x, times), np.tile(sources.rho, times)
+    theta = _GOLDEN * np.arange(len(x))
+    return np.stack([x, rho * np.cos(theta), rho * np.sin(theta)], axis=1)
+
+
+def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
+    """Velocities of each mode on all nodes from ring sources in unbounded fluid, (3 nodes, sources)."""
+    found: list[Samples] = []
+    for last, bearing in solids.tiers:
+        cross = sources.velocities(solids.panels.of_solids(bearing), last)
+        rows = np.flatnonzero(np.repeat(bearing[solids.panels.solid_of_node], 3))
+        for m in range(len(found), last):
+            whole = np.zeros((3 * solids.panels.size, cross[m].shape[1]))
+            whole[rows] = share(m) * cross[m]
+            found.append(whole)
+    return found
+
+
+def _reflected(solids: Solids, waves: Waves, placed: Samples, away: float) -> list[Samples]:
+    """Basis of what the wall reflects of forces at points, with roots of surface elements, for each system."""
+    count = _WALL_SKETCH
+    while True:
+        forces = _mixing(3 * len(placed), count)
+        sent = solids.rings.sent(waves, solids.systems, placed, forces, away)
+        found = [_basis(np.sqrt(_duals(s))[:, None] * fields) for s, fields in zip(solids.systems, sent, strict=True)]
+        if count >= 3 * len(placed) or max(basis.shape[1] for basis in found) < count:
+            return found
+        count *= 2
+
+
+def _mixing(size: int, count: int) -> Samples:
+    """Random combinations, (size, count); the unit matrix where they are no fewer."""
+    if count >= size:
+        return np.eye(size)
+    return np.random.default_rng(0).standard_normal((size, count)) / np.sqrt(count)
+
+
+def _duals(system: System) -> Samples:
+    return np.concatenate([family.dual for family in system])
+
+
+def _answers(
+    solids: Solids, number: int, crossing: list[Samples], wall: Samples, coefficients: list[Samples]
+) -> Answers:
+    """Answers of one system.
+
+    Args:
+        solids: solids and wall.
+        number: of the system.
+        crossing: see `_unbounded`.
+        wall: basis of the fields that the wall reflects, (unknowns, fields).
+        coefficients: of those, see `Answers`.
+    """
+    system = solids.systems[number]
+    dual = _duals(system)
+    root = np.sqrt(dual)[:, None]
+    weighted, places = [], []
+    first = 0
+    for family in system:
+        for m, rows in enumerate(family.of_mode):
+            here = slice(first + family.starts[m], first + family.starts[m + 1])
+            weighted.append(root[here] * crossing[m][rows])
+            places.append((family.parity, m, here))
+        first += family.dual.size
+    largest = max(float(np.max(np.linalg.norm(values, axis=0), initial=0.0)) for values in weighted)
+    blocks, free = [], []
+    for (parity, m, here), values in zip(places, weighted, strict=True):
+        fields = _basis(values, largest)
+        block = np.zeros((dual.size, fields.shape[1]))
+        block[here] = fields
+        blocks.append(block)
+        if fields.size:
+            free.append((parity, m, fields.T @ values))
+    basis = np.concatenate([np.concatenate(blocks, axis=1) / root, wall], axis=1)
+    tractions = solids.solve_system(number, basis)
+    acting = (dual[:, None] * basis).T
+    moving, motion = (
+        np.concatenate([values[family.parity] for family in system]) for values in (solids.moving, solids.motion)
+    )
+    return Answers(
+        tractions,
+        acting @ tractions,
+        acting @ moving,
+        (dual[:, None] * motion).T @ tractions,
+        tuple(free),
+        tuple(coefficients),
+        tuple(family.parity for family in system),
+    )
+
+
+def _basis(fields: Samples, largest: float | None = None) -> Samples:
+    """Orthonormal columns that span fields, but for what is small against the largest, (n, fields)."""
+    from scipy.linalg import qr
+
+    size = largest or float(np.max(np.linalg.norm(fields, axis=0), initial=0.0))
+    count = _SKETCH
+    while True:
+        if not fields.size or size == 0.0:
+            return fields[:, :0]
+        sketched = fields @ _mixing(fields.shape[1], count) if 2 * count < fields.shape[1] else fields
+        basis, upper, _ = qr(sketched, mode="economic", pivoting=True)
+        kept = int(np.count_nonzero(np.abs(np.diag(upper)) > _LEAST * size))
+        if kept < sketched.shape[1] or sketched is fields:
+            found: Samples = basis[:, :kept]
+            return found
+        count *= 2
+
+
+def _rows(basis: Samples) -> np.ndarray:
+    """Rows from which a field's coefficients are found, half as many again as there are fields."""
+    from scipy.linalg import qr
+
+    rows = np.arange(len(basis))
+    found: list[int] = []
+    for wanted in (basis.shape[1], basis.shape[1] // 2):
+        left = np.setdiff1d(rows, found)
+        _, order = qr(basis[left].T, mode="r", pivoting=True)[-2:]
+        found += left[order[:wanted]].tolist()
+    return np.sort(np.array(found, dtype=int))
+
+
+def _split(system: System, rows: np.ndarray) -> list[np.ndarray]:
+    """Unknowns of a system as unknowns of its families."""
+    edges = np.cumsum([0, *(family.dual.size for family in system)])
+    return [rows[(rows >= low) & (rows < high)] - low for low, high in pairwise(edges)]
