@@ -335,6 +335,31 @@ def test_gap_of_a_site_closes_as_its_gradient_says(made: Any) -> None:
             assert found == pytest.approx(-j[i], abs=1e-8), (site, i)
 
 
+def test_gap_of_a_site_is_that_of_its_points(made: Any) -> None:
+    """Rings, edges with a fillet, hemispheres and spheroids, tilted and yawed, against all of their points."""
+    from scipy.spatial.transform import Rotation
+
+    _, links, _ = made()
+    theta, latitude = np.linspace(0.0, 2 * np.pi, 4001), np.linspace(-0.5, 0.5, 401)
+    sites = [*links.sites, np.array([0.002, 0.006, 0.0, 0.003, 0.0]), np.array([0.0, 0.009, 0.0175, 0.0, 0.0])]
+    normal, point, j = np.empty(3), np.empty(3), np.empty(7)
+    for x, ring, half, ball, turning in sites:
+        for angles in ((0.4, 0.1, -0.07), (0.0, 0.02, 0.3), (2.0, -0.2, 0.05)):
+            turned = Rotation.from_euler("xyz", angles)
+            state = np.zeros(kernel.STATES)
+            state[:3] = (0.0, 4e-3, -6e-3)
+            lat = latitude if half else np.zeros(1)
+            across = ring * np.cos(lat)[:, None] * np.stack([np.cos(theta), np.sin(theta)])[:, None, :]
+            along = np.broadcast_to((x + half * np.sin(lat))[:, None], across.shape[1:])
+            points = state[:3] + turned.apply(np.stack([along, *across], axis=-1).reshape(-1, 3))
+            dense = 0.02 - ball - np.hypot(points[:, 1], points[:, 2]).max()
+            site = np.array([x, ring, half, ball, turning])
+            found = contacts.ring_gap(state, turned.as_matrix(), 0.02, site, normal, point, j)
+            assert found == pytest.approx(dense, abs=3e-8), site
+            touching = state[:3] + turned.apply(point)
+            assert 0.02 - np.hypot(*touching[1:]) == pytest.approx(found, abs=1e-14)
+
+
 def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
     """Nose up until the tip is at the wall: its gap is that of points along the wire."""
     _, links, _ = made()

@@ -65,8 +65,9 @@ def ring_gap(
 ) -> float:
     """Gap between the wall and one site, m.
 
-    With the ring's centre c off the tube's axis, n = c/|c| across it and n_1 = n.e_1, the site reaches
-    sqrt(rho^2 (1 - n_1^2) + b^2 n_1^2) + beta beyond c along n.
+    Across the tube the site reaches H(n) = c.n + S(n_1) + beta from the tube's axis along a unit vector n, with the
+    ring's centre c, n_1 = n.e_1 and S^2 = rho^2 (1 - n_1^2) + b^2 n_1^2. The gap is R less the largest H, which
+    Newton's method finds from n = c/|c|; its gradient is that at constant n.
 
     Args:
         y: the state.
@@ -78,27 +79,29 @@ def ring_gap(
         j: result, (7,): the gap closes at j.q at the rates q.
     """
     x, ring, half, ball = site[SITE_X], site[SITE_RING], site[SITE_HALF], site[SITE_BALL]
-    side = y[POSITION + 1] + rotation[1, 0] * x
-    height = y[POSITION + 2] + rotation[2, 0] * x
-    distance = math.hypot(side, height)
-    if distance < 1e-9 * radius:
-        distance, side, height = 1e-9 * radius, 0.0, -1.0
-    else:
-        side, height = side / distance, height / distance
-    n_1 = rotation[1, 0] * side + rotation[2, 0] * height
-    square = (half * n_1) ** 2 + ring**2 * max(1.0 - n_1 * n_1, 0.0)
-    reach = max(math.sqrt(square), 1e-12 * radius)
-    slope = (half**2 - ring**2) * n_1 / reach
-    turning = slope * (-rotation[1, 0] * height + rotation[2, 0] * side) / distance
+    side, up = y[POSITION + 1] + rotation[1, 0] * x, y[POSITION + 2] + rotation[2, 0] * x
+    flat = half**2 - ring**2
+    angle = math.atan2(up, side) if math.hypot(side, up) > 1e-9 * radius else -0.5 * math.pi
+    n_y, n_z, n_1, reach = 0.0, 0.0, 0.0, 0.0
+    for _ in range(12):
+        n_y, n_z = math.cos(angle), math.sin(angle)
+        n_1, turned = n_y * rotation[1, 0] + n_z * rotation[2, 0], n_y * rotation[2, 0] - n_z * rotation[1, 0]
+        reach = math.sqrt(max(ring**2 + flat * n_1 * n_1, 1e-36 * radius**2))
+        slope = flat * n_1 * turned / reach
+        first = n_y * up - n_z * side + slope
+        second = -n_y * side - n_z * up + (flat * (turned * turned - n_1 * n_1) - slope * slope) / reach
+        if second >= 0.0 or abs(first) < 1e-15 * radius:
+            break
+        angle -= min(max(first / second, -0.5), 0.5)
     for i in range(3):
-        normal[i] = rotation[1, i] * side + rotation[2, i] * height
-        j[i] = normal[i] + turning * (-rotation[1, i] * height + rotation[2, i] * side)
-        point[i] = ring * ring * normal[i] / reach + ball * normal[i]
-    point[0] = x + half * half * n_1 / reach + ball * n_1
+        normal[i] = rotation[1, i] * n_y + rotation[2, i] * n_z
+        j[i] = normal[i]
+        point[i] = (ring * ring / reach + ball) * normal[i]
+    arm = x + flat * n_1 / reach
+    point[0] = arm + point[0]
     j[3] = j[6] = 0.0
-    j[4] = -slope * normal[2] - x * j[2]
-    j[5] = slope * normal[1] + x * j[1]
-    return float(radius - distance - reach - ball)
+    j[4], j[5] = -arm * normal[2], arm * normal[1]
+    return float(radius - n_y * side - n_z * up - reach - ball)
 
 
 @compiled
