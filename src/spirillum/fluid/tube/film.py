@@ -1,11 +1,13 @@
 """Reynolds film between a body of revolution and the wall of a circular tube.
 
-Lubrication with the true distance h from the body's surface to the wall and the body's true normal n: the pressure p
-of a rigid motion v = U + Omega x r (viscosity 1, wall at rest) obeys on the body's surface
+Lubrication with the body's true normal n and the true distance h between body and wall, the geometric mean of those
+along the normals of either; lengths are those midway. The pressure p of a rigid motion v = U + Omega x r (viscosity 1,
+wall at rest) obeys
 
-    div(h^3/12 grad p) = div(h v_t/2) - v.n,    p = 0 on the edges of the film,
+    div(h^3/12 grad p) = div(h v_t/2) - v.n J,    p = 0 on the edges of the film,
 
-with v_t the tangential part of v, and the resistance is the dissipation of pressure and shear,
+with v_t the part of v along the body's surface and J the body's area over that midway. The resistance is the
+dissipation of pressure and shear,
 
     R_ij = int h^3/12 grad p_i . grad p_j + g v_ti . v_tj/h dA,    g = 1/(1 + (h/0.2 a)^2),
 
@@ -171,16 +173,19 @@ def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float,
 
 def _assembled(place: Place, surface: Surface, along: _Basis, around: _Basis) -> tuple[Samples, Samples, Samples]:
     """Stiffness (elements, n_u, n_v, n_u, n_v), loads (elements, n_u, n_v, 6) and the shear's resistance."""
-    points, normals, by_u, by_v = surface
-    h = place.clearance(points)
+    points, normals, by_u, by_v, *turning = surface
+    h = place.thickness(points, normals)
     if not h.min() > 0:
         raise InputError(TOUCHES)
+    displaced = np.linalg.norm(np.cross(by_u, by_v), axis=-1)
+    by_u, by_v = (by + 0.5 * h[..., None] * turn for by, turn in zip((by_u, by_v), turning, strict=True))
     normal = np.cross(by_u, by_v)
     squared = np.einsum("abi,abi->ab", normal, normal)
     to_u, to_v = np.cross(by_v, normal), np.cross(normal, by_u)  # gradients of u and v
     to_u, to_v = to_u / squared[..., None], to_v / squared[..., None]
     weights = np.resize(along.weights, h.shape[0])
-    element = weights[:, None] * around.weights * np.sqrt(squared)
+    weights = weights[:, None] * around.weights
+    element = weights * np.sqrt(squared)
     mobility = element * h**3 / 12.0
     uu, vv, uv = (
         mobility * np.einsum("abi,abi->ab", one, other) for one, other in ((to_u, to_u), (to_v, to_v), (to_u, to_v))
@@ -205,7 +210,7 @@ def _assembled(place: Place, surface: Surface, along: _Basis, around: _Basis) ->
     loads = (
         tested(half * (motions @ to_u[..., None])[..., 0], along.slopes, around.values)
         + tested(half * (motions @ to_v[..., None])[..., 0], along.values, around.slopes)
-        + tested(element[..., None] * through[..., 0], along.values, around.values)
+        + tested((weights * displaced)[..., None] * through[..., 0], along.values, around.values)
     )
     thin = 1.0 / (1.0 + (h / (_SHEARED * place.body.radius)) ** 2)
     sheared = (tangential * np.sqrt(element * thin / h)[..., None, None]).swapaxes(0, 2).reshape(6, -1)

@@ -22,6 +22,8 @@ ROUNDED = 0.7
 """Angle of a rounded end that belongs to the film, rad."""
 PATCH = 1.2
 """Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
+_LEAST = 1e-12
+"""Thinnest film over the tube's radius."""
 TOUCHES = "the body touches the wall of the tube"
 _HALF = 0.5 * np.pi
 
@@ -77,6 +79,10 @@ class Surface(NamedTuple):
     """Derivative of the points by u."""
     across: Samples
     """Derivative of the points by v."""
+    turning_along: Samples
+    """Derivative of the normals by u."""
+    turning_across: Samples
+    """Derivative of the normals by v."""
 
 
 class Cuts(NamedTuple):
@@ -143,6 +149,21 @@ class Place:
         height = points @ self.axes[2] - self.offset
         return np.asarray(self.tube - np.hypot(side, height))
 
+    def thickness(self, points: Samples, normals: Samples) -> Samples:
+        """Thickness h of the film at points in F: geometric mean of the distances along both normals, m.
+
+        With it, and lengths measured midway between the surfaces, what is left of the exact resistance hardly knows
+        the gap, for lines and for points of contact.
+        """
+        side, height = points @ self.axes[1], points @ self.axes[2] - self.offset
+        outward = side * (normals @ self.axes[1]) + height * (normals @ self.axes[2])
+        distance = np.hypot(side, height)
+        room = (self.tube - distance) * (self.tube + distance)
+        # the smaller root, without cancellation where the film is thin
+        root = np.sqrt(outward**2 + np.maximum(room, 0.0))
+        along = np.where(outward > 0.0, room / (outward + root), root - outward)
+        return np.asarray(np.sqrt(np.maximum((self.tube - distance) * along, 0.0)))
+
     def bottom(self, x: Samples) -> tuple[Samples, Samples]:
         """Angle at which the straight side faces the wall at x, rad, and its derivative by x.
 
@@ -185,7 +206,7 @@ def _with_side(place: Place, cuts: Cuts) -> Surface:
         gap - f * (1.0 - np.sqrt(1.0 - min(outward * lift, 0.0) ** 2))
         for (_, f), gap, outward in zip(shoulders, gaps, (-1.0, 1.0), strict=True)
     ]
-    if not min(*gaps, *nearest) > 0:
+    if not min(*gaps, *nearest) > _LEAST * place.tube:
         raise InputError(TOUCHES)
     thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
     width = float(np.sqrt(2.0 * thinnest * reduced) / a)
@@ -196,7 +217,7 @@ def _with_side(place: Place, cuts: Cuts) -> Surface:
     )
     x = _stretched(cuts.side, body.rear[0], body.front[0], marks)
     zero, one = np.zeros_like(cuts.side), np.ones_like(cuts.side)
-    parts = [_revolved(place, around, x.slope / cuts.sides, (x.at, a * one), (one, zero), (zero, one))]
+    parts = [_revolved(place, around, x.slope / cuts.sides, (x.at, a * one), (one, zero), (zero, one), (zero, zero))]
     for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
         if f == 0:
             continue
@@ -205,7 +226,7 @@ def _with_side(place: Place, cuts: Cuts) -> Surface:
         angle = _stretched(cuts.rounded, low, high, (mark,))
         sin, cos = np.sin(angle.at), np.cos(angle.at)
         outline = (joint + f * sin, a - f + f * cos)
-        end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos))
+        end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos), (cos, -sin))
         parts.insert(0 if outward < 0 else len(parts), end)
     return Surface(*(np.concatenate(fields) for fields in zip(*parts, strict=True)))
 
@@ -217,13 +238,14 @@ def _revolved(
     outline: tuple[Samples, Samples],
     tangent: tuple[Samples, Samples],
     normal: tuple[Samples, Samples],
+    turning: tuple[Samples, Samples],
 ) -> Surface:
-    """Surface of revolution of an outline (x, rho) with its tangent by s and unit normal; `rate` is ds/du."""
-    turn, turning = place.bottom(outline[0])
+    """Surface of revolution of an outline (x, rho): tangent by s, unit normal, its derivative by s; `rate` is ds/du."""
+    turn, turn_rate = place.bottom(outline[0])
     fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
     theta = around.at + turn[:, None] * fade
     by_v = around.slope * (1.0 - turn[:, None] * 2.0 * around.at / _HALF**2)
-    by_u = ((turning * tangent[0])[:, None] * fade) * rate[:, None]
+    by_u = ((turn_rate * tangent[0])[:, None] * fade) * rate[:, None]
     sin, cos = np.sin(theta), np.cos(theta)
     rho = outline[1][:, None]
     zero = np.zeros_like(sin)
@@ -234,11 +256,14 @@ def _revolved(
     def meridian(pair: tuple[Samples, Samples]) -> Samples:
         return np.asarray(pair[0][:, None, None] * axis + pair[1][:, None, None] * radial)
 
+    steep = normal[1][:, None]
     return Surface(
         meridian(outline),
         meridian(normal),
         meridian(tangent) * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
         (rho * by_v)[..., None] * hoop,
+        meridian(turning) * rate[:, None, None] + (steep * by_u)[..., None] * hoop,
+        (steep * by_v)[..., None] * hoop,
     )
 
 
@@ -260,21 +285,29 @@ def _spheroid(place: Place, cuts: Cuts) -> Surface:
 
         sphere = turned(sb, cb * st, -cb * ct)
         normals = sphere / stretch
-        normals = normals / np.linalg.norm(normals, axis=-1, keepdims=True)
-        along, across = turned(cb, -sb * st, sb * ct), turned(0.0 * sb, cb * ct, cb * st)
-        return Surface(stretch * sphere, normals, stretch * along, stretch * across)
+        size = np.linalg.norm(normals, axis=-1, keepdims=True)
+        normals /= size
+        slopes = turned(cb, -sb * st, sb * ct), turned(0.0 * sb, cb * ct, cb * st)
+        along, across = (stretch * slope for slope in slopes)
+        turning = [slope / (stretch * size) for slope in slopes]
+        first, second = (by - normals * np.sum(normals * by, axis=-1, keepdims=True) for by in turning)
+        return Surface(stretch * sphere, normals, along, across, first, second)
 
     step = 0.05
     probe = np.array([-step, 0.0, step])
     h = place.clearance(patch(probe, probe).points)
-    if h[1, 1] <= 0:
+    if not h[1, 1] > _LEAST * place.tube:
         raise InputError(TOUCHES)
     bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
     beta, theta = (
-        _stretched(unit, -PATCH, PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / bend))),))
+        _stretched(unit, -PATCH, PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / (max(bend, 0.0) + h[1, 1])))),))
         for unit, bend in zip((cuts.patch, cuts.around), bends, strict=True)
     )
     surface = patch(beta.at, theta.at)
+    by_u, by_v = beta.slope[:, None, None] / cuts.patches, theta.slope[:, None]
     return surface._replace(
-        along=surface.along * beta.slope[:, None, None] / cuts.patches, across=surface.across * theta.slope[:, None]
+        along=surface.along * by_u,
+        across=surface.across * by_v,
+        turning_along=surface.turning_along * by_u,
+        turning_across=surface.turning_across * by_v,
     )
