@@ -10,8 +10,9 @@ from typing import Any, Literal, cast
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
-from spirillum.view.figures.style import lay_out, new_figure
+from spirillum.view.figures.style import DPI, lay_out, new_figure
 
 __all__ = ["Sheet", "add_letters", "width_of"]
 
@@ -70,16 +71,18 @@ class Sheet:
     ) -> None:
         self.heights = heights
         self.figure = new_figure(width, 1.5 + 1.2 * sum(heights))
+        self.shown_dpi = self.figure.dpi
+        self.figure.set_dpi(DPI)  # words are measured once for the layout and for the PNG
         rect = (_EDGE, 0.0, 1.0 - 2.0 * _EDGE, 1.0)
         self.figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.06, wspace=0.0, hspace=0.0, rect=rect)
         # One title and one legend find room in a figure; the next ones stand in figures within it.
         outer = _within(self.figure)
-        left: Any = {"x": 0.0, "ha": "left", "wrap": True}
-        outer.suptitle(title, size=11, weight="bold", **left)
+        left: Any = {"x": 0.0, "ha": "left"}
+        _wrap(outer.suptitle(title, size=11, weight="bold", **left))
         if notes:
-            outer.supxlabel("\n".join(notes), size=8, color="#333333", **left)
+            _wrap(outer.supxlabel("\n".join(notes), size=8, color="#333333", **left))
         middle = _within(outer)
-        middle.suptitle(subtitle, size=9, color="#333333", **left)
+        _wrap(middle.suptitle(subtitle, size=9, color="#333333", **left))
         inner = _within(middle)
         _add_legend(inner, legend, "outside upper left")
         _add_legend(inner, legend_below, "outside lower left")
@@ -110,6 +113,7 @@ class Sheet:
         self.figure.set_figheight(self.figure.get_figheight() + missing)
         lay_out(self.figure)
         self.figure.set_layout_engine("none")
+        self.figure.set_dpi(self.shown_dpi)
         return self.figure
 
 
@@ -117,6 +121,35 @@ def _within(figure: Figure | SubFigure) -> SubFigure:
     """A figure within a figure: what its title, legend and notes leave of it."""
     found: Any = figure.subfigures()
     return cast("SubFigure", found)
+
+
+def _wrap(text: Text) -> None:
+    """Break the lines of a text at the free edge at the right of its figure.
+
+    Words are measured one by one: matplotlib measures every beginning of a line, which with formulas takes seconds.
+    """
+    figure = cast("Figure", text.get_figure(root=True))
+    room = (1.0 - 2.0 * _EDGE) * figure.bbox.width
+
+    def width(word: str) -> float:
+        text.set_text(word)
+        return text.get_window_extent().width
+
+    wanted = text.get_text()
+    space = width("n n") - width("nn")
+    widths = {word: width(word) for word in set(wanted.split())}
+    lines = []
+    for line in wanted.split("\n"):
+        words: list[str] = []
+        left = room
+        for word in line.split(" "):
+            if words and widths.get(word, 0.0) > left:
+                lines.append(" ".join(words))
+                words, left = [], room
+            words.append(word)
+            left -= widths.get(word, 0.0) + space
+        lines.append(" ".join(words))
+    text.set_text("\n".join(lines))
 
 
 def _add_legend(

@@ -23,6 +23,7 @@ from spirillum.units import for_people, shown_in
 
 __all__ = [
     "COLOURS",
+    "DPI",
     "Look",
     "Scale",
     "label_of_model",
@@ -74,7 +75,8 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
     "svg.fonttype": "path",
     "svg.hashsalt": "spirillum",
 }
-_DPI = 200
+DPI = 200
+"""Of PNG files."""
 _NO_DATE: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None},
@@ -228,4 +230,4 @@ def save_as(figure: Figure, path: Path) -> None:
     if isinstance(figure.get_layout_engine(), PlaceHolderLayoutEngine):  # what `tight_layout` leaves behind
         figure.set_layout_engine(None)  # else everything is laid out once more before it is drawn
     with styled(), whole_file(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=_DPI, metadata=_NO_DATE[kind])
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
