@@ -13,6 +13,8 @@ from spirillum.papers.biorob2012.evidence import Claim
 from spirillum.results.study_content import FRICTION_MEANINGS
 from spirillum.results.study_report import write_report
 from spirillum.robot.actuation import FrictionReading
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.style import new_figure
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 HOSTILE = "<script>alert(1)</script>"
@@ -59,6 +61,12 @@ def small_study(**more: Any) -> Any:
 def written(dataset: Any, folder: Path) -> Page:
     write_report(dataset, folder, lambda *_: None)
     return Page((folder / "report.html").read_text(encoding="utf-8"))
+
+
+@pytest.fixture
+def blank(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Empty sheets in place of the figures, where only the page's words are looked at."""
+    monkeypatch.setattr(Picture, "figure", lambda _picture: new_figure(1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +148,7 @@ def test_every_friction_reading_has_a_meaning() -> None:
     assert set(FRICTION_MEANINGS) == set(FrictionReading.__args__)
 
 
+@pytest.mark.usefixtures("blank")
 def test_page_and_file_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     stated = [
         Claim("a & b", "1 < 2", "computed so", "agrees", "since"),
@@ -157,6 +166,7 @@ def test_page_and_file_hold_every_claim(monkeypatch: pytest.MonkeyPatch, tmp_pat
         assert f"verdict {verdict}" in classes
 
 
+@pytest.mark.usefixtures("blank")
 def test_study_without_claims_has_an_empty_list(tmp_path: Path) -> None:
     page = written(small_study(), tmp_path)
     assert json.loads((tmp_path / "claims.json").read_text()) == []
@@ -185,6 +195,7 @@ def test_hostile_channel_names_stay_in_the_folder(tmp_path: Path) -> None:
     assert all(path.is_file() for path in (folder / "figures").iterdir())
 
 
+@pytest.mark.usefixtures("blank")
 def test_observations_file_is_named(tmp_path: Path) -> None:
     path = tmp_path / "synthetic.csv"
     path.write_text(
@@ -197,6 +208,7 @@ def test_observations_file_is_named(tmp_path: Path) -> None:
     assert "Nothing in this report is measured" not in page.text
 
 
+@pytest.mark.usefixtures("blank")
 def test_progress_runs_to_its_end(tmp_path: Path) -> None:
     steps: list[tuple[str, int, int]] = []
     write_report(small_study(), tmp_path, lambda what, done, total: steps.append((what, done, total)))

@@ -33,3 +33,9 @@ def observed_study(tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = Path(tmp_path_factory.mktemp("observed")) / "synthetic.csv"
     path.write_text(SYNTHETIC)
     return sp.study(observations=path)
+
+
+@pytest.fixture
+def unplaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Panels and words stay where they are made: finding room for them takes most of the time of a figure."""
+    monkeypatch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)

@@ -31,6 +31,7 @@ def _marks(axes: Any) -> dict[float, float]:
     }
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_marks_stand_at_the_predicted_numbers(both: ModelComparison) -> None:
     panels = comparison_figure(both).axes
     assert [text.get_text() for text in panels[0].get_yticklabels()] == ["sbt*", "rft*"]
@@ -42,18 +43,21 @@ def test_marks_stand_at_the_predicted_numbers(both: ModelComparison) -> None:
         assert efficiency == pytest.approx(100 * answer.hydrodynamic_efficiency)
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_axes_have_names_and_units_and_start_at_zero(both: ModelComparison) -> None:
+    panels = comparison_figure(both).axes
     for axes, words in zip(
-        comparison_figure(both).axes,
+        panels,
         ("advance per turn", "body counter-rotation", "tail torque per rate", "hydrodynamic efficiency"),
         strict=True,
     ):
         assert words in axes.get_xlabel()
         assert axes.get_xlim()[0] == 0
-    units = [axes.get_xlabel() for axes in comparison_figure(both).axes]
+    units = [axes.get_xlabel() for axes in panels]
     assert ["(mm)" in units[0], "N m s/rad)" in units[2], "(%)" in units[3]] == [True, True, True]
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_a_left_handed_robot_advances_too() -> None:
     left = sp.compare_models(sp.load(WIDE, **{"tail.handedness": "left"}), models=["sbt", "rft"], tail_rate=-7.5)
     right = sp.compare_models(WIDE, models=["sbt", "rft"], tail_rate=7.5)
@@ -61,6 +65,7 @@ def test_a_left_handed_robot_advances_too() -> None:
         assert _marks(mirrored) == pytest.approx(_marks(straight))
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_a_bar_spans_a_models_own_error(both: ModelComparison, monkeypatch: pytest.MonkeyPatch) -> None:
     from matplotlib.container import ErrorbarContainer
 
@@ -96,8 +101,9 @@ def test_a_model_without_an_answer_keeps_its_line_and_says_why() -> None:
 )  # fmt: skip
 def test_any_robot_can_be_drawn(fields: dict[str, str], tmp_path: Path) -> None:
     found = sp.compare_models(sp.load(WIDE, **fields), models=["sbt", "rft"])
+    figure = comparison_figure(found)
     for suffix in ("png", "pdf", "svg"):
-        save_as(comparison_figure(found), tmp_path / f"models.{suffix}")
+        save_as(figure, tmp_path / f"models.{suffix}")
         assert (tmp_path / f"models.{suffix}").stat().st_size > 5_000
 
 

@@ -39,6 +39,7 @@ def test_paper_study_has_the_papers_figures(paper_study: Any) -> None:
     assert list(figures_of(paper_study)) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_drop_equals_the_dataset_and_has_the_papers_mean(paper_study: Any) -> None:
     figure = figures_of(paper_study)["drop"].figure()
     free = paper_study.sel(friction="none")
@@ -83,6 +84,7 @@ def test_legend_tells_models_and_bounds_apart(fig5: Any) -> None:
     assert sbt.marker != rft.marker
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_figure_says_that_nothing_is_measured(paper_study: Any) -> None:
     for picture in figures_of(paper_study).values():
         assert "nothing in this figure is measured" in picture.caption
@@ -112,6 +114,7 @@ def test_inferred_friction_equals_the_dataset_and_leaves_negative_values_out(pap
     assert fig5.axes[8].get_yscale() == "log"
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_bound_has_the_papers_largest_reynolds_number(paper_study: Any) -> None:
     figure = figures_of(paper_study)["bound"].figure()
     assert len(figure.axes) == 8
@@ -126,6 +129,7 @@ def test_bound_has_the_papers_largest_reynolds_number(paper_study: Any) -> None:
         assert any(f"{speed:.2f}" in entry for entry in legend_entries(figure))
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_other_studies_do_not_borrow_the_papers_reynolds_number(paper_study: Any) -> None:
     other = paper_study.assign_attrs(claims="none")
     figures = figures_of(other)
@@ -133,6 +137,7 @@ def test_other_studies_do_not_borrow_the_papers_reynolds_number(paper_study: Any
     assert not [line for line in figures["bound"].figure().axes[0].get_lines() if line.get_color() == "black"]
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> None:
     picture = figures_of(observed_study)["fig5-wide"]
     figure = picture.figure()
@@ -152,6 +157,7 @@ def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> 
     np.testing.assert_allclose(model.get_ydata(), expected)
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) -> None:
     figure = figures_of(observed_study)["fig5-wide"].figure()
     wide = observed_study.sel(channel="wide")
@@ -164,6 +170,7 @@ def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) 
     assert np.isnan(curves(figure.axes[7], "rft")[0].get_ydata()).all()
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study: Any) -> None:
     figure = figures_of(observed_study)["fig5-wide"].figure()
     part = observed_study["effective_friction_at_observed_rate"].sel(channel="wide", model="sbt").isel(wavelength=3)
@@ -173,6 +180,7 @@ def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study:
     np.testing.assert_allclose(paper.get_ydata(), part.sel(friction="paper") / factor)
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_unanswered_robots_leave_gaps_and_are_counted() -> None:
     study = {
         "grid": {"channels": {"one": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["2 mm", "25 mm"]}
@@ -237,6 +245,7 @@ def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str],
     return make
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_listed_robots_have_a_point_each(robot_file: Callable[[str, str], str]) -> None:
     robots = [robot_file(f"r{number}", f"{number} mm") for number in (1, 2, 3)]
     dataset = sp.study({"robots": robots, "title": "three"})

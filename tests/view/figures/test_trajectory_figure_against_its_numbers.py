@@ -52,6 +52,7 @@ def panels(dataset: Any) -> dict[str, Any]:
     return {axes.get_ylabel(): axes for axes in trajectory_figure(dataset).axes}
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_path_from_the_side_and_from_above(run: Any) -> None:
     shown = panels(run)
     for label, axis in (("$z$ (mm)", 2), ("$y$ (mm)", 1)):
@@ -64,6 +65,7 @@ def test_path_from_the_side_and_from_above(run: Any) -> None:
         assert shown[label].get_xlabel() == "$x$ (mm)"
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_lines_over_time_show_the_run_in_readable_units(run: Any) -> None:
     shown = panels(run)
     expected = {
@@ -80,6 +82,7 @@ def test_lines_over_time_show_the_run_in_readable_units(run: Any) -> None:
     assert [text.get_text() for text in shown["rate (Hz)"].get_legend().get_texts()] == ["tail", "body", "motor"]
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_powers_that_differ_by_far_stand_on_a_logarithmic_axis(run: Any) -> None:
     shown = panels(run)
     assert shown["power (W)"].get_yscale() == "log"
@@ -89,6 +92,7 @@ def test_powers_that_differ_by_far_stand_on_a_logarithmic_axis(run: Any) -> None
     assert panels(run.drop_vars("electrical_power"))["power (mW)"].get_yscale() == "linear"
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_time_axis_is_shared_and_spans_the_run(run: Any) -> None:
     over_time = [axes for label, axes in panels(run).items() if not label.startswith("$")]
     assert all(axes.get_xlim() == (0.0, 2.0) for axes in over_time)
@@ -106,11 +110,13 @@ def test_events_are_marked_and_named(run: Any) -> None:
 
 
 @pytest.mark.parametrize("events", ["", "not JSON", "[1, 2]", '{"time": 1}', '[{"time": "x", "what": 1}]'])
+@pytest.mark.usefixtures("unplaced")
 def test_events_that_cannot_be_read_cost_only_themselves(run: Any, events: str) -> None:
     run.attrs["events"] = events
     assert len(trajectory_figure(run).axes) == 9
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
     gone = [name for name in run.data_vars if str(name).startswith(("motor", "electrical"))]
     run = run.drop_vars(gone).assign(wobble_angle=("time", 0.1 + 0 * TIME), phase_lag=("time", 0.5 + 0 * TIME))
@@ -120,6 +126,7 @@ def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
     assert shown["phase lag (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.5) + 0 * TIME)
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_panel_of_nothing_but_nan_is_left_out(run: Any) -> None:
     run["wall_gap"][:] = np.nan
     assert not [label for label in panels(run) if label.startswith("gap")]
