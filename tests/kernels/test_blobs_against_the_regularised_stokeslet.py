@@ -89,3 +89,15 @@ def test_moments_against_differences_of_the_kernel(cloud: np.ndarray) -> None:
             np.testing.assert_allclose(velocities[3 * i : 3 * i + 3, q * j : q * j + q], u, atol=1e-4 * size)
             np.testing.assert_allclose(gradients[q * i : q * i + q, q * j : q * j + q], g, atol=2e-3 * size)
     assert np.linalg.eigvalsh(gradients)[0] > 0
+
+
+def test_threads_share_the_points_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    points, sources, forces = (rng.normal(size=(count, 3)) for count in (41, 7, 7))
+    fields = []
+    for threads in (1, 3):
+        monkeypatch.setattr("spirillum.kernels.compiled._THREADS", threads)
+        fields.append(np.zeros((41, 4)))
+        add_blobs(points, sources, forces, np.full(7, 0.01), fields[-1])
+    np.testing.assert_array_equal(*fields)
+    assert np.all(fields[0] != 0)

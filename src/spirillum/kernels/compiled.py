@@ -6,28 +6,62 @@ Kernels assign and multiply element by element: slices of arrays and `@` take se
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from concurrent.futures import ThreadPoolExecutor
+from functools import wraps
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 
-__all__ = ["compiled", "compiled_parallel"]
+__all__ = ["compiled", "compiled_by_rows"]
+
+_THREADS = numba.config.NUMBA_NUM_THREADS
+_SHARES = 4
+"""Shares of the rows for each thread: some rows take longer than others."""
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
 
-def _compile(function: _F, **options: Any) -> _F:
+def compiled(function: _F) -> _F:
+    """Compile a function of numbers and arrays; its machine code is kept on disk for the next process."""
     try:
-        kernel: _F = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        kernel: _F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no folder to keep the machine code in: it is compiled again in every process
-        kernel = numba.njit(nogil=True, error_model="numpy", **options)(function)
+        kernel = numba.njit(nogil=True, error_model="numpy")(function)
     return kernel
 
 
-def compiled(function: _F) -> _F:
-    """Compile a function of numbers and arrays; its machine code is kept on disk for the next process."""
-    return _compile(function)
+def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
+    """Compile a function that works row by row; threads share the rows.
+
+    A loop that Numba parallelises itself takes twice as long to compile.
+
+    Args:
+        places: of the arguments that have one row for each item: arrays, or tuples of arrays.
+    """
+
+    def decorate(function: _F) -> _F:
+        kernel = compiled(function)
+
+        @wraps(function)
+        def call(*arguments: Any) -> None:
+            first = arguments[places[0]]
+            count = len(first[0] if isinstance(first, tuple) else first)
+            if _THREADS == 1:
+                kernel(*arguments)
+                return
+
+            def work(low: int, high: int) -> None:
+                kernel(*(_rows(a, low, high) if n in places else a for n, a in enumerate(arguments)))
+
+            edges = np.linspace(0, count, min(_SHARES * _THREADS, count) + 1).astype(int).tolist()
+            with ThreadPoolExecutor(_THREADS) as pool:
+                list(pool.map(work, edges[:-1], edges[1:]))
+
+        return cast("_F", call)
+
+    return decorate
 
 
-def compiled_parallel(function: _F) -> _F:
-    """Compile a function whose `numba.prange` loops run on several cores; its machine code is kept on disk."""
-    return _compile(function, parallel=True)
+def _rows(argument: Any, low: int, high: int) -> Any:
+    return tuple(part[low:high] for part in argument) if isinstance(argument, tuple) else argument[low:high]

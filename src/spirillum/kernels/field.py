@@ -1,24 +1,23 @@
 """Velocity and pressure at points, from a single layer on solids of revolution and from blobs along wires.
 
-Both come without factors: velocity times 8 pi mu, pressure times 8 pi. A loop over points runs on all cores.
+Both come without factors: velocity times 8 pi mu, pressure times 8 pi. All cores share the points.
 """
 
 from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from spirillum.arrays import Amplitudes, Samples
-from spirillum.kernels.compiled import compiled, compiled_parallel
+from spirillum.kernels.compiled import compiled, compiled_by_rows
 from spirillum.kernels.panels import Panel, cardinals, is_near, next_piece
 from spirillum.kernels.rings import ring_b_v, ring_modes
 
 __all__ = ["add_blobs", "add_layer", "add_moments"]
 
 
-@compiled_parallel
+@compiled_by_rows(0, 4)
 def add_blobs(points: Samples, sources: Samples, forces: Samples, e2: Samples, field: Samples) -> None:
     """Add the flow of regularised Stokeslets; p = (x.f)(2 r^2 + 3 e^2)/r^5 (Cortez, 2001).
 
@@ -29,7 +28,8 @@ def add_blobs(points: Samples, sources: Samples, forces: Samples, e2: Samples, f
         e2: square of the blob radius of each source.
         field: velocity and pressure to add to, (n, 4).
     """
-    for i in numba.prange(points.shape[0]):
+    for i in range(points.shape[0]):
+        u, v, w, pressure = field[i, 0], field[i, 1], field[i, 2], field[i, 3]
         for j in range(sources.shape[0]):
             x = points[i, 0] - sources[j, 0]
             y = points[i, 1] - sources[j, 1]
@@ -38,13 +38,14 @@ def add_blobs(points: Samples, sources: Samples, forces: Samples, e2: Samples, f
             cube = 1.0 / (r2 * math.sqrt(r2))
             dot = x * forces[j, 0] + y * forces[j, 1] + z * forces[j, 2]
             diagonal = (r2 + e2[j]) * cube
-            field[i, 0] += diagonal * forces[j, 0] + dot * cube * x
-            field[i, 1] += diagonal * forces[j, 1] + dot * cube * y
-            field[i, 2] += diagonal * forces[j, 2] + dot * cube * z
-            field[i, 3] += dot * cube * (2.0 + 3.0 * e2[j] / r2)
+            u += diagonal * forces[j, 0] + dot * cube * x
+            v += diagonal * forces[j, 1] + dot * cube * y
+            w += diagonal * forces[j, 2] + dot * cube * z
+            pressure += dot * cube * (2.0 + 3.0 * e2[j] / r2)
+        field[i, 0], field[i, 1], field[i, 2], field[i, 3] = u, v, w, pressure
 
 
-@compiled_parallel
+@compiled_by_rows(0, 4)
 def add_moments(points: Samples, sources: Samples, moments: Samples, e2: Samples, field: Samples) -> None:
     """Add the flow of first moments m of forces: u_a = -m[b, k] d_k G[a, b], and the pressure that goes with it.
 
@@ -55,9 +56,9 @@ def add_moments(points: Samples, sources: Samples, moments: Samples, e2: Samples
         e2: square of the blob radius of each source.
         field: velocity and pressure to add to, (n, 4).
     """
-    for i in numba.prange(points.shape[0]):
+    for i in range(points.shape[0]):
         for j in range(sources.shape[0]):
-            x = points[i] - sources[j]
+            x = (points[i, 0] - sources[j, 0], points[i, 1] - sources[j, 1], points[i, 2] - sources[j, 2])
             r2 = x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + e2[j]
             i3 = 1.0 / (r2 * math.sqrt(r2))
             i5 = i3 / r2
@@ -131,7 +132,7 @@ def _panel_field(
         return
     stack = np.empty((64, 2))
     stack[0, 0], stack[0, 1] = -1.0, 1.0
-    depth = 1
+    depth = int(1.0)  # no literal, see `panels`
     while depth > 0:
         depth = next_piece(stack, depth, 1e-6, target, panel, near, cardinal)
         low, high = stack[depth, 0], stack[depth, 1]
@@ -139,16 +140,19 @@ def _panel_field(
             u = low + 0.5 * (high - low) * (1.0 + abscissas[q])
             cardinals(u, nodes, barycentric, cardinal)
             dx, delta = 0.0, 0.0
-            local[:] = 0.0
             for j in range(p):
                 dx += cardinal[j] * (x - x_p[j])
                 delta += cardinal[j] * (rho - rho_p[j])
-                local += cardinal[j] * density[j]
+            for m in range(modes):
+                for d in range(3):
+                    local[m, d] = 0.0
+                    for j in range(p):
+                        local[m, d] += cardinal[j] * density[j, m, d]
             weight = 0.5 * weights[q] * (high - low) * (rho - delta)
             _add_ring(dx, delta, rho, rho - delta, theta, weight, local, work, out)
 
 
-@compiled_parallel
+@compiled_by_rows(0, 5)
 def add_layer(
     points: Samples, x_p: Samples, rho_p: Samples, density: Amplitudes, rule: tuple[Samples, ...], field: Samples
 ) -> None:
@@ -162,7 +166,7 @@ def add_layer(
         rule: nodes, barycentric weights, finer abscissas and weights, Gauss weights of the nodes.
         field: velocity and pressure to add to, (n, 4).
     """
-    for i in numba.prange(points.shape[0]):
+    for i in range(points.shape[0]):
         theta = math.atan2(points[i, 2], points[i, 1])
         point = (points[i, 0], math.hypot(points[i, 1], points[i, 2]), theta)
         out = np.zeros(4)

@@ -153,11 +153,12 @@ def _other_panel(target: Target, panel: Panel, rule: Rule, work: Work, block: Sa
     """Integrals over a panel that the target lies off: halved until each piece is shorter than its distance."""
     stack = np.empty((64, 2))
     stack[0, 0], stack[0, 1] = -1.0, 1.0
-    depth = 1
+    one = int(1.0)  # no literal: for each value of a literal, callees are compiled once more
+    depth = one
     while depth > 0:
         depth = next_piece(stack, depth, 1e-9, target, panel, rule, work[0])
         low, high = stack[depth, 0], stack[depth, 1]
-        _add_piece(low, high, 1, low, target, panel, rule, work, block)
+        _add_piece(low, high, one, low, target, panel, rule, work, block)
 
 
 @compiled

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.compiled import compiled, compiled_parallel
+from spirillum.kernels.compiled import compiled, compiled_by_rows
 from spirillum.kernels.tube_waves import _flows, _ratios, _wall_inverses, wall_layers
 
 __all__ = ["add_waves", "wave_amplitudes"]
@@ -54,8 +53,9 @@ def _taper(k: float, p: int, radius: float, steepest: float) -> float:
 @compiled
 def _along(k: float, x: Samples, forces: Samples, real: Samples, imaginary: Samples) -> None:
     """Sum exp(i k x) times the forces of one column, even and odd, (2, 3) each."""
-    real[:] = 0.0
-    imaginary[:] = 0.0
+    for parity in range(2):
+        for d in range(3):
+            real[parity, d] = imaginary[parity, d] = 0.0
     for s in range(x.size):
         cos, sin = math.cos(k * x[s]), math.sin(k * x[s])
         for parity in range(2):
@@ -97,7 +97,7 @@ def _reflect(weight: float, layers: Samples, inverses: Samples, amplitudes: Samp
                     amplitudes[parity, phase, p, i] = share * total
 
 
-@compiled_parallel
+@compiled_by_rows(0, 6, 7)
 def wave_amplitudes(
     waves: tuple[Samples, Samples, np.ndarray, Samples],
     radius: float,
@@ -124,7 +124,7 @@ def wave_amplitudes(
     """
     wave_k, weights, orders, bessel = waves
     rho, angle, steepest = columns
-    for n in numba.prange(wave_k.size):
+    for n in range(wave_k.size):
         k, count = wave_k[n], orders[n]
         wall = k * radius
         inverses, r, v = np.empty((count, 10)), np.empty(count + 2), np.empty((3, 3))
@@ -158,7 +158,7 @@ def wave_amplitudes(
         _reflect(weights[n], wall_layers(wall, bessel[n], count), inverses, amplitudes[n])
 
 
-@compiled_parallel
+@compiled_by_rows(0, 1, 6)
 def add_waves(
     points: Samples,
     steepest: Samples,
@@ -182,7 +182,7 @@ def add_waves(
         field: velocity (x, y, z) and pressure to add to, (n, 4).
     """
     wave_k, orders = waves
-    for i in numba.prange(points.shape[0]):
+    for i in range(points.shape[0]):
         rho, angle = math.hypot(points[i, 1], points[i, 2]), math.atan2(points[i, 2], points[i, 1])
         r, v, push = np.empty(steps.shape[1] + 2), np.empty((3, 3)), np.zeros(3)
         total = np.zeros(4)

@@ -216,7 +216,8 @@ def observe(time: Samples, states: Samples, data: Samples, out: Samples) -> None
     work, dy = data[:_WORK], np.empty(STATES)
     for row in range(time.size):
         rates(dy, time[row], states[row], data)
-        out[row] = work[_OUT:_ROTATION]
+        for column in range(_ROTATION - _OUT):
+            out[row, column] = work[_OUT + column]
 
 
 @compiled
