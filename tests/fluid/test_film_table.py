@@ -1,0 +1,122 @@
+"""The tabulated film against the direct solution, and what must hold anywhere."""
+
+import numpy as np
+import pytest
+
+from spirillum.errors import InputError
+from spirillum.fluid.tube.film import FilmTable, film_resistance
+from spirillum.kernels.film_table import film_at, smallest_gap
+from spirillum.robot.outline import body_outline
+
+TUBE, A = 20e-3, 9e-3
+CAPSULE = body_outline("capsule", 2 * A, 35e-3, 0.0, "hemisphere", "flat")
+MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+
+
+@pytest.fixture(scope="module")
+def table():
+    return FilmTable.of(CAPSULE, TUBE, intervals=9)
+
+
+def offset_at(packed, gap, p, psi):
+    low, high = 0.0, TUBE
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if smallest_gap(packed, middle, p, psi) > gap else (low, middle)
+    return low
+
+
+def errors(table, seed, count, pitch):
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        gap = A * np.exp(rng.uniform(np.log(1e-3), np.log(0.2)))
+        p, psi = pitch * rng.uniform(-1, 1) * rng.uniform() ** 2, rng.uniform(-0.12, 0.12)
+        e = offset_at(table.packed, gap, p, psi)
+        film, smallest = table.at(e, p, psi)
+        assert smallest == pytest.approx(gap, rel=1e-6)
+        direct = film_resistance(CAPSULE, TUBE, e, p, psi)
+        roots = np.sqrt(np.diag(direct))
+        found.append(np.abs((film - direct) / np.outer(roots, roots)).max())
+    return np.array(found)
+
+
+def test_coarse_table_is_near_the_direct_solution(table):
+    found = errors(table, 0, 40, 0.1)
+    assert found.max() < 2e-2
+    assert np.median(found) < 2e-3
+
+
+@pytest.mark.slow
+def test_table_is_the_direct_solution():
+    table = FilmTable.of(CAPSULE, TUBE)
+    few_degrees = errors(table, 0, 200, 0.1)
+    assert few_degrees.max() < 3e-3
+    assert np.median(few_degrees) < 3e-4
+    assert errors(table, 1, 100, 0.2).max() < 1e-2
+    assert table.packed.nbytes < 100_000
+
+
+def test_table_is_symmetric_positive_and_mirrored_anywhere(table):
+    rng = np.random.default_rng(2)
+    out = np.empty((6, 6))
+    for _ in range(300):
+        e, p, psi = rng.uniform(0, 12e-3), rng.uniform(-0.4, 0.4), rng.uniform(-0.3, 0.3)
+        film_at(table.packed, e, p, psi, out)
+        roots = np.sqrt(np.diag(out))
+        scaled = out / np.outer(roots, roots)
+        assert np.abs(scaled - scaled.T).max() < 1e-10
+        mirrored = np.empty((6, 6))
+        film_at(table.packed, e, p, -psi, mirrored)
+        assert np.abs((MIRROR @ mirrored @ MIRROR - out) / np.outer(roots, roots)).max() < 1e-10
+        if smallest_gap(table.packed, e, p, psi) > 1e-5 * A:
+            assert np.linalg.eigvalsh(scaled).min() > 0
+
+
+def test_film_below_the_table_goes_on_as_the_power_law(table):
+    thin, thinner = (table.at(11e-3 - gap, 0.0, 0.0)[0][2, 2] for gap in (4e-5 * A, 2e-5 * A))
+    assert thinner / thin == pytest.approx(2**1.5, rel=0.1)
+
+
+def test_film_is_smooth_along_offset_pitch_and_yaw(table):
+    """No jumps of the second differences, through knots and through the tube's axis in pitch."""
+    for path in (
+        lambda t: (11e-3 * (1 - 10 ** (-0.2 - 3.0 * t)), 0.15 * 10 ** (-0.2 - 3.0 * t), 0.0),
+        lambda t: (8e-3, -0.1 + 0.2 * t, 0.02),
+        lambda t: (10e-3, 0.01, -0.12 + 0.24 * t),
+        lambda t: (4e-3 * t, 0.03, 0.02),
+    ):
+        logs = np.array([np.log(np.diag(table.at(*path(t))[0])) for t in np.linspace(0, 1, 801)])
+        bends = np.diff(logs, 2, axis=0)
+        assert np.abs(np.diff(bends, axis=0)).max() < 2e-5
+
+
+def test_smallest_gap_is_that_of_the_surface(table):
+    s, theta = np.linspace(0, 1, 801), np.linspace(-np.pi, np.pi, 1441)
+    for e, p, psi in ((8e-3, 0.1, 0.05), (8e-3, -0.1, 0.05), (5e-3, -0.2, -0.1), (9e-3, 0.02, 0.1), (2e-3, 0.3, 0.1)):
+        axis = np.array([np.cos(p) * np.cos(psi), np.cos(p) * np.sin(psi), np.sin(p)])
+        side = np.array([-np.sin(psi), np.cos(psi), 0.0])
+        up = np.cross(axis, side)
+        nearest = np.inf
+        for piece in CAPSULE.pieces:
+            x, rho = (part[:, None] for part in piece.points(s))
+            y = x * axis[1] + rho * (np.sin(theta) * side[1] - np.cos(theta) * up[1])
+            z = x * axis[2] + rho * (np.sin(theta) * side[2] - np.cos(theta) * up[2]) - e
+            nearest = min(nearest, (TUBE - np.hypot(y, z)).min())
+        assert smallest_gap(table.packed, e, p, psi) == pytest.approx(nearest, abs=2e-7)
+
+
+def test_table_of_a_sphere_turns_with_it():
+    sphere = body_outline("sphere", 2 * A, 2 * A, 0.0, None, None)
+    table = FilmTable.of(sphere, TUBE, intervals=9)
+    for e, p, psi in ((10.9e-3, 0.3, 0.05), (10.99e-3, -0.1, -0.1), (5e-3, 0.0, 0.02), (0.0, 0.1, 0.0)):
+        direct = film_resistance(sphere, TUBE, e, p, psi)
+        roots = np.sqrt(np.diag(direct))
+        assert np.abs((table.at(e, p, psi)[0] - direct) / np.outer(roots, roots)).max() < 3e-3
+
+
+def test_bodies_without_a_table_are_refused():
+    with pytest.raises(InputError, match="does not fit"):
+        FilmTable.of(CAPSULE, 8e-3)
+    with pytest.raises(InputError, match="straight sides"):
+        FilmTable.of(body_outline("capsule", 2 * A, 19e-3, 0.0, "hemisphere", "hemisphere"), TUBE)
