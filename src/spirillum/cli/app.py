@@ -194,7 +194,10 @@ def resistance(
     robot: RobotArgument,
     part: Annotated[
         str | None,
-        typer.Option(autocompletion=complete_parts, help="body, coupling, tail, rotor or robot (joint locked)."),
+        typer.Option(
+            autocompletion=complete_parts,
+            help="body, coupling, tail, rotor or robot (joint locked): 6x6; both (body and rotor): 12x12.",
+        ),
     ] = None,
     model: Annotated[
         str,
@@ -216,7 +219,7 @@ def resistance(
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Give the 6x6 resistance matrix of a robot or one of its parts, never calibrated.
+    """Give the resistance matrix of a robot, of one of its parts or of its two links, never calibrated.
 
     Example: `spirillum resistance biorob2012-wide --part tail --about tail-root`
     """

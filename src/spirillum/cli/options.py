@@ -73,7 +73,7 @@ def complete_resistance_models(incomplete: str) -> list[str]:
 
 def complete_parts(incomplete: str) -> list[str]:
     """Parts of a robot."""
-    return starting(("body", "coupling", "robot", "rotor", "tail"), incomplete)
+    return starting(("body", "both", "coupling", "robot", "rotor", "tail"), incomplete)
 
 
 def complete_planes(incomplete: str) -> list[str]:

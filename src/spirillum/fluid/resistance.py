@@ -1,4 +1,4 @@
-"""The 6x6 resistance matrix of a robot or one of its parts."""
+"""The 6x6 resistance matrix of a robot or one of its parts, or the 12x12 of its two links."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
-from spirillum.fluid.algebra import about_point
-from spirillum.fluid.model import PARTS, ResistanceModel
+from spirillum.fluid.algebra import transfer
+from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
 from spirillum.fluid.registry import check_placement, find_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -26,18 +26,21 @@ from spirillum.units import KINDS, parse_option
 __all__ = ["Resistance", "resistance"]
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
+_BOTH = "both"
+_LINKS = ("body", "rotor")
+"""Order of the two links in a 12x12."""
 
 
 @dataclass(frozen=True)
 class Resistance:
-    """F = -B V for one part: force and torque against velocity and rotation, never calibrated."""
+    """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 
     robot: Robot
     """The robot."""
     model: ResistanceModel
     """The hydrodynamic model."""
     part: str
-    """The part."""
+    """The part; `both` for body and rotor, each with a motion of its own."""
     about: str
     """Reference point: the body's mid-length, or the tail's root; both on the motor axis."""
     phase: float
@@ -45,7 +48,7 @@ class Resistance:
     placement: dict[str, Any]
     """Where the model places the robot."""
     matrix: Samples
-    """B, 6x6, SI; NaN where the model does not know an entry."""
+    """B, 6x6, or 12x12 for body and rotor in this order, SI; NaN where the model does not know an entry."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
 
@@ -56,14 +59,17 @@ class Resistance:
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum resistance --json`."""
+        count = len(self.matrix) // 6
+        units = [row * count for row in _UNITS] * count
         content = {
             "robot": self.robot.name,
             "model": self.model.name,
             "part": self.part,
+            **({"links": list(_LINKS)} if self.part == _BOTH else {}),
             "about": self.about,
             "phase": quantity(self.phase, "rad"),
             "placement": self.placement,
-            "matrix": {**quantity(self.matrix, ""), "unit": _UNITS},
+            "matrix": {**quantity(self.matrix, ""), "unit": units},
             "references": list(self.references),
         }
         return envelope("resistance", content, self.warnings)
@@ -79,11 +85,13 @@ def resistance(
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> Resistance:
-    """Resistance matrix of one part alone in the same fluid.
+    """Resistance matrix of one part alone in the same fluid, or of body and rotor together.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked); None: the robot, or what the model knows.
+        part: `body`, `coupling`, `tail`, `rotor` or `robot` (joint locked), alone in the fluid: 6x6; or `both`, body
+            and rotor beside each other with motions of their own, about the same point: 12x12. None: the robot, or what
+            the model knows.
         model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
@@ -98,10 +106,12 @@ def resistance(
     ready = with_resolution(ready, resolution, model)
     if part is None:
         part = "robot" if "robot" in chosen.parts else chosen.parts[0]
-    if part not in PARTS:
-        raise InputError(f"part = {part!r}{did_you_mean(str(part), PARTS)}; allowed: {', '.join(PARTS)}")
-    if part not in chosen.parts:
-        raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(chosen.parts)}")
+    if part not in (*PARTS, _BOTH):
+        allowed = (*PARTS, _BOTH)
+        raise InputError(f"part = {part!r}{did_you_mean(str(part), allowed)}; allowed: {', '.join(allowed)}")
+    known = (*chosen.parts, _BOTH) if isinstance(chosen, SwimmerModel) else chosen.parts
+    if part not in known:
+        raise InputError(f"part = {part!r} with model '{model}'; allowed: {', '.join(known)}")
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
     angle = parse_option("phase", phase, KINDS["angle"])
@@ -110,13 +120,18 @@ def resistance(
     outside = broken(chosen.part_domain(batch, part))
     if outside:
         raise InputError(f"{ready.name} with model '{model}': {outside[0].sentence()}")
-    matrix = chosen.part_matrix(batch, part, np.array([angle]))
-    if about == "tail-root":
+    phases = np.array([angle])
+    if part == _BOTH and isinstance(chosen, SwimmerModel):
+        matrix = chosen.resistance(batch, phases)[0]
+    else:
+        matrix = chosen.part_matrix(batch, part, phases)[0]
+    if about == "tail-root" and not chosen.axial_only:
         # A shift along the axis leaves axial entries as they are, and the others of an axial model stay unknown.
-        root = np.array([[-float(batch.root[0]), 0.0, 0.0]])
-        matrix = matrix if chosen.axial_only else about_point(matrix, root)
+        root = np.array([-float(batch.root[0]), 0.0, 0.0])
+        moved = np.kron(np.eye(len(matrix) // 6), transfer(-root))
+        matrix = moved.T @ matrix @ moved
     place = chosen.placement_of(batch)
-    return Resistance(ready, chosen, part, about, angle, place, matrix[0], _warnings(ready, chosen, batch, part))
+    return Resistance(ready, chosen, part, about, angle, place, matrix, _warnings(ready, chosen, batch, part))
 
 
 def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:
@@ -127,6 +142,6 @@ def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str
         found.append(
             f"model '{model.name}' gives the entries along and about the motor axis only; the others are unknown"
         )
-    if part in ("rotor", "robot") and robot.coupling.length > 0 and "coupling" not in model.parts:
+    if part in ("rotor", "robot", _BOTH) and robot.coupling.length > 0 and "coupling" not in model.parts:
         found.append(f"model '{model.name}' leaves the coupling out")
     return tuple(found)
