@@ -183,3 +183,10 @@ def test_ecolis_bundle_is_of_the_size_measured(model: str) -> None:
     b = sp.resistance("ecoli", part="tail", model=model).matrix
     for found, measured in ((b[0, 0], 1.48e-8), (abs(b[0, 3]), 7.9e-16), (b[3, 3], 7e-22)):
         assert 0.5 < found / measured < 2.0
+
+
+@pytest.mark.parametrize("axis", ["z", [0.0, 0.0, 1.0], "10 deg"])
+def test_a_field_about_another_axis_is_refused(axis: object) -> None:
+    with pytest.raises(sp.InputError, match=r"magnetic\.axis = .* is not allowed; allowed: 'x'"):
+        sp.load("magnetic-helix", **{"magnetic.axis": axis})
+    assert sp.load("magnetic-helix", **{"magnetic.axis": "x"}) == sp.load("magnetic-helix")

@@ -113,6 +113,8 @@ class Magnetic(Section):
     """Flux density B of the field, which is at right angles to its axis of rotation."""
     rotation_rate: Rate
     """Rotation rate of the field about +x in the lab."""
+    axis: Literal["x"] = "x"
+    """Axis about which the field turns: `x`, the lab's and the channel's; no other is computed."""
 
 
 class Friction(Section):
