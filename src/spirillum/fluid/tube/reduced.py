@@ -113,7 +113,7 @@ class Reduced:
         at_stations = each(lambda k: point_waves(placed, self.waves, k), range(self.waves.k.size))
         found = []
         for answers in self.answers:
-            free = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
+            free: list[Samples] = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
             for parity, m, coefficients in answers.free:
                 turn = sources.turn(m, coefficients.shape[1])
                 free.append(sources.columns(coefficients * (turn.imag if parity else turn.real)))
@@ -165,7 +165,8 @@ def _mixing(size: int, count: int) -> Samples:
     """Random combinations, (size, count); the unit matrix where they are no fewer."""
     if count >= size:
         return np.eye(size)
-    return np.random.default_rng(0).standard_normal((size, count)) / np.sqrt(count)
+    mixed: Samples = np.random.default_rng(0).standard_normal((size, count)) / np.sqrt(count)
+    return mixed
 
 
 def _duals(system: System) -> Samples:

@@ -349,27 +349,29 @@ class TiltedRings(Rings):
     def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
         tiers, lock = self._tiers(systems), Lock()
+        alike = [tier.averaged is tier.sample for tier in tiers]  # among those the wall's part is symmetric
         blocks = {
             (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size))
             for a in range(len(tiers))
             for b in range(len(tiers))
             for s in range(len(systems))
+            if not (alike[a] and alike[b] and a > b)
         }
 
         def lessen(number: int) -> None:
             nearest = min(tier.distance for tier in tiers)
             orders = [waves.orders_between(number, 0.5 * (tier.distance + nearest)) for tier in tiers]
             reached = [(t, tier, count) for t, (tier, count) in enumerate(zip(tiers, orders, strict=True)) if count]
-            sides = [
-                (
-                    self._on_rings(waves, number, tier, tier.sample, count),
-                    self._on_rings(waves, number, tier, tier.averaged, count),
-                )
-                for _, tier, count in reached
-            ]
+            sides = []
+            for t, tier, count in reached:
+                targets = self._on_rings(waves, number, tier, tier.sample, count)
+                averages = targets if alike[t] else self._on_rings(waves, number, tier, tier.averaged, count)
+                sides.append((targets, averages))
             for (a, tier_a, count_a), (targets, _) in zip(reached, sides, strict=True):
                 pressed = [times_layers(target, waves, number) for target in targets]
                 for (b, tier_b, count_b), (_, sources) in zip(reached, sides, strict=True):
+                    if (a, b, 0) not in blocks:
+                        continue
                     far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
                     count = min(count_a, count_b, far)
                     for s in range(len(systems)) if count else ():
@@ -381,15 +383,18 @@ class TiltedRings(Rings):
         each(lessen, range(waves.k.size))
         duals = [np.concatenate([family.dual for family in system]) for system in systems]
         for (a, b, s), block in blocks.items():
-            columns = tiers[b].unknowns[s]
-            matrices[s][np.ix_(tiers[a].unknowns[s], columns)] -= block * duals[s][columns]
+            rows, columns = tiers[a].unknowns[s], tiers[b].unknowns[s]
+            matrices[s][np.ix_(rows, columns)] -= block * duals[s][columns]
+            if a != b and (b, a, s) not in blocks:
+                matrices[s][np.ix_(columns, rows)] -= block.T * duals[s][rows]
 
     def sent(
         self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
     ) -> list[Samples]:
         """See `Rings.sent`."""
         tiers = self._tiers(systems)
-        found = [np.zeros((sum(family.dual.size for family in system), forces.shape[1])) for system in systems]
+        sizes = [sum(family.dual.size for family in system) for system in systems]
+        found: list[Samples] = [np.zeros((size, forces.shape[1])) for size in sizes]
         parities = [[family.parity for family in system] for system in systems]
         lock = Lock()
 
