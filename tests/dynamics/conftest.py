@@ -80,7 +80,7 @@ def resistance_at(table, e, p, psi, phi, out):
             for i in range(6):
                 for j in range(6):
                     out[i, j] += length * weights[row] * rows[row, i] * rows[row, j]
-    return 2 if abs(p) > table[68] else 0
+    return 1 if abs(p) > table[68] else 0
 """
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,15 @@ import spirillum as sp
 from spirillum.dynamics import tube_integration
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
+from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
+from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.dynamics.tube_start import Start, laid_down
 from spirillum.errors import InputError
 from spirillum.kernels import contacts, dry_friction, rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.placement import Placement
 from spirillum.swimming.freedom import LINKS
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import calibrated_resistance
@@ -418,3 +422,33 @@ def test_start_has_the_gap_pitch_yaw_and_azimuth_asked_for(made: Any) -> None:
         laid_down(steady.robot, links, Start(gap=0.02))
     with pytest.raises(InputError, match="cut"):
         laid_down(steady.robot, links, Start(gap=5e-4, pitch=0.2))
+
+
+def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any) -> None:
+    """Ends, flow over time, waiting, friction, and the table's error; the flow file is checked."""
+    steady, links, _ = made()
+    table = SimpleNamespace(packed=links.table, error={"forward_velocity": 0.02, "other": 0.03}, key="name")
+    file = tmp_path / "flow.csv"
+    file.write_text("# pulsating\ntime_s,flow_mm_s\n0,0\n1,2\n2,-1\n")
+    asked = InTube.of({"azimuth": "20 deg", "wait": "2 s", "friction_coefficient": 0.2, "flow": file})
+    placed = Placement.of({"gap": "0.3 mm", "yaw": "1 deg", "pitch": "-0.5 deg"})
+    times = Timing(duration="2 s")
+    found = run_in_tube(steady, table, times, placed, asked, 1e-4, True, None)
+    np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], [0, 1, 2], [0, 2e-3, -1e-3]), atol=1e-15)
+    assert found.attrs["ends"] == "imposed flow"
+    assert found.attrs["wait"] == 2.0
+    assert found.attrs["friction_coefficient"] == 0.2
+    assert found.attrs["roughness"] == 1e-4
+    assert found.attrs["error_estimate"] == 0.03
+    assert float(found["electrical_energy"][0]) == 0.0
+    open_ended = run_in_tube(steady, table, times, placed, InTube(), None, True, None)
+    assert open_ended.attrs["ends"] == "open"  # the channel has a length
+    for text, words in (
+        ("time_s,flow\n0,1\n", "columns"),
+        ("time_s,flow_mm_s\n", "no rows"),
+        ("time_s,flow_mm_s\n0,x\n", "flow_mm_s = x"),
+        ("time_s,flow_mm_s\n1,1\n1,2\n", "does not follow"),
+    ):
+        file.write_text(text)
+        with pytest.raises(InputError, match=words):
+            read_flow(file)

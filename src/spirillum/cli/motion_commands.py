@@ -30,7 +30,7 @@ _FullModel = Annotated[
     str | None,
     typer.Option(
         autocompletion=complete_models,
-        help="Hydrodynamic model: rft or slender; held also sbt, tube. Else that of the calibration, or rft.",
+        help="Hydrodynamic model: rft, slender or tube; held also sbt. Else that of the calibration, or rft.",
     ),
 ]
 _RunMotion = Annotated[
@@ -75,6 +75,27 @@ def simulate(
     roughness: Annotated[
         str | None, typer.Option(metavar="LENGTH", help="Free: roughness under the robot, else 1e-4 of its radius.")
     ] = None,
+    yaw: Annotated[
+        str | None, typer.Option(metavar="ANGLE", help="Free, tube: angle of the nose to +y at the start.")
+    ] = None,
+    azimuth: Annotated[
+        str | None,
+        typer.Option(metavar="ANGLE", help="Free, tube: azimuth of the body's centre about +x from the lowest place."),
+    ] = None,
+    ends: Annotated[str | None, typer.Option(help="Free, tube: ends of the channel, open or closed.")] = None,
+    flow: Annotated[
+        str | None,
+        typer.Option(
+            metavar="VELOCITY|FILE",
+            help="Free, tube: imposed mean flow, such as 1mm/s, or over time: CSV with the columns time_s, flow_mm_s.",
+        ),
+    ] = None,
+    friction_coefficient: Annotated[
+        float | None, typer.Option(help="Free, tube: coefficient of dry friction where asperities touch; else 0.1.")
+    ] = None,
+    wait: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.")
+    ] = None,
     samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.")] = None,
     movie: Annotated[
@@ -100,6 +121,7 @@ def simulate(
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)
+    over_time = flow is not None and flow.lower().endswith(".csv")
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
     if movie is not None:
         _check_movie(movie)
@@ -122,9 +144,15 @@ def simulate(
             posterior=posterior,
             draws=draws,
             resolution={"accuracy": accuracy},
-            placement=placement_from(gap, eccentricity, pitch, None, None, None),
+            placement=placement_from(gap, eccentricity, pitch, None, ends, None if over_time else flow, yaw),
             weight=not no_weight,
             roughness=roughness,
+            in_tube={
+                "azimuth": azimuth,
+                "wait": wait,
+                "friction_coefficient": friction_coefficient,
+                "flow": flow if over_time else None,
+            },
             progress=progress,
         )
         write_dataset(dataset, target)

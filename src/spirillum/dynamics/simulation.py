@@ -14,13 +14,16 @@ from spirillum.dynamics.fitted_runs import DRAWS, chosen_model, with_intervals
 from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.start import reach_of, start_state
+from spirillum.dynamics.start import reach_of, start_state, turning_rate
 from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
 from spirillum.robot.load import load
@@ -28,7 +31,8 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
-from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import friction_reading
 from spirillum.units import KINDS, parse_option, show
 
@@ -53,16 +57,18 @@ def simulate(
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
     roughness: str | float | None = None,
+    in_tube: InTube | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate swimming from rest.
 
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
-    model (without walls); films of fluid keep it off the wall of its channel. This is a first form of motion in a tube.
+    model (without walls); films of fluid keep it off the wall of its channel. With `tube` the walls, film, contact and
+    dry friction are those of the robot's table (`spirillum.prepare`), which is made first where there is none.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
-        model: `rft` or `slender`; with `motion="held"` also `sbt` or `tube`. None: the model to which the posterior or
+        model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`. None: the model to which the posterior or
             the calibration was fitted, or `rft` without one.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
             `free`, but `held` where the model is that of a posterior or calibration and cannot be free.
@@ -79,6 +85,8 @@ def simulate(
             starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
         weight: let weight and buoyancy act on the free robot, if its masses are known.
         roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
+        in_tube: with a free robot and `tube`: `azimuth`, `wait`, `friction_coefficient` and `flow` over time, see
+            `InTube`; its placement may have yaw, ends and a constant flow, too.
         progress: told what is being computed, how much is done, and of how much.
 
     Returns:
@@ -96,13 +104,17 @@ def simulate(
         known = read_posterior(posterior, *([] if model is None else [model]))
     placed, times = Placement.of(placement), Timing.of(timing)
     model, motion, said = chosen_model(model, motion, calibration, known)
-    held = motion_of(motion) == "held"
+    held, asked = motion_of(motion) == "held", InTube.of(in_tube)
+    walled = model == "tube" and not held
     if held:
         _check_held(placed, roughness, weight=weight)
-    else:
+    elif not walled:
         check_full(find_swimmer_model(model))
+    if not walled and asked != InTube():
+        raise InputError("in_tube is given without walls; allowed: only with model 'tube' and motion 'free'")
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None) -> xr.Dataset:
+        table = _table(one, placed, asked, tell) if walled else None
         steady = predict(
             one,
             model=model,
@@ -110,8 +122,13 @@ def simulate(
             calibrated=calibrated,
             calibration=calibration,
             resolution=resolution,
+            placement=placed if walled else None,
+            band=not walled,
             progress=tell,
         )
+        if table is not None:
+            height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+            return run_in_tube(steady, table, timing, placed, asked, height, weight, tell)
         return held_run(steady, timing) if held else _free_run(steady, timing, placed, roughness, weight, tell)
 
     own = load(robot)
@@ -127,6 +144,13 @@ def simulate(
     return dataset.assign_attrs(warnings="\n".join([*said, *warnings]))
 
 
+def _table(robot: Robot, placed: Placement, asked: InTube, progress: Progress | None) -> TubeTable:
+    """The robot's table, made if there is none, once all else is known to be right."""
+    _, _, batch = prepared(robot, "tube", placement=placed)
+    check_in_tube(robot, placed, asked)
+    return table_for(batch, progress=progress)
+
+
 def _free_run(
     steady: Prediction,
     times: Timing,
@@ -137,7 +161,7 @@ def _free_run(
 ) -> xr.Dataset:
     """A run with six degrees of freedom."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
-    end, time, switches = times.timetable(2.0 * np.pi / _turning(steady), own)
+    end, time, switches = times.timetable(2.0 * np.pi / turning_rate(steady), own)
     links = _links(steady, roughness, weight=weight)
     start = start_state(steady.robot, placed, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
     _check_clear(links, start, placed)
@@ -199,22 +223,6 @@ def _check_held(placement: Placement, roughness: str | float | None, *, weight: 
     ]
     if given:
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
-
-
-def _turning(steady: Prediction) -> float:
-    """Steady rate of the tail, or of the field, rad/s, positive.
-
-    Raises:
-        InputError: if nothing turns.
-    """
-    rate = steady.tail_rotation_rate
-    if steady.robot.magnetic is not None:
-        rate = steady.robot.magnetic.rotation_rate
-    if rate == 0:
-        kind = "duty" if steady.batch.drive == "dc-motor" else steady.batch.drive
-        field = "magnetic.rotation_rate" if kind == "magnetic" else f"drive.{kind}"
-        raise InputError(f"{field} = 0: the tail does not turn; allowed: any other, and `on` for switching off")
-    return abs(rate)
 
 
 def _links(steady: Prediction, roughness: str | float | None, *, weight: bool) -> TwoLinks:

@@ -13,9 +13,10 @@ from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat, gap_of, largest_gap
+from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
 
-__all__ = ["reach_of", "start_state"]
+__all__ = ["reach_of", "start_state", "turning_rate"]
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
@@ -84,3 +85,19 @@ def reach_of(robot: Robot) -> Reach:
         middle=-0.5 * (robot.coupling.length + robot.tail.length),  # where the robot's own middle is at first
         charge=np.inf if charge is None else charge,
     )
+
+
+def turning_rate(steady: Prediction) -> float:
+    """Steady rate of the tail, or of the field, rad/s, positive.
+
+    Raises:
+        InputError: if nothing turns.
+    """
+    rate = steady.tail_rotation_rate
+    if steady.robot.magnetic is not None:
+        rate = steady.robot.magnetic.rotation_rate
+    if rate == 0:
+        kind = "duty" if steady.batch.drive == "dc-motor" else steady.batch.drive
+        field = "magnetic.rotation_rate" if kind == "magnetic" else f"drive.{kind}"
+        raise InputError(f"{field} = 0: the tail does not turn; allowed: any other, and `on` for switching off")
+    return abs(rate)

@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach, Trajectory
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.kernels import rigid_links, tube_motion, tube_steps
+from spirillum.kernels import rigid_links, tube_motion, tube_steps, tube_table
 
 __all__ = ["INTEGRATOR", "TOLERANCE", "Checkpoint", "TubeTrajectory", "integrate_in_tube", "observed_at"]
 
@@ -227,7 +227,7 @@ def _crossed(
     return ""
 
 
-_RANGES = {1: "offset", 2: "pitch", 3: "yaw"}
+_RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
 """What `resistance_at` says was left."""
 
 

@@ -1,0 +1,80 @@
+"""What a run in a tube is told beside the placement: azimuth, waiting time, dry friction, and a flow over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.formats.tables import number_in, read_table
+from spirillum.robot.arguments import Options, in_range, refusal
+from spirillum.robot.fields import Angle, Time
+
+__all__ = ["FLOW_COLUMNS", "InTube", "read_flow"]
+
+FLOW_COLUMNS = ("time_s", "flow_mm_s")
+"""Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
+_WHAT = "a flow file (CSV with the columns time_s and flow_mm_s)"
+_LARGEST = 64 << 20
+_LIMITS = ((0.0, 1e9), (-1e6, 1e6))
+
+
+def _file(value: Any) -> Any:
+    if not (value is None or isinstance(value, (str, Path))):
+        raise refusal(f"= {str(value)[:40]}; allowed: a flow file; a constant flow is placement.flow")
+    return value
+
+
+class InTube(Options):
+    """Start, surroundings and contact of a run in a tube, beside its placement."""
+
+    argument: ClassVar[str] = "in_tube"
+    prefixed: ClassVar[bool] = True
+
+    azimuth: Angle = 0.0
+    """Azimuth of the body's centre about +x from the lowest place; gap, pitch and yaw are against the wall there."""
+    wait: Time | None = None
+    """Time for which the robot lies with its drive off before the run."""
+    friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
+    """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
+    flow: Annotated[str | Path | None, BeforeValidator(_file)] = None
+    """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
+
+
+def read_flow(path: str | Path) -> Samples:
+    """Read and check a flow file.
+
+    Args:
+        path: CSV with the columns `time_s` and `flow_mm_s`; `#` starts a comment line.
+
+    Returns:
+        Times, s, and velocities, m/s, (n, 2).
+
+    Raises:
+        InputError: if the file or a cell is wrong; the sentence names file, row and column.
+    """
+    table = read_table(path, _WHAT, largest=_LARGEST)
+    if table.header != FLOW_COLUMNS:
+        shown = ", ".join(table.header)[:80]
+        raise InputError(f"{table.path} has the columns '{shown}'; allowed: {', '.join(FLOW_COLUMNS)}")
+    if not table.below:
+        raise InputError(f"{table.path} holds no rows; allowed: a header line and at least one row")
+    found: list[list[float]] = []
+    for number, cells in table.below:
+        place = f"{table.path}, row {number}"
+        if len(cells) != len(FLOW_COLUMNS):
+            raise InputError(f"{place} has {len(cells)} cells; allowed: {len(FLOW_COLUMNS)}")
+        values = [number_in(cell) for cell in cells]
+        for name, cell, value, (low, high) in zip(FLOW_COLUMNS, cells, values, _LIMITS, strict=True):
+            if not low <= value <= high:
+                raise InputError(f"{place}: {name} = {cell.strip()[:40]}; allowed: a number from {low:g} to {high:g}")
+        if found and values[0] <= found[-1][0]:
+            raise InputError(
+                f"{place}: time_s = {values[0]:g} does not follow {found[-1][0]:g}; allowed: times that increase"
+            )
+        found.append(values)
+    return np.array(found) * (1.0, 1e-3)

@@ -1,0 +1,115 @@
+"""A free run of a robot in its tube from what a user asks for: table, place, ends, flow, roughness, friction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.start import turning_rate
+from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.tube_options import InTube, read_flow
+from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, tube_robot
+from spirillum.dynamics.tube_run import tube_run
+from spirillum.dynamics.tube_start import Start
+from spirillum.errors import InputError
+from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.tube import END_LOSS
+from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.prediction import Prediction
+from spirillum.units import show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["check_in_tube", "run_in_tube"]
+
+
+def run_in_tube(
+    steady: Prediction,
+    table: TubeTable,
+    times: Timing,
+    placed: Placement,
+    asked: InTube,
+    roughness: float | None,
+    weight: bool,  # noqa: FBT001 - one of the run's settings
+    progress: Progress | None,
+) -> xr.Dataset:
+    """A run with six degrees of freedom in the robot's tube.
+
+    Args:
+        steady: the robot with friction and drive, by the model `tube`.
+        table: the robot's table.
+        times: length, sampling and remote.
+        placed: where it is laid down, ends, and a constant flow.
+        asked: azimuth, waiting time, dry friction, and a flow over time.
+        roughness: height of the asperities, m; None: 1e-4 of the body's radius.
+        weight: let weight and buoyancy act, if the masses are known.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Raises:
+        InputError: for a tail that does not turn, or a place where the robot cannot lie.
+    """
+    robot = steady.robot
+    turn = 2.0 * np.pi / turning_rate(steady)
+    own = robot.drive.duty if robot.drive is not None else 1.0
+    around = _around(robot, placed, asked, roughness)
+    links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
+    start = Start(
+        gap=placed.gap,
+        eccentricity=placed.eccentricity,
+        pitch=placed.pitch or 0.0,
+        yaw=placed.yaw,
+        azimuth=asked.azimuth,
+    )
+    dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
+    error = max(table.error.values())
+    said = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    if weight and not links.weight.any():
+        said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+    return dataset.assign_attrs(warnings="\n".join(said), error_estimate=error, table=table.key)
+
+
+def check_in_tube(robot: Robot, placed: Placement, asked: InTube) -> None:
+    """Refuse what a run in a tube cannot be told, before minutes go into a table.
+
+    Raises:
+        InputError: if there is something.
+    """
+    if placed.tail_drop:
+        raise InputError(
+            f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"
+        )
+    _around(robot, placed, asked, None)
+
+
+def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> Surroundings:
+    channel = robot.channel
+    length = np.inf if channel is None or channel.length is None else channel.length
+    radius = np.nan if channel is None else 0.5 * channel.diameter
+    if asked.flow is not None and (placed.flow is not None or placed.ends is not None):
+        raise InputError(
+            f"in_tube.flow = {str(asked.flow)[:80]} is given together with placement.flow or placement.ends; allowed: "
+            "one of them, for an imposed flow leaves the ends no say"
+        )
+    ends = kernel.IMPOSED
+    flow: Samples = np.zeros((1, 2))
+    if asked.flow is not None:
+        flow = read_flow(asked.flow)
+    elif placed.flow is not None:
+        flow = np.array([[0.0, placed.flow]])
+    else:
+        ends = kernel.OPEN if placed.ends_of(length) == "open" else kernel.CLOSED
+    if ends == kernel.OPEN and not np.isfinite(length):
+        raise InputError("placement.ends = 'open' needs channel.length; allowed: closed ends, or a channel.length")
+    return Surroundings(
+        ends=ends,
+        length=length + END_LOSS * radius,
+        flow=flow,
+        roughness=roughness,
+        coefficient=FRICTION_COEFFICIENT if asked.friction_coefficient is None else asked.friction_coefficient,
+    )
