@@ -118,6 +118,7 @@ def simulate(
     from spirillum.cli import renderer
     from spirillum.dynamics.answer import run_answer
     from spirillum.dynamics.simulation import simulate as answer
+    from spirillum.dynamics.tube_integration import INTERRUPTED
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)
@@ -160,6 +161,8 @@ def simulate(
     found = run_answer(dataset)
     found["warnings"] += warnings
     renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
+    if any(event["what"] == INTERRUPTED for event in found["events"]):
+        raise KeyboardInterrupt
 
 
 def _check_movie(movie: Path) -> None:

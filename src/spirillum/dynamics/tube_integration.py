@@ -19,14 +19,16 @@ from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links, tube_motion, tube_steps, tube_table
 
-__all__ = ["INTEGRATOR", "TOLERANCE", "Checkpoint", "TubeTrajectory", "integrate_in_tube", "observed_at"]
+__all__ = ["INTEGRATOR", "INTERRUPTED", "TOLERANCE", "Checkpoint", "TubeTrajectory", "integrate_in_tube", "observed_at"]
 
 TOLERANCE = 1e-8
 """Error of a step over the sizes of the state's components."""
 INTEGRATOR = f"Rodas5P, tolerance {TOLERANCE:g}"
 _STEPS = 64  # between two signs of life
 _FIRST = 1e-4  # first step over the time of a turn
-_END, _INTERRUPTED = "end of the channel", "interrupted"
+_END = "end of the channel"
+INTERRUPTED = "interrupted"
+"""The event of a run that was interrupted, which keeps what was done."""
 
 
 class Checkpoint(NamedTuple):
@@ -170,7 +172,7 @@ def _stretch(
             elif status == tube_steps.DONE:
                 break
     except KeyboardInterrupt:
-        what = _INTERRUPTED
+        what = INTERRUPTED
         events.append(Event(run.time, what))
     times, states = inside[:done], states[:done]
     if what and what != BATTERY_EMPTY and not (times.size and times[-1] == run.time):

@@ -17,6 +17,7 @@ from spirillum.dynamics.start import reach_of
 from spirillum.dynamics.timing import Timetable
 from spirillum.dynamics.tube_integration import (
     INTEGRATOR,
+    INTERRUPTED,
     Checkpoint,
     TubeTrajectory,
     integrate_in_tube,
@@ -112,6 +113,8 @@ def _waited(
         return state, ()
     run = integrate_in_tube(robot, state, np.array([-wait, 0.0]), [Switch(-wait, 0.0)], reach, progress)
     if run.time[-1] < 0.0:
+        if run.events[-1].what == INTERRUPTED:
+            raise KeyboardInterrupt
         raise InputError(
             f"wait = {wait:g} s: {run.events[-1].what} after {wait + run.time[-1]:.4g} s; allowed: a shorter time"
         )
