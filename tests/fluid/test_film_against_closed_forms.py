@@ -27,7 +27,7 @@ def per_length(radius, tube, gap):
     """Resistance per length of a long cylinder: of two lengths, so that the ends drop out."""
     films = [
         film_resistance(
-            body_outline("capsule", 2 * radius, length, 0.0, "flat", "flat"), tube, tube - radius - gap, 0, 0
+            body_outline("capsule", 2 * radius, length, 0.0, "flat", "flat"), tube, tube - radius - gap, 0.0, 0.0
         )
         for length in (40 * radius, 30 * radius)
     ]
@@ -54,10 +54,10 @@ def test_singular_film_of_a_journal_orbits_and_slides_as_two_dimensional_theory_
 @pytest.mark.parametrize(
     ("tube", "gap", "force", "lateral", "normal", "torque"),
     [
-        (20, 2.0, 20.22, 120.07, 402.05, 2.1788),
-        (20, 0.5, 41.49, 211.16, 2664.1, 4.1272),
-        (15, 1.0, 61.46, 417.91, 1690.3, 3.3732),
-        (15, 0.2, 140.99, 826.51, 16460.0, 7.5116),
+        (20.0, 2.0, 20.22, 120.07, 402.05, 2.1788),
+        (20.0, 0.5, 41.49, 211.16, 2664.1, 4.1272),
+        (15.0, 1.0, 61.46, 417.91, 1690.3, 3.3732),
+        (15.0, 0.2, 140.99, 826.51, 16460.0, 7.5116),
     ],
 )
 def test_rest_of_the_two_dimensional_problem_is_small_and_positive(tube, gap, force, lateral, normal, torque):
