@@ -15,12 +15,22 @@ settings.register_profile("spirillum", deadline=None, derandomize=True, database
 settings.load_profile("spirillum")
 
 
-_LONGEST = ("test_documentation.py", "test_examples_run.py")
+_LONGEST = (
+    "test_documentation.py",
+    "test_tube_flow_against_stokes_equations.py",
+    "test_follow_from_film_to_track.py",
+    "test_flow_figure_against_its_field.py",
+    "test_flow_command.py",
+    "test_settling_against_balances.py",
+    "test_tube_pitched_and_wired.py",
+    "test_examples_run.py",
+)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest tests first, so that all workers end at about the same time."""
-    items.sort(key=lambda item: item.path.name not in _LONGEST)
+    rank = {name: place for place, name in enumerate(_LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 
 
 @pytest.fixture(scope="session", autouse=True)
