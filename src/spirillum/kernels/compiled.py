@@ -15,7 +15,7 @@ import numpy as np
 
 __all__ = ["compiled", "compiled_by_rows"]
 
-_THREADS = numba.config.NUMBA_NUM_THREADS
+_THREADS: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _SHARES = 4
 """Shares of the rows for each thread: some rows take longer than others."""
 
@@ -25,10 +25,10 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 def compiled(function: _F) -> _F:
     """Compile a function of numbers and arrays; its machine code is kept on disk for the next process."""
     try:
-        kernel: _F = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        kernel: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     except RuntimeError:  # no folder to keep the machine code in: it is compiled again in every process
         kernel = numba.njit(nogil=True, error_model="numpy")(function)
-    return kernel
+    return cast("_F", kernel)
 
 
 def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
