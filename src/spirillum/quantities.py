@@ -209,7 +209,7 @@ _STUDIES = (
         "error_estimate",
         "",
         "1",
-        "relative difference of the forward velocity from another resolution",
+        "relative difference of the forward velocity from another resolution, or of a table from the flow solved for",
         "models that solve for the flow; NaN for those in closed form",
     ),
 )

@@ -260,7 +260,7 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
         ({"model": "tube", "placement": {"tail_drop": "1 mm"}}, "placement.tail_drop"),
         ({"model": "tube", "in_tube": {"flow": "missing.csv"}}, "missing.csv"),
         ({"model": "tube", "in_tube": {"flow": "a.csv"}, "placement": {"ends": "open"}}, "in_tube.flow"),
-        ({"in_tube": {"wait": "1 s"}}, "in_tube is given without walls"),
+        ({"in_tube": {"wait": "1 s"}}, "in_tube.wait is given with model"),
         ({"in_tube": {"friction_coefficient": -0.1}}, "in_tube.friction_coefficient"),
         ({"placement": {"gap": "30 mm"}}, "placement.gap = 30 mm"),
         ({"placement": {"pitch": "40 deg"}}, "placement.pitch = 40 deg"),

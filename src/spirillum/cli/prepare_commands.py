@@ -18,7 +18,7 @@ def prepare(
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Make the table of a robot in its tube: minutes, once; then `tube` answers at once, and the robot can move in it.
+    """Make the table of a robot in its tube: minutes, once; then `predict` and `simulate` take it.
 
     An interrupted preparation goes on where it was.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import TypeVar
 
 import numpy as np
 
@@ -40,6 +40,9 @@ _ELECTRICS = {
 }
 
 
+_A = TypeVar("_A", bound="Acting")
+
+
 @dataclass(frozen=True)
 class Acting:
     """Friction, weight and drive as `spirillum.kernels.rigid_links` reads them, SI, about the origin in body axes."""
@@ -51,7 +54,7 @@ class Acting:
     drive: Samples
     """Drive and motor (20,)."""
 
-    def at_duty(self, duty: float) -> Self:
+    def at_duty(self: _A, duty: float) -> _A:
         """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
         drive = self.drive.copy()
         drive[rigid_links.DUTY] = duty

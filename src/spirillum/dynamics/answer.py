@@ -48,7 +48,13 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
         "model": dataset.attrs["model"],
         "friction": dataset.attrs["friction"],
         "motion": dataset.attrs["motion"],
-        "error_estimate": quantity(float(dataset.attrs["error_estimate"]), "1", statement=dataset.attrs["known_error"]),
+        "error_estimate": quantity(
+            float(dataset.attrs["error_estimate"]),
+            "1",
+            **({"against": dataset.attrs["error_against"]} if "error_against" in dataset.attrs else {}),
+            statement=dataset.attrs["known_error"],
+        ),
+        **_in_the_tube(dataset),
         "events": json.loads(dataset.attrs["events"]),
         "steady": dataset.attrs["steady"],
         "duration": quantity(float(last["time"]), "s"),
@@ -94,3 +100,19 @@ def sweep_answer(dataset: xr.Dataset) -> dict[str, Any]:
         if variable.ndim == 1
     }
     return envelope("magnetic-sweep", content, _warnings(dataset))
+
+
+def _in_the_tube(dataset: xr.Dataset) -> dict[str, Any]:
+    """Under what a run in the tube was made."""
+    if "table" not in dataset.attrs:
+        return {}
+    attrs = dataset.attrs
+    return {
+        "in_tube": {
+            "ends": attrs["ends"],
+            "gap": quantity(float(dataset["wall_gap"][0]), "m", meaning="of the body, when the run begins"),
+            "roughness": quantity(float(attrs["roughness"]), "m"),
+            "friction_coefficient": quantity(float(attrs["friction_coefficient"]), "1"),
+            "wait": quantity(float(attrs["wait"]), "s"),
+        }
+    }

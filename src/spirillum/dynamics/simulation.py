@@ -111,7 +111,10 @@ def simulate(
     elif not walled:
         check_full(find_swimmer_model(model))
     if not walled and asked != InTube():
-        raise InputError("in_tube is given without walls; allowed: only with model 'tube' and motion 'free'")
+        name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
+        raise InputError(
+            f"in_tube.{name} is given with model '{model}'; allowed: only with model 'tube', motion 'free'"
+        )
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None) -> xr.Dataset:
         table = _table(one, placed, asked, tell) if walled else None
@@ -148,7 +151,7 @@ def _table(robot: Robot, placed: Placement, asked: InTube, progress: Progress | 
     """The robot's table, made if there is none, once all else is known to be right."""
     _, _, batch = prepared(robot, "tube", placement=placed)
     check_in_tube(robot, placed, asked)
-    return table_for(batch, progress=progress)
+    return table_for(batch, workers=1, progress=progress)
 
 
 def _free_run(

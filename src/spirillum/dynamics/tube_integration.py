@@ -7,7 +7,7 @@ A run keeps the beginning of its last step: continued from there, it is the long
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -98,6 +98,12 @@ def integrate_in_tube(
     run = _Run(robot, reach, state, memory, np.ones(len(robot.names) + tube_steps.WATCHED), state.copy())
     pieces: list[tuple[Samples, Samples, float]] = []
     events: list[Event] = []
+    first = run.time
+
+    def tell(moment: float) -> None:
+        if progress is not None:
+            progress("motion", int(1000 * (min(moment, end) - first) / (end - first)), 1000)
+
     spent = False
     if not going_on:
         pieces.append((time[:1], state[None].copy(), _duty(switches, float(time[0]))))
@@ -108,7 +114,7 @@ def integrate_in_tube(
         stop = min((t for t in stops if t > run.time), default=np.inf)
         inside = after[(after > run.time) & (after <= stop)] if not going_on else after[after <= stop]
         going_on = False
-        stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=progress)
+        stretch = _stretch(run, duty, stop, end, inside, spent=spent, tell=tell)
         events += stretch.events
         pieces.append((stretch.times, stretch.states, duty))
         if stretch.what == BATTERY_EMPTY:
@@ -140,7 +146,7 @@ class _Stretch(NamedTuple):
 
 
 def _stretch(
-    run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Progress | None
+    run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Callable[[float], None]
 ) -> _Stretch:
     robot = run.robot.at_duty(duty)
     data, limits = robot.data, _limits(robot, run.reach, spent=spent)
@@ -158,8 +164,7 @@ def _stretch(
                 inside[done:], states[done:], sizes, limits, robot.roughness, data, robot.table,
             )  # fmt: skip
             done += answered
-            if tell is not None:
-                tell("motion", int(1000 * min(run.time, end) / end), 1000)
+            tell(run.time)
             if status == tube_steps.CROSSED:
                 what = _crossed(run, robot, data, limits, watched, min(end, target), events)
                 if what:

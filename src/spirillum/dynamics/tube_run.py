@@ -24,7 +24,7 @@ from spirillum.dynamics.tube_integration import (
     observed_at,
 )
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_start import Start, check_in_table, laid_down
+from spirillum.dynamics.tube_start import StartPlace, check_in_table, laid_down
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -39,7 +39,7 @@ __all__ = ["tube_run"]
 def tube_run(
     steady: Prediction,
     robot: TubeRobot,
-    start: Start | xr.Dataset,
+    start: StartPlace | xr.Dataset,
     times: Timetable,
     *,
     wait: float = 0.0,
@@ -73,7 +73,7 @@ def tube_run(
     before: tuple[Event, ...] = ()
     moments = np.union1d(times.time, [switch.time for switch in times.switches])
     first: Samples | Checkpoint
-    if isinstance(start, Start):
+    if isinstance(start, StartPlace):
         laid = laid_down(steady.robot, robot, start)
         check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)
@@ -98,7 +98,7 @@ def tube_run(
     attrs |= _assumptions(robot, wait, (*before, *run.events))
     attrs["checkpoint"] = json.dumps(run.last._asdict())
     dataset = dataset_of(steady, robot, run, on, _in_the_tube(run, start), attrs)
-    if not isinstance(start, Start):  # angles go on counting
+    if not isinstance(start, StartPlace):  # angles go on counting
         last = start.isel(time=-1)
         begun = float(last["body_angle"] + last["tail_phase"] - last["tail_angle"])
         dataset["tail_angle"].values[:] = dataset["body_angle"].values + dataset["tail_phase"].values - begun
@@ -119,7 +119,7 @@ def _waited(
             f"wait = {wait:g} s: {run.events[-1].what} after {wait + run.time[-1]:.4g} s; allowed: a shorter time"
         )
     found = run.states[-1].copy()
-    found[rigid_links.ROLL] = 0.0
+    found[rigid_links.POSITION], found[rigid_links.ROLL] = state[rigid_links.POSITION], 0.0
     found[rigid_links.CURRENT : kernel.STATES] = 0.0
     return found, tuple(event for event in run.events if not event.what.startswith("duty"))
 
@@ -154,11 +154,11 @@ def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Ma
     }
 
 
-def _in_the_tube(run: TubeTrajectory, start: Start | xr.Dataset) -> dict[str, Samples]:
+def _in_the_tube(run: TubeTrajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
     """What a run in a tube has beside that of any free run."""
     seen, states = run.observed, run.states
     azimuth = np.unwrap(seen[:, kernel.AZIMUTH])
-    if not isinstance(start, Start):
+    if not isinstance(start, StartPlace):
         turns = np.round((float(start["azimuth"][-1]) - azimuth[0]) / (2.0 * np.pi))
         azimuth = azimuth + 2.0 * np.pi * turns
     tail = seen[:, kernel.TAIL_GAP]

@@ -13,9 +13,10 @@ from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, tube_robot
 from spirillum.dynamics.tube_run import tube_run
-from spirillum.dynamics.tube_start import Start
+from spirillum.dynamics.tube_start import StartPlace, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.placement import Placement
@@ -59,19 +60,22 @@ def run_in_tube(
     own = robot.drive.duty if robot.drive is not None else 1.0
     around = _around(robot, placed, asked, roughness)
     links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
-    start = Start(
+    start = StartPlace(
         gap=placed.gap,
         eccentricity=placed.eccentricity,
         pitch=placed.pitch or 0.0,
         yaw=placed.yaw,
         azimuth=asked.azimuth,
     )
+    check_roughness(links, laid_down(robot, links, start))
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
-    error = max(table.error.values())
+    error = table.error["forward_velocity"]
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
-    return dataset.assign_attrs(warnings="\n".join(said), error_estimate=error, table=table.key)
+    return dataset.assign_attrs(
+        warnings="\n".join(said), error_estimate=error, table=table.key, error_against=TabledTube.error_against
+    )
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube) -> None:

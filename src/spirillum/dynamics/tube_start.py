@@ -15,11 +15,11 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import GAP_SHARE
 from spirillum.units import show
 
-__all__ = ["Start", "laid_down"]
+__all__ = ["StartPlace", "check_in_table", "check_roughness", "laid_down"]
 
 
 @dataclass(frozen=True)
-class Start:
+class StartPlace:
     """A place in the tube; SI, angles in rad."""
 
     gap: float | None = None
@@ -36,7 +36,7 @@ class Start:
     """Phase of the tail against the body, which has not rolled from where it lies."""
 
 
-def laid_down(robot: Robot, links: TubeRobot, start: Start) -> Samples:
+def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
     """The state of a robot at rest at a place, (19,).
 
     Args:
@@ -63,6 +63,20 @@ def laid_down(robot: Robot, links: TubeRobot, start: Start) -> Samples:
     return state
 
 
+def check_roughness(links: TubeRobot, state: Samples) -> None:
+    """Refuse a start at which asperities are pressed by more than the robot's weight.
+
+    Raises:
+        InputError: if they are.
+    """
+    gap = float(links.gaps(state).min())
+    if gap < 0.5 * links.roughness:
+        raise InputError(
+            f"roughness = {show(links.roughness, 'um')} with a gap of {show(gap, 'um')} at the start: asperities would "
+            "carry more than its weight; allowed: a roughness below twice the gap, or a larger gap"
+        )
+
+
 def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
     """Refuse a start that the table does not hold.
 
@@ -77,7 +91,7 @@ def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
         )
 
 
-def _at(start: Start, offset: float) -> Samples:
+def _at(start: StartPlace, offset: float) -> Samples:
     from scipy.spatial.transform import Rotation
 
     state = np.zeros(kernel.STATES)
@@ -89,7 +103,7 @@ def _at(start: Start, offset: float) -> Samples:
     return state
 
 
-def _offset(links: TubeRobot, start: Start, gap: float, radius: float) -> float:
+def _offset(links: TubeRobot, start: StartPlace, gap: float, radius: float) -> float:
     """Largest offset at which the body's smallest gap is `gap`, m."""
     from scipy.optimize import brentq, minimize_scalar
 

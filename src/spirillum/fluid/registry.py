@@ -51,11 +51,11 @@ def quickest(model: SwimmerModel, batch: RobotBatch) -> SwimmerModel:
     Raises:
         InputError: where `model.tube.form` asks for a table that is not there.
     """
-    from spirillum.fluid.tube.tabled import tabled
-
     options, own = batch.options.tube, batch.options.slender.accuracy
     if not isinstance(model, Tube) or options.form == "direct":
         return model
+    from spirillum.fluid.tube.tabled import tabled
+
     resolved = options != TubeOptions(form=options.form) or own != SlenderOptions().accuracy
     found = None if resolved and options.form == "auto" else tabled(batch)
     if found is None and options.form == "table":

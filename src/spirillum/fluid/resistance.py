@@ -117,7 +117,7 @@ def resistance(
     angle = parse_option("phase", phase, KINDS["angle"])
     batch = RobotBatch.of(ready, Placement.of(placement))
     check_placement(batch.placement, chosen)
-    outside = broken(chosen.part_domain(batch, part))
+    outside = broken(chosen.part_domain(batch, "robot" if part == _BOTH else part))
     if outside:
         raise InputError(f"{ready.name} with model '{model}': {outside[0].sentence()}")
     phases = np.array([angle])

@@ -1,6 +1,6 @@
 """Rates of two rigid links on which dry friction acts: the root of a balance of forces, compiled.
 
-    A q + sum_c mu_c N_c J_c' J_c q/sqrt(|J_c q|^2 + v_r^2) = f
+    A q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = f
 
 for seven rates q, with N_c the loads at contacts and J_c q their sliding velocities (2,). Where A is symmetric the left
 side is the gradient of a convex function. A joint friction as printed in (15) makes A unsymmetric, still with a

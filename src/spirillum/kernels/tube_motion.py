@@ -2,7 +2,7 @@
 
 Unknowns are the seven rates q = (U, Omega_b, omega_m) in body axes about the origin. Forces balance without inertia:
 
-    (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(|J_c q|^2 + v_r^2) = weight + field + tau d + flow - N n
+    (mu M + B) q + sum_c mu_c N_c J_c' J_c q/sqrt(q' J_c' J_c q + v_r^2) = weight + field + tau d + flow - N n
 
 M, (7, 7), is the table's at the robot's place, with the mean flow of open ends eliminated; B friction in the joint; N_c
 the load that asperities carry at contact c along n_c, J_c q its sliding velocity (2,), mu_c the coefficient of dry

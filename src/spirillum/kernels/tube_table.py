@@ -6,8 +6,8 @@ phase phi of the tail. The rest is interpolated over
     t = 1 - e/e_c(p), 0 where a robot without yaw touches the floor of the tube, 1 on its axis,
     f = p/p_hi(t) nose up or p/p_lo(t) nose down, 1 at the largest pitch of the table.
 
-Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in f between the nodes, linear in t
-below the first, quadratic in yaw, and a Fourier sum in the phase: the rest is positive definite everywhere.
+Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - f) between the nodes,
+linear in t below the first, quadratic in yaw, and a Fourier sum in the phase: the rest is positive definite everywhere.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
 """Entries of a Cholesky factor."""
 INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED = 0, 1, 2
 _PITCH_SLACK = 1.1  # of the largest pitch: the tail's tip touches the glass a little beyond it
+_BEYOND = 1.3  # beyond the largest pitch, so that the logarithm stays finite at contact
 YAW_SLACK = 2.0  # of the yaw at which the rest was computed
 
 # Header of a packed table: radius of the tube, yaw of the yawed places, rows, and the lengths of what follows.
@@ -126,6 +127,19 @@ def _lagrange(data: Samples, start: int, count: int, x: float, out: Samples) -> 
 
 
 @compiled
+def _steep(data: Samples, start: int, count: int, f: float, out: Samples) -> None:
+    """Lagrange weights in log(1.3 - f): what nears the glass varies as the logarithm of its clearance."""
+    at = math.log(_BEYOND - f)
+    for j in range(count):
+        weight = 1.0
+        for m in range(count):
+            if m != j:
+                other = math.log(_BEYOND - data[start + m])
+                weight *= (at - other) / (math.log(_BEYOND - data[start + j]) - other)
+        out[j] = weight
+
+
+@compiled
 def _rooted(data: Samples, start: int, count: int, t: float, out: Samples) -> None:
     """Lagrange weights in the square root of t, linear in t below the first node."""
     at = math.sqrt(max(t, data[start]))
@@ -175,7 +189,7 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
     if f > _PITCH_SLACK:
         left, f = TOO_FAR_PITCHED, _PITCH_SLACK
     pitches = down if lowered else up
-    _lagrange(table, at_up + up if lowered else at_up, pitches, f, of_pitch)
+    _steep(table, at_up + up if lowered else at_up, pitches, f, of_pitch)
     flat = out.ravel()
     for n in range(block):
         flat[n] = 0.0

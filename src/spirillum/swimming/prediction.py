@@ -112,7 +112,12 @@ class Prediction:
             **({"interval_of": self.interval_of} if self.interval_of else {}),
             "placement": self.placement,
             **({"band": band.to_dict()} if band else {}),
-            "error_estimate": quantity(self.error_estimate, "1", statement=self.model.stated_error(self.robot.model)),
+            "error_estimate": quantity(
+                self.error_estimate,
+                "1",
+                **({} if self.model.form != "table" else {"against": self.model.error_against}),
+                statement=self.model.stated_error(self.robot.model),
+            ),
             "references": list(self.references),
         }
         return envelope("prediction", content, self.warnings)

@@ -69,7 +69,7 @@ class Prepared:
 def prepare(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    workers: int = 2,
+    workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prepared:
     """Make the table of a robot in its tube, or read the one that is there.
@@ -80,13 +80,14 @@ def prepare(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
-        workers: number of processes.
+        workers: number of processes; with more than one, a script that calls this guards what it does at its top by
+            `if __name__ == "__main__":`.
         progress: told what is being solved, how many places are done, and of how many.
 
     Raises:
         InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
     """
-    if not 1 <= workers <= _MOST_WORKERS:
+    if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
     ready, _, batch = prepared(robot, "tube")
     return Prepared(ready, table_for(batch, workers=workers, progress=progress))
@@ -96,7 +97,7 @@ _MOST_WORKERS = 64
 
 
 def table_for(
-    batch: RobotBatch, *, workers: int = 2, progress: Callable[[str, int, int], None] | None = None
+    batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
     """The table of the first robot of a batch in its tube; arguments as `prepare`."""
     radius = 0.5 * float(batch.channel_diameter[0])

@@ -56,7 +56,8 @@ def _own_error(item: Answer) -> str:
     estimate = (
         ""
         if error["value"] is None
-        else f"{100 * error['value']:.2g} % of the forward velocity, against another resolution; "
+        else f"{100 * error['value']:.2g} % of the forward velocity, against "
+        f"{error.get('against', 'another resolution')}; "
     )
     return f"known error of {item['model']}: {estimate}{error['statement']}"
 

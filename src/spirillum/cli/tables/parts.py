@@ -78,7 +78,8 @@ def show_error(error: Answer, console: Console) -> None:
     """A model's own estimate, where it has one, and its known error in words."""
     if error["value"] is not None:
         share = f"{100 * error['value']:.2g} %"
-        console.print(f"error estimate: {share} of the forward velocity, against another resolution", highlight=False)
+        against = error.get("against", "another resolution")
+        console.print(f"error estimate: {share} of the forward velocity, against {against}", highlight=False)
     console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
 
 

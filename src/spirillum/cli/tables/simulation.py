@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.answer import quantity
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_error
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -33,8 +33,13 @@ def table(answer: Answer, console: Console) -> None:
             highlight=False,
             soft_wrap=True,
         )
-    for event in answer["events"]:
-        console.print(f"{event['time']:.4g} s: {escape(event['what'])}", highlight=False)
+    if "in_tube" in answer:
+        told = answer["in_tube"]
+        shown = {name: " ".join(friendly(told[name]["value"], told[name]["unit"])) for name in told if name != "ends"}
+        said = [f"{name.replace('_', ' ')} {words.strip()}" for name, words in shown.items()]
+        console.print(f"in the tube: ends {told['ends']}, {', '.join(said)}", highlight=False, soft_wrap=True)
+    for words in _events(answer["events"]):
+        console.print(escape(words), highlight=False)
     show_error(answer["error_estimate"], console)
     console.print("means are over the last two thirds of the run", highlight=False)
     console.print(f"steady: {answer['steady']}", highlight=False, soft_wrap=True)
@@ -57,6 +62,26 @@ def _averages(answer: Answer) -> Table:
         words = name.removesuffix("_on").removeprefix("mean_").replace("_", " ")
         table.add_row(words, *values, unit)
     return table
+
+
+def _events(events: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What happened, a line each; of what happens again and again, the first time and how often."""
+    times: dict[str, list[float]] = {}
+    for event in events:
+        times.setdefault(event["what"], []).append(event["time"])
+    again = {what for what, when in times.items() if len(when) > _MOST_ALIKE}
+    lines = []
+    for event in events:
+        what, when = event["what"], times[event["what"]]
+        if what not in again:
+            lines.append(f"{event['time']:.4g} s: {what}")
+        elif event["time"] == when[0]:
+            lines.append(f"{when[0]:.4g} s: {what}, {len(when)} times until {when[-1]:.4g} s")
+    return lines
+
+
+_MOST_ALIKE = 4
+"""Events of one kind that are listed one by one."""
 
 
 def _rows(answer: Answer) -> list[tuple[str, Any]]:

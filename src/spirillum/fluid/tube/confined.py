@@ -70,7 +70,8 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
         if solids.none:
             return _wires_alone(_Link.of(solids, wires, drop))
         matrix = solids.wrenches(solids.moving)
-        tractions, forces = solids.moving, np.zeros((0, MOTIONS))
+        tractions = solids.moving
+        forces: Samples = np.zeros((0, MOTIONS))
         lines: tuple[Wire, ...] = ()
         if wires:
             link = _Link.of(solids, wires, drop)
@@ -88,7 +89,7 @@ def held_in_tube(solids: Solids, wires: Sequence[tuple[Wire, int]], drop: float 
             lost = [answer.tractions @ fields for answer, fields in zip(answers, reached, strict=True)]
             even, odd = (moving - some for moving, some in zip(solids.moving, solids.families(lost), strict=True))
             tractions, lines = (even, odd), link.wires
-            forces = strengths[: sum(line.points.size for line in lines)]
+            forces = np.asarray(strengths[: sum(line.points.size for line in lines)], dtype=np.float64)
     found = Strengths(solids, (_EIGHT_PI * tractions[0], _EIGHT_PI * tractions[1]), lines, _EIGHT_PI * forces)
     return _held(_EIGHT_PI * matrix, found)
 
@@ -150,7 +151,8 @@ class _Link:
         placed = seat.placed(points)
         distance = seat.radius - float(np.max(np.hypot(placed[:, 1], placed[:, 2])))
         own = waves_between(seat.radius, float(np.ptp(placed[:, 0])), distance, solids.fineness.wire_damping)
-        along = np.kron(np.eye(len(points)), seat.rotation)  # from forces in robot axes to those in the tube's
+        # from forces in robot axes to those in the tube's
+        along = np.asarray(np.kron(np.eye(len(points)), seat.rotation), dtype=np.float64)
         mobility = system.mobility.copy()
         mobility[:forces, :forces] -= along.T @ point_reflection(placed, own) @ along
         start = 0

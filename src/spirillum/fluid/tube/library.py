@@ -33,7 +33,7 @@ def _kept(key: str) -> Path | None:
     folder, code = cache_folder(), digest_of("spirillum.fluid.tube.table")
     if folder is None or code is None:
         return None
-    return folder / f"{key}-{code[:16]}.npz"
+    return folder / f"{key}-{code[:16]}.table"
 
 
 def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
@@ -45,10 +45,10 @@ def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
     """
     key = key_of(geometry, radius)
     kept = _kept(key)
-    for path in (_SHIPPED / f"{key}.npz", *([] if kept is None else [kept])):
+    for path in (_SHIPPED / f"{key}.table", *([] if kept is None else [kept])):
         if path.exists():
             table = _read(path)
-            if table is not None:
+            if table is not None and table.key == key:
                 return table
     return None
 

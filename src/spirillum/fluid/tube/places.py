@@ -38,7 +38,8 @@ _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
 _UP = (0.0, 0.3, 0.6, 0.85, 1.0)
 _DOWN = (0.0, 0.3, 0.65, 1.0)
-_YAW_PITCHES = (-0.5, 0.0, 0.8)
+_YAW = float(np.radians(4.0))
+_YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
 _LEAST_PITCH = np.radians(0.2)
 _NARROWEST = 1e-6
 
@@ -110,8 +111,15 @@ class Places:
 
     @cached_property
     def yaw(self) -> float:
-        """Yaw of yawed places: two thirds of the pitch at which the tail touches from the axis, at most 4 degrees."""
-        return float(min(np.radians(4.0), 2.0 / 3.0 * self.most[-1].min()))
+        """Yaw of yawed places, rad: at most 4 degrees, and at all of them the tail is off the glass as elsewhere."""
+        wire = self.geometry.wire()
+        film = WIRE_FILM * wire.radius
+
+        def spare(yaw: float) -> float:
+            seats = [self.seat(float(t), float(f), yaw) for t in self.yaw_gaps for f in self.yaw_pitches]
+            return min(seat.tail_clearance(wire.points, wire.radius).clearance for seat in seats) - film
+
+        return max(float(_LEAST_PITCH), _last_positive(spare, min(_YAW, 2.0 / 3.0 * float(self.most[-1].min()))))
 
     @cached_property
     def most(self) -> Samples:

@@ -6,8 +6,10 @@ to contact, is kept as a Cholesky factor with logarithms on the diagonal.
 
 from __future__ import annotations
 
+import multiprocessing
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import NamedTuple
 
@@ -86,15 +88,28 @@ def solutions(
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    if workers == 1:
+        for done, place in enumerate(places, start=1):
+            found[done - 1] = _solve(place)
+            tell(what, done, len(places))
+        return found
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    try:
         waiting: dict[Future[list[Samples]], int] = {pool.submit(_solve, place): n for n, place in enumerate(places)}
-        try:
-            for done, future in enumerate(as_completed(waiting), start=1):
-                found[waiting[future]] = future.result()
-                tell(what, done, len(places))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        for done, future in enumerate(as_completed(waiting), start=1):
+            found[waiting[future]] = future.result()
+            tell(what, done, len(places))
+    except BrokenProcessPool as error:
+        raise InputError(
+            f"a process of {workers} that solve for the flow was ended from outside, as for want of memory; allowed: "
+            "workers = 1, or more memory; what was solved is kept"
+        ) from error
+    except BaseException:
+        for process in multiprocessing.active_children():
+            process.terminate()  # what they were at is lost, what they have done is kept
+        raise
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
     return found
 
 

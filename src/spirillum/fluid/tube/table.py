@@ -8,10 +8,9 @@ and roughness; another tail, body or tube needs another table.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import time
-import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -44,9 +43,9 @@ from spirillum.robot.seat import Seat
 __all__ = ["TubeTable", "response_of"]
 
 _FORMAT = "spirillum.tube-table/1"
-_LARGEST_FILE = 2**24
-FINENESS = Fineness("standard", 0.01)
-"""How finely the flow is resolved at the places of a table."""
+_LARGEST_FILE, _LARGEST_TABLE = 2**21, 2**23  # bytes, compressed and not
+_TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
+"""How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
 _HELD_OUT = 6
 _SEED = 20121
 
@@ -87,8 +86,8 @@ class TubeTable:
         return out, int(left)
 
     def write(self, path: Path) -> None:
-        """Write it as a NumPy archive, whole or not at all."""
-        content = {
+        """Write it, whole or not at all: a digest, then its head and its numbers, compressed."""
+        head = {
             "format": _FORMAT,
             "geometry": self.geometry._asdict(),
             "radius": self.radius,
@@ -96,12 +95,11 @@ class TubeTable:
             "places": self.places,
             "seconds": self.seconds,
         }
-        buffer = io.BytesIO()
         start = kernel.film_start(self.packed)
-        rest, film = self.packed[:start].astype("<f4"), self.packed[start:].astype("<f8")
-        np.savez_compressed(buffer, head=np.array(json.dumps(content)), rest=rest, film=film)
+        numbers = self.packed[:start].astype("<f4").tobytes() + self.packed[start:].astype("<f8").tobytes()
+        content = zlib.compress(json.dumps(head | {"rest": start}).encode() + b"\n" + numbers, 9)
         with whole_file(path) as temporary:
-            temporary.write_bytes(buffer.getvalue())
+            temporary.write_bytes(hashlib.sha256(content).digest() + content)
 
     @classmethod
     def read(cls, path: Path) -> TubeTable:
@@ -136,8 +134,8 @@ class TubeTable:
         film = FilmTable.of(geometry.body, radius, yaw=places.largest_yaw, pitch=steepest).packed
         level, yawed = _level(places), _yawed(places)
         own = geometry, even_phases()
-        todo = [Solution((own,), place.seat, FINENESS) for place in level]
-        todo += [Solution((own, mirrored(*own)), place.seat, FINENESS) for place in yawed]
+        todo = [Solution((own,), place.seat, _fineness(place.seat)) for place in level]
+        todo += [Solution((own, mirrored(*own)), place.seat, _fineness(place.seat)) for place in yawed]
         found = solutions(todo, "table of the tube", progress, workers)
         table = _assembled(places, film, [place[0] for place in found[: len(level)]], found[len(level) :])
         errors = _held_out(places, table, progress, workers)
@@ -149,15 +147,19 @@ def _read(path: Path) -> TubeTable | None:
     try:
         if path.stat().st_size > _LARGEST_FILE:
             return None
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            head = json.loads(str(stored["head"][()]))
-            rest, film = stored["rest"].astype(np.float64), stored["film"].astype(np.float64)
-        packed = np.concatenate([rest, film])
-        if head.pop("format") != _FORMAT or not np.all(np.isfinite(rest)) or kernel.film_start(packed) != rest.size:
+        stored = path.read_bytes()
+        if hashlib.sha256(stored[32:]).digest() != stored[:32]:
             return None
+        words, _, numbers = zlib.decompressobj().decompress(stored[32:], _LARGEST_TABLE).partition(b"\n")
+        head = json.loads(words)
+        if head.pop("format") != _FORMAT:
+            return None
+        start = 4 * int(head.pop("rest"))
+        rest, film = np.frombuffer(numbers[:start], "<f4"), np.frombuffer(numbers[start:], "<f8")
+        packed = np.concatenate([rest.astype(np.float64), film.astype(np.float64)])
         geometry = RobotGeometry(**head.pop("geometry"))
         return TubeTable(geometry=geometry, packed=packed, **head)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, zlib.error):
         return None
 
 
@@ -173,6 +175,11 @@ class _Place(NamedTuple):
     t: float
     f: float
     seat: Seat
+
+
+def _fineness(seat: Seat) -> Fineness:
+    level = seat.pitch == 0 and seat.yaw == 0
+    return Fineness("standard", _LEVEL_TOLERANCE if level else _TOLERANCE)
 
 
 def _level(places: Places) -> list[_Place]:
@@ -284,7 +291,7 @@ def _held_out(places: Places, table: Samples, progress: Progress | None, workers
         clear = seat.tail_clearance(wire.points, wire.radius).clearance > WIRE_FILM * wire.radius
         if clear and seat.clearance(places.geometry.body) > 0.4 * places.thinnest:
             chosen.append((seat, float(draw.uniform(0.0, 2.0 * np.pi))))
-    todo = [Solution(((places.geometry, (phase,)),), seat, FINENESS) for seat, phase in chosen]
+    todo = [Solution(((places.geometry, (phase,)),), seat, _fineness(seat)) for seat, phase in chosen]
     found = solutions(todo, "checking the table", progress, workers)
     errors = []
     for (seat, phase), answer in zip(chosen, found, strict=True):

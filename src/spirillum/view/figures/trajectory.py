@@ -25,6 +25,7 @@ __all__ = ["trajectory_figure"]
 
 _WIDTH, _PATHS, _PANEL = 9.0, 1.75, 1.25
 """Width of the figure; heights of the paths and of a panel over time, inches."""
+_MOST_ALIKE = 4  # events of one kind that are marked one by one
 _MOST_EVENTS = 12
 _DECADES = 5
 """Range of a logarithmic axis."""
@@ -230,13 +231,25 @@ def _make_room(axes: Axes) -> None:
 
 
 def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
-    """Times within the run, and what happened then; what it begins with is no event in it."""
+    """Times within the run, and what happened then; what it begins with is no event in it.
+
+    Of what happens again and again, as where a contact bounces, the first time and the number of times.
+    """
     try:
         listed = json.loads(str(dataset.attrs.get("events", "[]")))
         found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
     except (ValueError, TypeError, KeyError):
         return []  # they are notes on a picture; a run without them can still be drawn
-    return sorted(event for event in found if time[0] < event[0] <= time[-1])
+    times: dict[str, list[float]] = {}
+    for when, what in sorted(event for event in found if time[0] < event[0] <= time[-1]):
+        times.setdefault(what, []).append(when)
+    events = []
+    for what, moments in times.items():
+        if len(moments) > _MOST_ALIKE:
+            events.append((moments[0], f"{what}, {len(moments)} times"))
+        else:
+            events += [(when, what) for when in moments]
+    return sorted(events)
 
 
 def _event_words(events: list[tuple[float, str]]) -> list[str]:

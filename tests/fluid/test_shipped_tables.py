@@ -1,0 +1,85 @@
+"""The tables that come with the package, against the flow solved for and what holds for any resistance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.places import Places
+from spirillum.fluid.tube.rest import matrix_of
+from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.table import RESPONSES, TubeTable, response_errors
+from spirillum.fluid.tube.tube import solved
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import INSIDE
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.seat import Seat
+
+PRESETS = ("biorob2012-wide", "biorob2012-narrow")
+
+
+def shipped(name: str) -> tuple[TubeTable, Places]:
+    batch = RobotBatch.of(sp.load(name))
+    geometry, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
+    table = find_table(geometry, radius)
+    assert table is not None
+    return table, Places(geometry, radius)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_presets_have_tables_that_state_their_errors(name: str) -> None:
+    table, _ = shipped(name)
+    assert set(table.error) == set(RESPONSES)
+    assert 0 < table.error["forward_velocity"] < 0.03
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None:
+    table, places = shipped(name)
+    draw = np.random.default_rng(0)
+    for _ in range(300):
+        seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
+        deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - seat.offset) if seat.pitch == 0 else 0.0
+        yaw, phase = draw.uniform(-1, 1) * places.largest_yaw, draw.uniform(0, 2 * np.pi)
+        matrix, left = table.at(seat.offset + deeper, seat.pitch, yaw, phase)
+        scale = np.sqrt(np.diag(matrix))
+        assert left == INSIDE
+        assert np.array_equal(matrix, matrix.T)
+        assert np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] > 1e-4
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_raised_and_lowered_noses_meet_where_the_robot_is_level(name: str) -> None:
+    table, _ = shipped(name)
+    for offset in (0.001, 0.004, 0.0055):
+        up, down = (table.at(offset, pitch, 0.02, 1.0)[0] for pitch in (1e-9, -1e-9))
+        np.testing.assert_allclose(up, down, rtol=1e-5, atol=1e-6 * np.abs(up).max())
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_on_the_axis_raised_and_lowered_noses_are_mirror_images(name: str) -> None:
+    """A turn of the whole by 180 degrees about the tube's axis."""
+    table, places = shipped(name)
+    sign = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
+    pitch = 0.5 * float(places.most[-1].min())
+    up, down = table.at(0.0, pitch, 0.0, 0.7)[0], table.at(0.0, -pitch, 0.0, 0.7 + np.pi)[0]
+    allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
+    assert np.all(response_errors(sign[:, None] * down * sign, up) < allowed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize(
+    ("gap", "pitch", "yaw", "phase"), [(0.5, 0.0, 0.0, 0.3), (1.2, 2.0, 1.0, 2.0), (3.0, -2.0, -2.0, 4.0)]
+)
+def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: float, yaw: float, phase: float) -> None:
+    table, places = shipped(name)
+    g = places.geometry
+    seat = Seat.at_gap(g.body, places.radius, 1e-3 * gap, np.radians(pitch), yaw=np.radians(yaw))
+    true = matrix_of(solved(g, seat, Fineness("standard", 0.005), phase))
+    found, left = table.at(seat.offset, seat.pitch, seat.yaw, phase)
+    assert left == INSIDE
+    allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
+    assert np.all(response_errors(found, true) < allowed)
