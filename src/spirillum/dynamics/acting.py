@@ -15,7 +15,7 @@ from spirillum.robot.links import links_of
 from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 from spirillum.swimming.balance import friction_torques
 
-__all__ = ["Acting", "drive_of", "friction_of", "torque_scale", "weight_of"]
+__all__ = ["Acting", "drive_of", "friction_of", "state_sizes", "torque_scale", "weight_of"]
 
 _KINDS = {
     "dc-motor": rigid_links.MOTOR,
@@ -122,3 +122,22 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
     resistance = drive[rigid_links.CONSTANT]
     stall = drive[rigid_links.TORQUE_CONSTANT] * drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 0.0
     return float(max(stall, field, given if kind in (rigid_links.TORQUE, rigid_links.RATE) else 0.0, heavy, 1e-300))
+
+
+def state_sizes(drive: Samples, length: float, torque: float, states: int) -> Samples:
+    """Sizes of a state's components below which nothing matters, (states,).
+
+    Args:
+        drive: drive and motor (20,).
+        length: of the robot's order, m.
+        torque: of the order of those that act, N m.
+        states: number of components; those behind the ones of `rigid_links` are works, J.
+    """
+    resistance = drive[rigid_links.CONSTANT]
+    current = drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
+    found = np.ones(states)
+    found[rigid_links.POSITION : rigid_links.POSITION + 3] = length
+    found[rigid_links.CURRENT] = found[rigid_links.CHARGE] = current
+    found[rigid_links.ELECTRICAL : rigid_links.CHARGE] = max(drive[rigid_links.VOLTAGE] * current, torque)
+    found[rigid_links.DRIVEN :] = torque
+    return found

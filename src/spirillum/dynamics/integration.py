@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.acting import state_sizes
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
@@ -261,7 +262,7 @@ def _solved(links: TwoLinks, state: Samples, at: Samples, start: float, watches:
         events=tuple(watches),
         args=(links.data,),
         rtol=_tolerances(links),
-        atol=1e-3 * TOLERANCE * _scales(links),
+        atol=1e-3 * TOLERANCE * state_sizes(links.drive, links.length, links.torque, rigid_links.STATES),
         max_num_steps=_STEPS_AT_LEAST + _STEPS_PER_SAMPLE * at.size,
         pass_dy_as_arg=True,
     )
@@ -281,20 +282,6 @@ def _tolerances(links: TwoLinks) -> Samples:
     if links.spots.size:
         found[: rigid_links.PHASE] *= 1e-3
     return found
-
-
-def _scales(links: TwoLinks) -> Samples:
-    """Sizes of the state's components below which nothing matters, (17,)."""
-    drive, length, torque = links.drive, links.length, links.torque
-    resistance = drive[rigid_links.CONSTANT]
-    current = drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
-    electrical = max(drive[rigid_links.VOLTAGE] * current, torque)
-    scales = np.ones(rigid_links.STATES)
-    scales[rigid_links.POSITION : rigid_links.POSITION + 3] = length
-    scales[rigid_links.CURRENT] = scales[rigid_links.CHARGE] = current
-    scales[rigid_links.ELECTRICAL : rigid_links.CHARGE] = electrical
-    scales[rigid_links.DRIVEN :] = torque
-    return scales
 
 
 def _observed(links: TwoLinks, time: Samples, states: Samples) -> Samples:

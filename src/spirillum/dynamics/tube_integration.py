@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.acting import state_sizes
 from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Progress, Reach, Trajectory
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
@@ -260,18 +261,9 @@ def _limits(robot: TubeRobot, reach: Reach, *, spent: bool) -> Samples:
 
 def _sizes(robot: TubeRobot) -> Samples:
     """Sizes of the state's components below which nothing matters; a small change of time; the time of a turn."""
-    drive, length, torque = robot.drive, robot.length, robot.torque
-    resistance = drive[rigid_links.CONSTANT]
-    current = drive[rigid_links.VOLTAGE] / resistance if resistance > 0 else 1.0
-    electrical = max(drive[rigid_links.VOLTAGE] * current, torque)
-    found = np.ones(tube_motion.STATES + 2)
-    found[rigid_links.POSITION : rigid_links.POSITION + 3] = length
-    found[rigid_links.CURRENT] = found[rigid_links.CHARGE] = current
-    found[rigid_links.ELECTRICAL : rigid_links.CHARGE] = electrical
-    found[rigid_links.DRIVEN : tube_motion.STATES] = torque
-    changing = drive[rigid_links.KIND] == rigid_links.MAGNETIC or len(robot.flow) > 1
-    found[-2], found[-1] = 1e-6 * robot.turn if changing else 0.0, robot.turn
-    return found
+    sizes = state_sizes(robot.drive, robot.length, robot.torque, tube_motion.STATES)
+    changing = robot.drive[rigid_links.KIND] == rigid_links.MAGNETIC or len(robot.flow) > 1
+    return np.append(sizes, [1e-6 * robot.turn if changing else 0.0, robot.turn])
 
 
 def _joined(

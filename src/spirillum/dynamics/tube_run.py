@@ -24,7 +24,7 @@ from spirillum.dynamics.tube_integration import (
     observed_at,
 )
 from spirillum.dynamics.tube_robot import TubeRobot
-from spirillum.dynamics.tube_start import StartPlace, check_in_table, laid_down
+from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -75,6 +75,7 @@ def tube_run(
     first: Samples | Checkpoint
     if isinstance(start, StartPlace):
         laid = laid_down(steady.robot, robot, start)
+        check_roughness(robot, laid)
         check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)
     else:

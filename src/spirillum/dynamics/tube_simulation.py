@@ -13,7 +13,7 @@ from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, tube_robot
 from spirillum.dynamics.tube_run import tube_run
-from spirillum.dynamics.tube_start import StartPlace, check_roughness, laid_down
+from spirillum.dynamics.tube_start import StartPlace
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
@@ -67,7 +67,6 @@ def run_in_tube(
         yaw=placed.yaw,
         azimuth=asked.azimuth,
     )
-    check_roughness(links, laid_down(robot, links, start))
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]

@@ -11,8 +11,9 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import GAP_SHARE
+from spirillum.robot.seat import GAP_SHARE, Seat, largest_gap
 from spirillum.units import show
 
 __all__ = ["StartPlace", "check_in_table", "check_roughness", "laid_down"]
@@ -52,7 +53,7 @@ def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
     if start.eccentricity is not None:
         state = _at(start, start.eccentricity * (radius - a))
     else:
-        state = _at(start, _offset(links, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
+        state = _at(start, _offset(robot, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
     gaps = links.gaps(state)
     if gaps.min() <= 0.0:
         name = links.names[int(np.argmin(gaps))]
@@ -103,22 +104,14 @@ def _at(start: StartPlace, offset: float) -> Samples:
     return state
 
 
-def _offset(links: TubeRobot, start: StartPlace, gap: float, radius: float) -> float:
-    """Largest offset at which the body's smallest gap is `gap`, m."""
-    from scipy.optimize import brentq, minimize_scalar
-
-    body = [place for place, name in enumerate(links.names) if name.startswith("body")]
-
-    def spare(offset: float) -> float:
-        return float(links.gaps(_at(start, offset))[body].min()) - gap
-
-    middle = minimize_scalar(lambda e: -spare(e), bounds=(0.0, radius), options={"xatol": 1e-9 * radius})
-    best = 0.0 if spare(0.0) >= -middle.fun else float(middle.x)
-    if spare(best) < 0.0:
-        if spare(best) > -1e-9 * radius:
-            return best
+def _offset(robot: Robot, start: StartPlace, gap: float, radius: float) -> float:
+    """Offset at which the body's smallest gap is `gap`, m."""
+    body = outlines_of(robot)["body"]
+    offset = Seat.at_gap(body, radius, gap, start.pitch, yaw=start.yaw).offset
+    if not offset >= -1e-12 * radius:
+        most = max(largest_gap(body, radius, start.pitch, start.yaw), 0.0)
         raise InputError(
             f"placement.gap = {show(gap, 'mm')}: the body does not fit with that pitch and yaw; allowed: at most "
-            f"{show(max(spare(best) + gap, 0.0), 'mm')}, or a smaller pitch or yaw"
+            f"{show(most, 'mm')}, or a smaller pitch or yaw"
         )
-    return float(brentq(spare, best, radius, xtol=1e-15, rtol=1e-14))
+    return max(offset, 0.0)

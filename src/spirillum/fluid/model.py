@@ -44,8 +44,8 @@ class ResistanceModel(ABC):
     """True where only the entries along and about the motor axis are known; the others are NaN."""
     form: ClassVar[str | None] = None
     """How the answer is found, for a model that has more than one way."""
-    error_against: ClassVar[str] = "another resolution"
-    """What the error estimate comes from."""
+    error_against: ClassVar[str | None] = None
+    """What the error estimate comes from, where that is not another resolution."""
     placed: ClassVar[bool] = False
     """Whether the answer depends on where in the channel the robot lies, `batch.placement`."""
 

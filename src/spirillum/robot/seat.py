@@ -16,6 +16,7 @@ farthest point of a tail over a whole turn. With yaw it is found by Newton's met
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,7 +26,17 @@ from spirillum.arrays import Samples
 from spirillum.robot.outline import Outline
 from spirillum.robot.placement import Placement
 
-__all__ = ["GAP_BAND", "GAP_SHARE", "STEEPEST_PITCH", "Seat", "TailClearance", "contact_pitch", "gap_of", "largest_gap"]
+__all__ = [
+    "GAP_BAND",
+    "GAP_SHARE",
+    "STEEPEST_PITCH",
+    "Seat",
+    "TailClearance",
+    "contact_pitch",
+    "gap_of",
+    "largest_gap",
+    "last_clear",
+]
 
 GAP_SHARE = 1.0 / 18.0
 """Gap over the body's radius where a placement leaves it open: 0.5 mm for the paper's robot."""
@@ -337,12 +348,24 @@ def contact_pitch(
 
     if spare(0.0) < -1e-12 * radius:
         return np.nan
-    tried = np.linspace(0.0, STEEPEST_PITCH, _STEPS)
-    touching = next((step for step in range(1, _STEPS) if spare(float(tried[step])) < 0), None)
+    return sign * last_clear(spare, STEEPEST_PITCH, _STEPS, _NARROWEST)
+
+
+def last_clear(spare: Callable[[float], float], most: float, steps: int, narrowest: float) -> float:
+    """Largest angle up to which nothing touches, rad; `most` where nothing does.
+
+    Args:
+        spare: what is left of a clearance at an angle; at 0 it is there.
+        most: largest angle that is tried, rad.
+        steps: number of angles, from 0 to that, among which the first contact is bracketed.
+        narrowest: width of the bracket at the end, rad.
+    """
+    tried = np.linspace(0.0, most, steps)
+    touching = next((step for step in range(1, steps) if spare(float(tried[step])) < 0), None)
     if touching is None:
-        return sign * STEEPEST_PITCH
+        return float(most)
     low, high = float(tried[touching - 1]), float(tried[touching])
-    while high - low > _NARROWEST:
+    while high - low > narrowest:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if spare(middle) < 0 else (middle, high)
-    return sign * low
+    return low

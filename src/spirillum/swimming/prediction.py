@@ -115,7 +115,7 @@ class Prediction:
             "error_estimate": quantity(
                 self.error_estimate,
                 "1",
-                **({} if self.model.form != "table" else {"against": self.model.error_against}),
+                **({} if self.model.error_against is None else {"against": self.model.error_against}),
                 statement=self.model.stated_error(self.robot.model),
             ),
             "references": list(self.references),

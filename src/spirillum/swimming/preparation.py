@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
+from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import prepared_table
 from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.table import RESPONSES, TubeTable
@@ -100,7 +101,7 @@ def table_for(
     batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
     """The table of the first robot of a batch in its tube; arguments as `prepare`."""
-    radius = 0.5 * float(batch.channel_diameter[0])
+    radius = tube_radius(batch)
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
     return prepared_table(RobotGeometry.of(batch), radius, workers=workers, progress=progress)

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from spirillum.answer import quantity
 from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_error
+from spirillum.dynamics.events import told
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -34,10 +35,12 @@ def table(answer: Answer, console: Console) -> None:
             soft_wrap=True,
         )
     if "in_tube" in answer:
-        told = answer["in_tube"]
-        shown = {name: " ".join(friendly(told[name]["value"], told[name]["unit"])) for name in told if name != "ends"}
+        place = answer["in_tube"]
+        shown = {
+            name: " ".join(friendly(place[name]["value"], place[name]["unit"])) for name in place if name != "ends"
+        }
         said = [f"{name.replace('_', ' ')} {words.strip()}" for name, words in shown.items()]
-        console.print(f"in the tube: ends {told['ends']}, {', '.join(said)}", highlight=False, soft_wrap=True)
+        console.print(f"in the tube: ends {place['ends']}, {', '.join(said)}", highlight=False, soft_wrap=True)
     for words in _events(answer["events"]):
         console.print(escape(words), highlight=False)
     show_error(answer["error_estimate"], console)
@@ -65,23 +68,12 @@ def _averages(answer: Answer) -> Table:
 
 
 def _events(events: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What happened, a line each; of what happens again and again, the first time and how often."""
-    times: dict[str, list[float]] = {}
-    for event in events:
-        times.setdefault(event["what"], []).append(event["time"])
-    again = {what for what, when in times.items() if len(when) > _MOST_ALIKE}
-    lines = []
-    for event in events:
-        what, when = event["what"], times[event["what"]]
-        if what not in again:
-            lines.append(f"{event['time']:.4g} s: {what}")
-        elif event["time"] == when[0]:
-            lines.append(f"{when[0]:.4g} s: {what}, {len(when)} times until {when[-1]:.4g} s")
-    return lines
-
-
-_MOST_ALIKE = 4
-"""Events of one kind that are listed one by one."""
+    """What happened, a line each."""
+    return [
+        f"{event.time:.4g} s: {event.what}"
+        + (f", {event.times} times until {event.last:.4g} s" if event.times > 1 else "")
+        for event in told([(event["time"], event["what"]) for event in events])
+    ]
 
 
 def _rows(answer: Answer) -> list[tuple[str, Any]]:

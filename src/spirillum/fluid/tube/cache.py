@@ -25,7 +25,7 @@ from spirillum.errors import InputError
 from spirillum.files import whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = ["cache_folder", "digest_of", "imported_sources", "kept_or_computed"]
+__all__ = ["cache_folder", "digest_of", "imported_sources", "kept_or_computed", "sealed", "unsealed"]
 
 _PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ("numpy", "scipy", "numba")
@@ -74,7 +74,7 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         content = np.ascontiguousarray(found, dtype="<f8").tobytes()
         try:
             with whole_file(path) as temporary:
-                temporary.write_bytes(hashlib.sha256(content).digest() + content)
+                temporary.write_bytes(sealed(content))
         except (InputError, OSError):  # a full or read-only disk costs time only
             pass
     return found
@@ -86,10 +86,21 @@ def _kept(path: Path) -> Samples | None:
         stored = path.read_bytes()
     except OSError:
         return None
-    digest, content = stored[:32], stored[32:]
-    if len(content) != 8 * MOTIONS**2 or hashlib.sha256(content).digest() != digest:
+    content = unsealed(stored)
+    if content is None or len(content) != 8 * MOTIONS**2:
         return None
     return np.frombuffer(content, dtype="<f8").astype(np.float64).reshape(MOTIONS, MOTIONS)
+
+
+def sealed(content: bytes) -> bytes:
+    """Content behind its digest, by which damage is noticed."""
+    return hashlib.sha256(content).digest() + content
+
+
+def unsealed(stored: bytes) -> bytes | None:
+    """The content of what was sealed; None if it is damaged."""
+    digest, content = stored[:32], stored[32:]
+    return content if hashlib.sha256(content).digest() == digest else None
 
 
 @lru_cache(maxsize=8)

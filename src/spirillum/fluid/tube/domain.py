@@ -15,7 +15,7 @@ from spirillum.robot.limits import Limit, within
 from spirillum.robot.seat import Seat, gap_of, largest_gap
 from spirillum.units import show
 
-__all__ = ["WIRE_FILM", "placement_answer", "seat_limits", "seat_of"]
+__all__ = ["WIRE_FILM", "placement_answer", "seat_limits", "seat_of", "tube_radius"]
 
 WIRE_FILM = 0.75
 """Thinnest film between the wire's surface and the wall over the wire's radius: thinner ones are not resolved."""
@@ -29,11 +29,11 @@ _WIDEST = 1e3
 
 def seat_of(batch: RobotBatch, index: int = 0) -> Seat:
     """Seat of robot number `index`; what the placement leaves open is level, and at a gap of `GAP_SHARE`."""
-    radius, diameter = _radius(batch, index), number_of(batch.body_diameter, index)
+    radius, diameter = tube_radius(batch, index), number_of(batch.body_diameter, index)
     return Seat.of(batch.placement, RobotGeometry.of(batch, index).body, diameter, radius)
 
 
-def _radius(batch: RobotBatch, index: int) -> float:
+def tube_radius(batch: RobotBatch, index: int = 0) -> float:
     """R of the tube of robot number `index`, m."""
     return 0.5 * number_of(batch.channel_diameter, index)
 
@@ -152,7 +152,7 @@ def _films(batch: RobotBatch, part: str) -> _Films:
     asked, largest, coupling, tail = (np.full(batch.size, np.inf) for _ in range(4))
     where = ""
     for index in within(batch):
-        g, radius = RobotGeometry.of(batch, index), _radius(batch, index)
+        g, radius = RobotGeometry.of(batch, index), tube_radius(batch, index)
         if not np.isfinite(radius):
             continue
         outlines = g.outlines

@@ -21,11 +21,20 @@ _SHIPPED = Path(__file__).parent / "tables"
 
 
 @lru_cache(maxsize=256)
-def _read(path: Path) -> TubeTable | None:
+def _read(path: Path, _changed: int) -> TubeTable | None:
+    """The table in a file as it was when it was changed last; None where it is damaged or of another version."""
     try:
         return TubeTable.read(path)
-    except InputError:  # damaged, or of another version: made anew
+    except InputError:
         return None
+
+
+def _found(path: Path | None, key: str) -> TubeTable | None:
+    try:
+        table = None if path is None else _read(path, path.stat().st_mtime_ns)
+    except OSError:
+        return None
+    return table if table is not None and table.key == key else None
 
 
 def _kept(key: str) -> Path | None:
@@ -44,13 +53,7 @@ def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
         radius: R of the tube, m.
     """
     key = key_of(geometry, radius)
-    kept = _kept(key)
-    for path in (_SHIPPED / f"{key}.table", *([] if kept is None else [kept])):
-        if path.exists():
-            table = _read(path)
-            if table is not None and table.key == key:
-                return table
-    return None
+    return _found(_SHIPPED / f"{key}.table", key) or _found(_kept(key), key)
 
 
 def prepared_table(

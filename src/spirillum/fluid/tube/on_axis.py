@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.rest import even_phases, factor_of, fourier
+from spirillum.fluid.tube.rest import even_phases, factor_of, fourier, matrices_at
 from spirillum.kernels.tube_table import MOTIONS
 
 __all__ = ["OnAxis"]
 
-_LOWER = np.tril_indices(MOTIONS)
 _HALF_TURN = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
 
 
@@ -37,7 +36,7 @@ class OnAxis:
             pitches: from 0, increasing, rad.
             values: Fourier coefficients of the factor, (pitches, phases, 36).
         """
-        signs = (_HALF_TURN[:, None] * _HALF_TURN)[_LOWER]
+        signs = (_HALF_TURN[:, None] * _HALF_TURN)[np.tril_indices(MOTIONS)]
         harmonic = (np.arange(values.shape[1]) + 1) // 2
         lowered = values[1:] * signs * ((-1.0) ** harmonic)[:, None]
         return cls(np.concatenate([-pitches[:0:-1], pitches]), np.concatenate([lowered[::-1], values]))
@@ -54,7 +53,7 @@ class OnAxis:
         count = self.values.shape[1]
         phases = np.array(even_phases(count))
         rotation = _about_x(turn)
-        matrices = rotation @ _matrices(self._at(tilt), phases - turn) @ rotation.T
+        matrices = rotation @ matrices_at(self._at(tilt), phases - turn) @ rotation.T
         return fourier(factor_of(matrices, "on the tube's axis"))
 
     def _at(self, pitch: float) -> Samples:
@@ -70,18 +69,4 @@ def _about_x(angle: float) -> Samples:
     found = np.eye(MOTIONS)
     for first in (1, 4):
         found[first : first + 2, first : first + 2] = [[c, -s], [s, c]]
-    return found
-
-
-def _matrices(coefficients: Samples, phases: Samples) -> Samples:
-    """The 8x8 at phases, from Fourier coefficients of its factor."""
-    order = np.arange(len(coefficients))
-    harmonic = (order + 1) // 2
-    waves = np.where(order % 2 == 0, np.sin(np.outer(phases, harmonic)), np.cos(np.outer(phases, harmonic)))
-    waves[:, 0] = 1.0
-    factors = np.zeros((len(phases), MOTIONS, MOTIONS))
-    factors[:, _LOWER[0], _LOWER[1]] = waves @ coefficients
-    diagonal = np.arange(MOTIONS)
-    factors[:, diagonal, diagonal] = np.exp(factors[:, diagonal, diagonal])
-    found: Samples = factors @ np.swapaxes(factors, 1, 2)
     return found

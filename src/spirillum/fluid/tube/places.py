@@ -7,7 +7,6 @@ and its mirror image are the same for a robot without a tail; nothing here has a
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,7 +18,7 @@ from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import YAW_SLACK, contact_offset
 from spirillum.robot.outline import Arc, Outline
-from spirillum.robot.seat import Seat
+from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
 __all__ = ["Places", "rings_of"]
@@ -41,7 +40,8 @@ _DOWN = (0.0, 0.3, 0.65, 1.0)
 _YAW = float(np.radians(4.0))
 _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
 _LEAST_PITCH = np.radians(0.2)
-_NARROWEST = 1e-6
+_SEARCH = (31, 1e-6)
+"""Steps of the search for contact, and its accuracy, rad."""
 
 
 def rings_of(outline: Outline) -> Samples:
@@ -119,7 +119,7 @@ class Places:
             seats = [self.seat(float(t), float(f), yaw) for t in self.yaw_gaps for f in self.yaw_pitches]
             return min(seat.tail_clearance(wire.points, wire.radius).clearance for seat in seats) - film
 
-        return max(float(_LEAST_PITCH), _last_positive(spare, min(_YAW, 2.0 / 3.0 * float(self.most[-1].min()))))
+        return max(float(_LEAST_PITCH), last_clear(spare, min(_YAW, 2.0 / 3.0 * float(self.most[-1].min())), *_SEARCH))
 
     @cached_property
     def most(self) -> Samples:
@@ -175,17 +175,4 @@ class Places:
                 found = min(found, seat.clearance(outlines["coupling"]) - 0.5 * min(floor, film))
             return found
 
-        return max(float(_LEAST_PITCH), _last_positive(spare, _STEEPEST[0 if sign > 0 else 1]))
-
-
-def _last_positive(spare: Callable[[float], float], most: float) -> float:
-    """The size up to which a function stays positive, at most `most`; it starts positive."""
-    sizes = np.linspace(0.0, most, 31)
-    touching = next((i for i in range(1, sizes.size) if spare(float(sizes[i])) < 0), None)
-    if touching is None:
-        return float(most)
-    low, high = float(sizes[touching - 1]), float(sizes[touching])
-    while high - low > _NARROWEST:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if spare(middle) < 0 else (middle, high)
-    return low
+        return max(float(_LEAST_PITCH), last_clear(spare, _STEEPEST[0 if sign > 0 else 1], *_SEARCH))

@@ -31,6 +31,7 @@ __all__ = [
     "even_phases",
     "factor_of",
     "fourier",
+    "matrices_at",
     "matrix_of",
     "mirrored",
     "rest_at",
@@ -147,6 +148,20 @@ def fourier(values: Samples) -> Samples:
     for harmonic in range(1, (count - 1) // 2 + 1):
         rows += [np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count]
     found: Samples = np.tensordot(np.stack(rows), values, axes=1)
+    return found
+
+
+def matrices_at(coefficients: Samples, phases: Samples) -> Samples:
+    """The matrices at phases, (n, 8, 8), whose factors have these Fourier coefficients, (m, 36)."""
+    order = np.arange(len(coefficients))
+    turns = np.outer(phases, (order + 1) // 2)
+    waves = np.where(order % 2 == 0, np.sin(turns), np.cos(turns))
+    waves[:, 0] = 1.0
+    parameters = waves @ coefficients
+    parameters[:, _DIAGONAL] = np.exp(parameters[:, _DIAGONAL])
+    factors = np.zeros((len(phases), RATES, RATES))
+    factors[:, _LOWER[0], _LOWER[1]] = parameters
+    found: Samples = factors @ np.swapaxes(factors, 1, 2)
     return found
 
 

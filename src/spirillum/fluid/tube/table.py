@@ -21,6 +21,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import whole_file
+from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
@@ -55,7 +56,7 @@ class TubeTable:
     """Table of one robot in one tube."""
 
     geometry: RobotGeometry
-    """Robot without its hand's sign removed: everything that decides the table, but the tube."""
+    """Everything of the robot that decides the table."""
     radius: float
     """R of the tube, m."""
     packed: Samples = field(repr=False)
@@ -99,7 +100,7 @@ class TubeTable:
         numbers = self.packed[:start].astype("<f4").tobytes() + self.packed[start:].astype("<f8").tobytes()
         content = zlib.compress(json.dumps(head | {"rest": start}).encode() + b"\n" + numbers, 9)
         with whole_file(path) as temporary:
-            temporary.write_bytes(hashlib.sha256(content).digest() + content)
+            temporary.write_bytes(sealed(content))
 
     @classmethod
     def read(cls, path: Path) -> TubeTable:
@@ -147,10 +148,10 @@ def _read(path: Path) -> TubeTable | None:
     try:
         if path.stat().st_size > _LARGEST_FILE:
             return None
-        stored = path.read_bytes()
-        if hashlib.sha256(stored[32:]).digest() != stored[:32]:
+        content = unsealed(path.read_bytes())
+        if content is None:
             return None
-        words, _, numbers = zlib.decompressobj().decompress(stored[32:], _LARGEST_TABLE).partition(b"\n")
+        words, _, numbers = zlib.decompressobj().decompress(content, _LARGEST_TABLE).partition(b"\n")
         head = json.loads(words)
         if head.pop("format") != _FORMAT:
             return None

@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.domain import seat_limits, seat_of
+from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import Tube
@@ -89,7 +89,7 @@ def tabled(batch: RobotBatch) -> TabledTube | None:
         return None
     found: dict[str, TubeTable] = {}
     for index in range(batch.size):
-        radius = 0.5 * number_of(batch.channel_diameter, index)
+        radius = tube_radius(batch, index)
         if not np.isfinite(radius):
             return None
         table = find_table(RobotGeometry.of(batch, index), radius)
@@ -103,4 +103,4 @@ def tabled(batch: RobotBatch) -> TabledTube | None:
 
 
 def _key(batch: RobotBatch, index: int) -> str:
-    return key_of(RobotGeometry.of(batch, index), 0.5 * number_of(batch.channel_diameter, index))
+    return key_of(RobotGeometry.of(batch, index), tube_radius(batch, index))

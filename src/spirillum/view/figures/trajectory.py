@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.events import told
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
 from spirillum.view.figures.sheet import Sheet, add_letters
@@ -25,7 +26,6 @@ __all__ = ["trajectory_figure"]
 
 _WIDTH, _PATHS, _PANEL = 9.0, 1.75, 1.25
 """Width of the figure; heights of the paths and of a panel over time, inches."""
-_MOST_ALIKE = 4  # events of one kind that are marked one by one
 _MOST_EVENTS = 12
 _DECADES = 5
 """Range of a logarithmic axis."""
@@ -240,16 +240,10 @@ def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
         found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
     except (ValueError, TypeError, KeyError):
         return []  # they are notes on a picture; a run without them can still be drawn
-    times: dict[str, list[float]] = {}
-    for when, what in sorted(event for event in found if time[0] < event[0] <= time[-1]):
-        times.setdefault(what, []).append(when)
-    events = []
-    for what, moments in times.items():
-        if len(moments) > _MOST_ALIKE:
-            events.append((moments[0], f"{what}, {len(moments)} times"))
-        else:
-            events += [(when, what) for when in moments]
-    return sorted(events)
+    inside = [event for event in found if time[0] < event[0] <= time[-1]]
+    return [
+        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what) for event in told(inside)
+    ]
 
 
 def _event_words(events: list[tuple[float, str]]) -> list[str]:
