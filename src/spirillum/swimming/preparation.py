@@ -90,7 +90,8 @@ def prepare(
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
-    ready, _, batch = prepared(robot, "tube")
+    # A table holds for all places: the robot is checked on the axis, where a tail wider than its body is off the glass.
+    ready, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
     return Prepared(ready, table_for(batch, workers=workers, progress=progress))
 
 
