@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -67,8 +66,13 @@ def data_uri(picture: bytes, kind: str) -> str:
 
 def page(template: str, **names: Any) -> str:
     """A page from a template of this package; text is escaped, and every name of the template has to be given."""
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    text = (files("spirillum.results") / template).read_text(encoding="utf-8")
-    return environment.from_string(text).render(**names)
+    environment = Environment(
+        loader=PackageLoader("spirillum.results", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(**names)
