@@ -98,6 +98,9 @@ def simulate(
     ] = None,
     samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.")] = None,
+    column: Annotated[
+        str, typer.Option(help="Width of the plot: single or double, as the columns of a page.")
+    ] = "double",
     movie: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).")
     ] = None,
@@ -124,6 +127,10 @@ def simulate(
     target = netcdf_target(output)
     over_time = flow is not None and flow.lower().endswith(".csv")
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
+    if picture is not None:
+        from spirillum.view.figures.trajectory import check_column
+
+        check_column(column)
     if movie is not None:
         _check_movie(movie)
     loaded = loaded_robot(robot, settings)
@@ -157,7 +164,7 @@ def simulate(
             progress=progress,
         )
         write_dataset(dataset, target)
-        files, warnings = _drawn(dataset, picture, movie, progress)
+        files, warnings = _drawn(dataset, picture, column, movie, progress)
     found = run_answer(dataset)
     found["warnings"] += warnings
     renderer.show(renderer.with_files(found, file=str(output), **files), json=json)
@@ -177,7 +184,7 @@ def _check_movie(movie: Path) -> None:
 
 
 def _drawn(
-    dataset: xr.Dataset, picture: Path | None, movie: Path | None, progress: Any
+    dataset: xr.Dataset, picture: Path | None, column: str, movie: Path | None, progress: Any
 ) -> tuple[dict[str, str], list[str]]:
     """Draw and film a run; the files by what they are, and the film's warnings."""
     files: dict[str, str] = {}
@@ -186,7 +193,7 @@ def _drawn(
         from spirillum.view.figures.style import save_as
         from spirillum.view.figures.trajectory import trajectory_figure
 
-        save_as(trajectory_figure(dataset), picture)
+        save_as(trajectory_figure(dataset, column), picture)
         files["plot"] = str(picture)
     if movie is not None:
         from spirillum.errors import InputError

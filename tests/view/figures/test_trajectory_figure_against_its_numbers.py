@@ -8,7 +8,7 @@ import pytest
 from matplotlib.text import Text
 
 import spirillum as sp
-from spirillum.view.figures.trajectory import trajectory_figure
+from spirillum.view.figures.trajectory import COLUMNS, trajectory_figure
 
 TIME = np.linspace(0.0, 2.0, 101)
 
@@ -124,6 +124,85 @@ def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
     assert not {"motor current (A)", "motor current (mA)"} & set(shown)
     assert shown["wobble angle (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.1) + 0 * TIME)
     assert shown["phase lag (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.5) + 0 * TIME)
+
+
+@pytest.fixture
+def tube_run(run: Any) -> Any:
+    """The same run with what one in a tube has: around the wall by 20 degrees, with a film of 500 to 5 micrometres."""
+    robot = sp.load("biorob2012-wide")
+    azimuth = np.radians(-20.0) * TIME / 2.0
+    offset = 0.0105
+    path = np.stack([1e-3 * TIME, offset * np.sin(azimuth), -offset * np.cos(azimuth)], axis=-1)
+    turned = np.stack([np.cos(0.5 * azimuth), np.sin(0.5 * azimuth), 0 * TIME, 0 * TIME], axis=-1)
+    more = {
+        "azimuth": azimuth,
+        "body_angle": -0.5 * TIME,
+        "wall_gap": 5e-4 * 10.0**-TIME,
+        "wall_pitch": np.radians(0.5 * TIME),
+        "wall_yaw": np.radians(-0.2 * TIME),
+        "contact_force": 0.02 * (TIME > 1.0),
+        "contact_friction": 0.002 * (TIME > 1.0),
+    }
+    run = run.assign(
+        position=(("time", "axis"), path),
+        attitude=(("time", "quaternion"), turned),
+        mean_forward_velocity=1e-3,
+        **{name: ("time", values) for name, values in more.items()},
+    )
+    return run.assign_attrs(
+        robot=robot.name, roughness=1e-5, ends="closed", settings=json.dumps(robot.model_dump(), sort_keys=True)
+    )
+
+
+@pytest.mark.parametrize("column", ["single", "double"])
+@pytest.mark.usefixtures("unplaced")
+def test_run_in_a_tube_shows_film_contact_and_cross_section(tube_run: Any, column: str) -> None:
+    figure = trajectory_figure(tube_run, column)
+    assert figure.get_figwidth() == COLUMNS[column]
+    shown = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
+    gap = shown["gap (mm)"]
+    assert gap.get_yscale() == "log"
+    assert gap.lines[0].get_ydata() == pytest.approx(1e3 * tube_run["wall_gap"].values)
+    assert list(gap.lines[1].get_ydata()) == pytest.approx([0.01, 0.01])  # the roughness
+    assert shown["azimuth (deg)"].lines[0].get_ydata() == pytest.approx(-10.0 * TIME)
+    assert shown["contact (mN)"].lines[0].get_ydata().max() == pytest.approx(20.0)
+    assert shown["contact (mN)"].lines[1].get_ydata().max() == pytest.approx(2.0)
+    section = figure.axes[0]
+    path = section.lines[0]
+    assert np.hypot(path.get_xdata(), path.get_ydata()) == pytest.approx(10.5 + 0 * TIME)
+    assert float(path.get_xdata()[-1]) == pytest.approx(-10.5 * np.sin(np.radians(20.0)))
+    end, start = (patch.get_xy() for patch in section.patches[:2])
+    for outline, middle in ((start, (0.0, -10.5)), (end, (path.get_xdata()[-1], path.get_ydata()[-1]))):
+        assert np.hypot(*(outline - middle).T) == pytest.approx(9.0 + 0 * outline[:, 0], rel=2e-3)
+    assert section.patches[2].get_radius() == pytest.approx(20.0)  # the glass
+
+
+@pytest.mark.usefixtures("unplaced")
+@pytest.mark.parametrize(
+    ("factor", "turned", "words"),
+    [
+        (1.0, 1.0, "goes 20° around the tube with its body's rotation"),
+        (1.0, -1.0, "goes 20° around the tube against its body's rotation"),
+        (0.0, 1.0, "stays at its azimuth"),
+    ],
+)
+def test_headline_says_which_way_it_went(tube_run: Any, factor: float, turned: float, words: str) -> None:
+    tube_run = tube_run.assign(azimuth=factor * tube_run["azimuth"], body_angle=turned * tube_run["body_angle"])
+    texts = " ".join(text.get_text() for text in trajectory_figure(tube_run).findobj(Text))
+    assert words in " ".join(texts.split())
+
+
+@pytest.mark.usefixtures("unplaced")
+def test_robot_that_touches_nothing_has_no_panel_of_contact(tube_run: Any) -> None:
+    tube_run = tube_run.assign(
+        contact_force=0.0 * tube_run["contact_force"], contact_friction=0.0 * tube_run["azimuth"]
+    )
+    assert not [label for label in panels(tube_run) if label.startswith("contact")]
+
+
+def test_unknown_width_is_named(run: Any) -> None:
+    with pytest.raises(sp.InputError, match="column = 'triple'; allowed: single, double"):
+        trajectory_figure(run, "triple")
 
 
 @pytest.mark.usefixtures("unplaced")

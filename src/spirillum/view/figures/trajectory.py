@@ -1,4 +1,8 @@
-"""A run in time: its path from the side and from above, gap, rates, current, powers and energies over one time axis."""
+"""A run in time on one sheet: its path, and what it is made of over one time axis.
+
+A run in a tube has its path in the cross-section, the film on a logarithmic axis, azimuth, angles against the wall and
+contact; any other its path from the side and from above, current, powers and energies.
+"""
 
 from __future__ import annotations
 
@@ -11,26 +15,40 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.events import told
+from spirillum.dynamics.run_file import robot_of
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
+from spirillum.robot.robot import Robot
+from spirillum.view.figures.cross_section import draw_cross_section
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["trajectory_figure"]
+__all__ = ["COLUMNS", "check_column", "trajectory_figure"]
 
-_WIDTH, _PATHS, _PANEL = 9.0, 1.75, 1.25
-"""Width of the figure; heights of the paths and of a panel over time, inches."""
+COLUMNS = {"single": 3.5, "double": 7.16}
+"""Widths of a figure that fills one or both columns of a page, inches (those of the IEEE)."""
+_HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
+"""Heights of the paths, of the cross-section, and of a panel over time, inches."""
 _MOST_EVENTS = 12
+_MOST_BESIDE = 4
+"""Entries of a legend from which on they stand in two rows."""
 _DECADES = 5
 """Range of a logarithmic axis."""
+_DECADES_BARE = 30.0
+"""Ratio of gaps above which only decades are labelled."""
 _SPREAD = 30.0
 """Ratio of the largest values of two lines above which their axis is logarithmic."""
+_STILL = 0.5
+"""Change of azimuth below which a robot is said to stay where it was laid down, degrees."""
+_ONE_WAY = 0.75
+"""Net change of azimuth over all of it above which a robot is said to go around the tube one way."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +60,10 @@ class _Panel:
     """Variable, and its words in the legend."""
     logarithmic: bool = False
     """Whether a logarithmic axis may be used."""
+    film: bool = False
+    """Whether the axis is logarithmic over the whole range of the lines, with the roughness as a level."""
+    changing: bool = False
+    """Whether a panel whose lines are constant is left out."""
 
 
 _PANELS = (
@@ -73,12 +95,23 @@ _PANELS = (
         logarithmic=True,
     ),
 )
+_IN_TUBE = (
+    _Panel("gap", (("wall_gap", "under the body"), ("tail_gap", "under the tail")), film=True),
+    _Panel("azimuth", (("azimuth", ""),)),
+    _Panel("pitch, yaw", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
+    _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True),
+    _Panel("velocity $U_x$", (("forward_velocity", ""),)),
+    _Panel("body rate", (("body_rotation_rate", ""),)),
+    _Panel("tail rate", (("tail_rotation_rate", "tail"), ("motor_rotation_rate", "motor"))),
+    _Panel("mean flow", (("mean_flow", ""),), changing=True),
+)
 _COLOUR_OF = {
     "tail": COLOURS["blue"],
     "body": COLOURS["orange"],
     "motor": COLOURS["green"],
     "pitch": COLOURS["blue"],
     "yaw": COLOURS["vermillion"],
+    "under the tail": COLOURS["vermillion"],
     "electrical": COLOURS["black"],
     "shaft": COLOURS["blue"],
     "drive": COLOURS["blue"],
@@ -89,6 +122,7 @@ _LINE_OF: dict[str, Any] = {
     "body": "--",
     "motor": (0, (1, 1.2)),
     "yaw": "--",
+    "under the tail": "--",
     "shaft": "--",
     "drive": "--",
     "friction": (0, (1, 1.2)),
@@ -96,57 +130,123 @@ _LINE_OF: dict[str, Any] = {
 }
 
 
-def trajectory_figure(dataset: xr.Dataset) -> Figure:
+def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
     """A run in time. Panels without data are left out; events are numbered on the time axes and named below.
 
     Args:
-        dataset: what `spirillum.simulate` returns: a free run, a magnetic one, or an axial one.
+        dataset: what `spirillum.simulate` returns: a free run, one in a tube, a magnetic one, or an axial one.
+        column: `single` or `double`: width of the figure, see `COLUMNS`.
 
     Raises:
-        InputError: if it has less than two samples of time, or no variable that a panel shows.
+        InputError: for an unknown column, or a run with less than two samples of time or no variable that a panel
+            shows.
     """
+    check_column(column)
     time = _time_of(dataset)
     path = _path_of(dataset, time)
-    shown = [panel for panel in _PANELS if any(True for _ in _lines(dataset, panel, time))]
+    tube = _tube_robot(dataset, path)
+    shown = [panel for panel in (_PANELS if tube is None else _IN_TUBE) if _has(dataset, panel, time)]
     if path is None and not shown:
         raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
     events = _events_of(dataset, time)
-    facts = [
-        f"{name} {plain(str(dataset.attrs[name]), 40)}"
-        for name in ("model", "motion", "friction")
-        if dataset.attrs.get(name)
-    ]
+    beside = 2 if column == "double" else 1
     with styled():
+        paths, section, panel_height = _HEIGHTS[column]
+        heads = 0 if path is None else 2 if tube is None else 1
+        drawn = heads + len(shown)
+        first = [paths if tube is None else section] * -(-heads // beside)
+        rows = [*first, *[panel_height] * (-(-drawn // beside) - len(first))]
         sheet = Sheet(
-            f"{plain(str(dataset.attrs.get('robot', 'a robot')), 50)}: a run in time",
-            " · ".join([*facts, "computed, nothing is measured"]),
-            width=_WIDTH,
-            heights=[_PATHS] * (path is not None) + [_PANEL] * -(-len(shown) // 2),
-            columns=2,
+            _headline(dataset, path, in_tube=tube is not None),
+            " · ".join([*_facts(dataset, in_tube=tube is not None), "computed, nothing is measured"]),
+            width=COLUMNS[column],
+            heights=rows,
+            columns=beside,
             notes=_event_words(events),
             sharey=False,
         )
-        panels = iter(sheet.panels.flat)
-        if path is not None:
-            for name, across in (("side", 2), ("from above", 1)):
-                _draw_path(next(panels), path, across, name)
-        over_time = []
-        for number, panel in enumerate(shown):
-            axes = next(panels)
-            _draw_panel(axes, dataset, panel, time)
-            _mark_events(axes, events, numbered=number < 2)
+        panels = list(sheet.panels.flat)
+        for axes in panels[drawn:]:
+            axes.remove()
+        if path is not None and tube is not None:
+            draw_cross_section(panels[0], dataset, tube, path)
+        elif path is not None:
+            for axes, (name, across) in zip(panels, (("side", 2), ("from above", 1)), strict=False):
+                _draw_path(axes, path, across, name)
+        over_time = panels[heads:drawn]
+        for number, (axes, panel) in enumerate(zip(over_time, shown, strict=True)):
+            _draw_panel(axes, dataset, panel, time, beside)
+            _mark_events(axes, events, float(time[-1] - time[0]), numbered=number < beside)
             axes.set_xlim(float(time[0]), float(time[-1]))
-            over_time.append(axes)
-            if number + 2 < len(shown):
+            if number + beside < len(shown):
                 axes.tick_params(labelbottom=False)
             else:
                 axes.set_xlabel("time (s)")
-        for axes in panels:
-            axes.remove()
         for axes in over_time[1:]:
             axes.sharex(over_time[0])
-        add_letters(axes for axes in sheet.panels.flat if axes.figure is not None)
+        add_letters(panels[:drawn])
         return sheet.finished()
+
+
+def check_column(column: str) -> None:
+    """Refuse a width that no page has.
+
+    Raises:
+        InputError: for an unknown column.
+    """
+    if column not in COLUMNS:
+        raise InputError(f"column = {str(column)[:40]!r}; allowed: {', '.join(COLUMNS)}")
+
+
+def _tube_robot(dataset: xr.Dataset, path: Samples | None) -> Robot | None:
+    """The robot of a run in a tube; None for any other."""
+    if path is None or "azimuth" not in dataset or "attitude" not in dataset:
+        return None
+    robot = robot_of(dataset)
+    return robot if robot.channel is not None else None
+
+
+def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> str:
+    """What the run shows, in one line."""
+    name = plain(str(dataset.attrs.get("robot", "a robot")), 50)
+    if not in_tube or path is None:
+        return f"{name}: a run in time"
+    speed = float(dataset["mean_forward_velocity"]) if "mean_forward_velocity" in dataset else np.nan
+    swims = f"swims at {1e3 * speed:.3g} mm/s" if np.isfinite(speed) else "moves"
+    azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
+    around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
+    if swing < _STILL:
+        return f"{name} {swims} and stays at its azimuth"
+    if abs(around) < _ONE_WAY * swing:
+        return f"{name} {swims} and goes {swing:.2g}° around the tube, to and fro"
+    turned = float(dataset["body_angle"][-1] - dataset["body_angle"][0]) if "body_angle" in dataset else 0.0
+    sense = (
+        "" if turned == 0 else " with its body's rotation" if turned * around > 0 else " against its body's rotation"
+    )
+    return f"{name} {swims} and goes {abs(around):.2g}° around the tube{sense}"
+
+
+def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
+    """What the run was told."""
+    attrs = dataset.attrs
+    found = [f"{name} {plain(str(attrs[name]), 40)}" for name in ("model", "motion", "friction") if attrs.get(name)]
+    if in_tube:
+        found += [
+            f"{words} {plain(str(attrs[name]), 40)}"
+            for name, words in (("ends", "ends"), ("friction_coefficient", "dry friction"))
+            if name in attrs
+        ]
+        found += [f"roughness {1e6 * float(attrs['roughness']):.3g} µm"] if "roughness" in attrs else []
+        found += [f"waited {attrs['wait']:g} s"] if attrs.get("wait") else []
+    return found
+
+
+def _has(dataset: xr.Dataset, panel: _Panel, time: Samples) -> bool:
+    """Whether a panel has anything to show; a mean flow that is not imposed follows from the rest."""
+    if panel.lines[0][0] == "mean_flow" and dataset.attrs.get("ends") != "imposed flow":
+        return False
+    lines = [line for _, line in _lines(dataset, panel, time)]
+    return any(np.nanmax(line) > np.nanmin(line) for line in lines) if panel.changing else bool(lines)
 
 
 def _time_of(dataset: xr.Dataset) -> Samples:
@@ -194,10 +294,12 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples) -> None:
+def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, beside: int) -> None:
+    """Draw lines over time in a sheet of `beside` columns; a single one has low panels."""
     lines = list(_lines(dataset, panel, time))
     values = np.concatenate([line for _, line in lines])
     scale = Scale.of(values, unit_of(panel.lines[0][0]))
+    film = panel.film and bool(np.all(values[np.isfinite(values)] > 0))
     largest = [float(np.nanmax(np.abs(line))) for _, line in lines]
     steep = panel.logarithmic and min(largest) > 0 and max(largest) > _SPREAD * min(largest)
     for words, line in lines:
@@ -213,21 +315,49 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples) -
         top = max(largest) / scale.factor
         axes.set_yscale("log")
         axes.set_ylim(max(0.1 * min(largest) / scale.factor, top * 10.0**-_DECADES), 3.0 * top)
+    elif film:
+        _draw_film(axes, dataset, values, scale)
     elif panel.lines[0][0] == "wall_gap":
         axes.set_ylim(bottom=min(0.0, float(np.nanmin(values)) / scale.factor))
-    axes.set_ylabel(f"{panel.label} ({scale.unit})")
-    if any(words for words, _ in lines):
-        axes.legend(loc="upper right", ncols=4, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2)
-        _make_room(axes)
+    axes.set_ylabel(f"{panel.label}{' ' if beside > 1 else chr(10)}({scale.unit})")
+    if any(words for words, _ in lines) and not (film and len(lines) == 1):
+        columns = len(lines) if len(lines) < _MOST_BESIDE else 2
+        axes.legend(
+            loc="upper right", ncols=columns, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2, labelspacing=0.2
+        )
+        _make_room(axes, -(-len(lines) // columns) * (1.0 if beside > 1 else 2.0))
 
 
-def _make_room(axes: Axes) -> None:
-    """Room above the lines for the legend."""
+def _draw_film(axes: Axes, dataset: xr.Dataset, values: Samples, scale: Scale) -> None:
+    """A logarithmic axis for gaps, with the height of the asperities: below it they carry."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    roughness = float(dataset.attrs.get("roughness", np.nan))
+    if roughness > 0:
+        low = min(low, roughness)
+        axes.axhline(roughness / scale.factor, color="#555555", linewidth=0.9, linestyle=(0, (1, 1.5)))
+        axes.annotate(
+            "roughness",
+            (0.01, roughness / scale.factor),
+            xycoords=axes.get_yaxis_transform(),
+            xytext=(0, 2),
+            textcoords="offset points",
+            size=7.5,
+            color="#555555",
+        )
+    axes.set_yscale("log")
+    axes.set_ylim(0.6 * low / scale.factor, max(1.6 * high, 10.0 * low) / scale.factor)
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0,) if high > _DECADES_BARE * low else (1.0, 2.0, 5.0), numticks=7))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def _make_room(axes: Axes, rows: float) -> None:
+    """Room above the lines for a legend of so many rows of the higher panels."""
     low, high = axes.get_ylim()
     if axes.get_yscale() == "log":
-        axes.set_ylim(low, high * (high / low) ** 0.22)
+        axes.set_ylim(low, high * (high / low) ** (0.22 * rows))
     else:
-        axes.set_ylim(low, high + 0.28 * (high - low))
+        axes.set_ylim(low, high + 0.28 * rows * (high - low))
 
 
 def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
@@ -254,20 +384,25 @@ def _event_words(events: list[tuple[float, str]]) -> list[str]:
     return [" · ".join(words)] if words else []
 
 
-def _mark_events(axes: Axes, events: list[tuple[float, str]], *, numbered: bool) -> None:
+def _mark_events(axes: Axes, events: list[tuple[float, str]], span: float, *, numbered: bool) -> None:
     for number, (when, _) in enumerate(events, 1):
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
         if numbered and number <= _MOST_EVENTS:
-            level = 1.02 + 0.09 * _crowded(events, number - 1)
-            axes.text(
-                when, level, str(number), transform=axes.get_xaxis_transform(), ha="center", size=7, color="#555555"
+            axes.annotate(
+                str(number),
+                (when, 1.0),
+                xycoords=axes.get_xaxis_transform(),
+                xytext=(0, 2 + 7 * _crowded(events, number - 1, span)),
+                textcoords="offset points",
+                ha="center",
+                size=7,
+                color="#555555",
             )
 
 
-def _crowded(events: list[tuple[float, str]], place: int) -> int:
-    """0 or 1: every other one of events close to each other stands higher."""
-    span = max(events[-1][0] - events[0][0], 1e-300)
-    near = [later[0] - earlier[0] < 0.02 * span for earlier, later in pairwise(events[: place + 1])]
+def _crowded(events: list[tuple[float, str]], place: int, span: float) -> int:
+    """0 or 1: every other one of events close to each other in a run of `span` stands higher."""
+    near = [later[0] - earlier[0] < 0.03 * span for earlier, later in pairwise(events[: place + 1])]
     level = 0
     for close in near:
         level = 1 - level if close else 0
