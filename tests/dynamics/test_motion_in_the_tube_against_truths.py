@@ -441,6 +441,10 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any) -> No
     assert found.attrs["roughness"] == 1e-4
     assert found.attrs["error_estimate"] == 0.02
     assert float(found["electrical_energy"][0]) == 0.0
+    assert "Reynolds" not in found.attrs["warnings"]
+    file.write_text("time_s,flow_mm_s\n0,0\n2,-40\n")
+    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, True, None)
+    assert "Reynolds number (imposed flow, body diameter) = 0.2" in fast.attrs["warnings"]
     open_ended = run_in_tube(steady, table, times, placed, InTube(), None, True, None)
     assert open_ended.attrs["ends"] == "open"  # the channel has a length
     for text, words in (

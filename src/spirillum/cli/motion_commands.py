@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -193,18 +195,27 @@ def _drawn(
         from spirillum.view.figures.style import save_as
         from spirillum.view.figures.trajectory import trajectory_figure
 
-        save_as(trajectory_figure(dataset, column), picture)
+        with _after_the_run("plot"):
+            save_as(trajectory_figure(dataset, column), picture)
         files["plot"] = str(picture)
     if movie is not None:
-        from spirillum.errors import InputError
         from spirillum.view.scene3d.film import film
 
-        try:
+        with _after_the_run("film"):
             warnings += film(dataset, movie, progress=progress).warnings
-        except InputError as error:
-            raise InputError(f"the run is written, the film is not: {error}") from error
         files["movie"] = str(movie)
     return files, warnings
+
+
+@contextmanager
+def _after_the_run(what: str) -> Iterator[None]:
+    """Say of what cannot be drawn that the run itself is not lost."""
+    from spirillum.errors import InputError
+
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"the run is written, the {what} is not: {error}") from error
 
 
 def magnetic_sweep(

@@ -21,7 +21,7 @@ from spirillum.swimming.intervals import LEVEL
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DRAWS", "chosen_model", "with_intervals"]
+__all__ = ["DRAWS", "check_draws", "chosen_model", "with_intervals"]
 
 DRAWS = 100
 """Draws of a posterior that are run."""
@@ -78,6 +78,17 @@ def chosen_model(
     return name, "free", said
 
 
+def check_draws(draws: int) -> None:
+    """Refuse a number of draws that tells nothing, or that takes too long.
+
+    Raises:
+        InputError: for such a number.
+    """
+    given: Any = draws
+    if isinstance(given, bool) or not isinstance(given, Integral) or not _FEWEST <= int(given) <= _MOST:
+        raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
+
+
 def with_intervals(
     dataset: xr.Dataset,
     posterior: PosteriorFile,
@@ -95,13 +106,7 @@ def with_intervals(
         run: runs a robot for as long.
         draws: how many draws are run.
         tell: told how many are done, and of how many.
-
-    Raises:
-        InputError: for a number of draws that tells nothing, or that takes too long.
     """
-    given: Any = draws
-    if not isinstance(given, Integral) or not _FEWEST <= int(given) <= _MOST:
-        raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}
     drawn = posterior.drawn(robot, draws, rng)

@@ -11,13 +11,31 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["duration_of", "sample_times"]
+__all__ = ["check_samples", "duration_of", "sample_times", "stated_duration"]
 
 _LARGEST_SAMPLES = 1_000_000
+_MOST_A_TURN = 10_000
 _SHORTEST = 1e-6
 """Shortest run, in turns."""
 _ROUNDING = 1e-9
 """Difference of two times that is rounding, over the distance of two samples."""
+
+
+def stated_duration(turns: float, duration: str | float | None) -> float | None:
+    """Length of a run as far as it is known without a rate: s, or None where it is in turns.
+
+    Args:
+        turns: length in turns.
+        duration: length in time instead.
+
+    Raises:
+        InputError: for a length that is none.
+    """
+    if duration is not None:
+        return parse_option("duration", duration, KINDS["time"])
+    if not _SHORTEST <= turns <= 1e5:
+        raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
+    return None
 
 
 def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
@@ -31,14 +49,22 @@ def duration_of(turns: float, turn: float, duration: str | float | None) -> floa
     Raises:
         InputError: for a length that is none.
     """
-    if duration is None:
-        if not _SHORTEST <= turns <= 1e5:
-            raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
+    end = stated_duration(turns, duration)
+    if end is None:
         return turns * turn
-    end = parse_option("duration", duration, KINDS["time"])
     if end < _SHORTEST * turn:
         raise InputError(f"duration = {end:g} s; allowed: at least {_SHORTEST * turn:.3g} s, a millionth of a turn")
     return end
+
+
+def check_samples(samples_per_turn: int) -> None:
+    """Refuse a number of samples a turn that is none.
+
+    Raises:
+        InputError: for less than one, or too many.
+    """
+    if not 1 <= samples_per_turn <= _MOST_A_TURN:
+        raise InputError(f"samples-per-turn = {samples_per_turn}; allowed: 1 to {_MOST_A_TURN} a turn")
 
 
 def sample_times(end: float, turn: float, samples_per_turn: int, switches: Sequence[float] = ()) -> Samples:
@@ -56,11 +82,11 @@ def sample_times(end: float, turn: float, samples_per_turn: int, switches: Seque
     Raises:
         InputError: for no samples, or too many.
     """
-    count = math.ceil(end / turn * min(max(samples_per_turn, 1), 10_000))
-    if not 1 <= samples_per_turn <= 10_000 or count > _LARGEST_SAMPLES:
+    check_samples(samples_per_turn)
+    count = math.ceil(end / turn * samples_per_turn)
+    if count > _LARGEST_SAMPLES:
         raise InputError(
-            f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: 1 to 10000 a turn and "
-            f"{_LARGEST_SAMPLES} in all"
+            f"samples-per-turn = {samples_per_turn} makes {count} samples; allowed: at most {_LARGEST_SAMPLES} in all"
         )
     time = np.linspace(0.0, end, max(count, 1) + 1)
     for switch in switches:

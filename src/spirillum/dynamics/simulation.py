@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
-from spirillum.dynamics.fitted_runs import DRAWS, chosen_model, with_intervals
+from spirillum.dynamics.fitted_runs import DRAWS, check_draws, chosen_model, with_intervals
 from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
@@ -24,16 +24,19 @@ from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.kernels import rigid_links
 from spirillum.kernels import two_links as kernel
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
-from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
-from spirillum.swimming.steady import friction_reading
+from spirillum.swimming.steady import friction_reading, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
@@ -103,6 +106,11 @@ def simulate(
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
         known = read_posterior(posterior, *([] if model is None else [model]))
     placed, times = Placement.of(placement), Timing.of(timing)
+    times.check()
+    check_draws(draws)
+    if friction is not None:
+        friction_reading(friction)
+    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     model, motion, said = chosen_model(model, motion, calibration, known)
     held, asked = motion_of(motion) == "held", InTube.of(in_tube)
     walled = model == "tube" and not held
@@ -117,7 +125,7 @@ def simulate(
         )
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None) -> xr.Dataset:
-        table = _table(one, placed, asked, tell) if walled else None
+        table = _table(one, placed, asked, height, tell) if walled else None
         steady = predict(
             one,
             model=model,
@@ -130,9 +138,8 @@ def simulate(
             progress=tell,
         )
         if table is not None:
-            height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
             return run_in_tube(steady, table, timing, placed, asked, height, weight, tell)
-        return held_run(steady, timing) if held else _free_run(steady, timing, placed, roughness, weight, tell)
+        return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, weight, tell)
 
     own = load(robot)
     central = own if known is None else known.central(own)
@@ -147,10 +154,19 @@ def simulate(
     return dataset.assign_attrs(warnings="\n".join([*said, *warnings]))
 
 
-def _table(robot: Robot, placed: Placement, asked: InTube, progress: Progress | None) -> TubeTable:
-    """The robot's table, made if there is none, once all else is known to be right."""
-    _, _, batch = prepared(robot, "tube", placement=placed)
-    check_in_tube(robot, placed, asked)
+def _table(
+    robot: Robot, placed: Placement, asked: InTube, roughness: float | None, progress: Progress | None
+) -> TubeTable:
+    """The robot's table, made if there is none, once all else is known to be right.
+
+    Raises:
+        InputError: for a robot or a place that no table knows.
+    """
+    batch = RobotBatch.of(robot, placed)
+    outside = broken(requirements(batch, TabledTube({})))
+    if outside:
+        raise InputError(f"{robot.name} with model 'tube': {outside[0].sentence()}")
+    check_in_tube(robot, placed, asked, roughness)
     return table_for(batch, workers=1, progress=progress)
 
 
@@ -158,7 +174,7 @@ def _free_run(
     steady: Prediction,
     times: Timing,
     placed: Placement,
-    roughness: str | float | None,
+    roughness: float | None,
     weight: bool,  # noqa: FBT001 - one of the run's settings
     progress: Progress | None,
 ) -> xr.Dataset:
@@ -228,9 +244,8 @@ def _check_held(placement: Placement, roughness: str | float | None, *, weight: 
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
 
 
-def _links(steady: Prediction, roughness: str | float | None, *, weight: bool) -> TwoLinks:
+def _links(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
     effective = steady.effective_friction
-    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     return two_links(
         steady.robot,
         steady.batch,
@@ -239,7 +254,7 @@ def _links(steady: Prediction, roughness: str | float | None, *, weight: bool) -
         effective=0.0 if np.isnan(effective) else effective,
         calibrated=steady.calibrated,
         weight=weight,
-        roughness=height,
+        roughness=roughness,
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch, Window, schedule, windows_of
-from spirillum.dynamics.sampling import duration_of, sample_times
+from spirillum.dynamics.sampling import check_samples, duration_of, sample_times, stated_duration
 from spirillum.errors import InputError
 from spirillum.robot.arguments import Options
 
@@ -78,6 +78,16 @@ class Timing(Options):
     on throughout."""
     duty: Annotated[str | Path | None, BeforeValidator(_duty_file)] = None
     """Duty file instead: CSV with the columns `time_s` and `duty` (0 to 1), each row until the next."""
+
+    def check(self) -> None:
+        """Refuse what no run can have, before anything is known of the robot's own rate.
+
+        Raises:
+            InputError: for a length that is none, no samples, times that go back, or a wrong duty file.
+        """
+        end = stated_duration(self.turns, self.duration)
+        check_samples(self.samples_per_turn)
+        schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
 
     def timetable(self, turn: float, duty: float) -> Timetable:
         """The times of a run.

@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 __all__ = ["tube_run"]
 
+_FEWEST = 2
+"""Moments of the shortest run."""
+
 
 def tube_run(
     steady: Prediction,
@@ -75,7 +78,7 @@ def tube_run(
     first: Samples | Checkpoint
     if isinstance(start, StartPlace):
         laid = laid_down(steady.robot, robot, start)
-        check_roughness(robot, laid)
+        check_roughness(robot.roughness, float(robot.gaps(laid).min()))
         check_in_table(robot, laid, observed_at(robot, laid)[kernel.OUTSIDE])
         first, before = _waited(robot, laid, wait, reach, progress)
     else:
@@ -86,6 +89,9 @@ def tube_run(
                 f"the run already ends at t = {moments[0]:.6g} s; allowed: a longer duration, to continue it"
             )
     run = integrate_in_tube(robot, first, moments, times.switches, reach, progress)
+    if run.time.size < _FEWEST:
+        what = run.events[-1].what if run.events else "the equations have no next step"
+        raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(times.switches, driven)
     ended = float(run.time[-1])

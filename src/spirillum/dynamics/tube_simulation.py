@@ -13,15 +13,17 @@ from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, tube_robot
 from spirillum.dynamics.tube_run import tube_run
-from spirillum.dynamics.tube_start import StartPlace
+from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.prediction import Prediction
+from spirillum.robot.seat import gap_of
+from spirillum.swimming.prediction import Prediction, flow_limit
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -70,6 +72,10 @@ def run_in_tube(
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    if asked.flow is not None:
+        said += [
+            limit.sentence() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])
+        ]
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
     return dataset.assign_attrs(
@@ -77,8 +83,14 @@ def run_in_tube(
     )
 
 
-def check_in_tube(robot: Robot, placed: Placement, asked: InTube) -> None:
+def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
     """Refuse what a run in a tube cannot be told, before minutes go into a table.
+
+    Args:
+        robot: the robot.
+        placed: where it is laid down, ends, and a constant flow.
+        asked: azimuth, waiting time, dry friction, and a flow over time.
+        roughness: height of the asperities, m; None: 1e-4 of the body's radius.
 
     Raises:
         InputError: if there is something.
@@ -87,7 +99,9 @@ def check_in_tube(robot: Robot, placed: Placement, asked: InTube) -> None:
         raise InputError(
             f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"
         )
-    _around(robot, placed, asked, None)
+    _around(robot, placed, asked, roughness)
+    if roughness is not None and robot.channel is not None:
+        check_roughness(roughness, gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter))
 
 
 def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> Surroundings:

@@ -64,16 +64,19 @@ def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
     return state
 
 
-def check_roughness(links: TubeRobot, state: Samples) -> None:
+def check_roughness(roughness: float, gap: float) -> None:
     """Refuse a start at which asperities are pressed by more than the robot's weight.
+
+    Args:
+        roughness: height of the asperities, m.
+        gap: smallest gap of the robot, m.
 
     Raises:
         InputError: if they are.
     """
-    gap = float(links.gaps(state).min())
-    if gap < 0.5 * links.roughness:
+    if gap < 0.5 * roughness:
         raise InputError(
-            f"roughness = {show(links.roughness, 'um')} with a gap of {show(gap, 'um')} at the start: asperities would "
+            f"roughness = {show(roughness, 'um')} with a gap of {show(gap, 'um')} at the start: asperities would "
             "carry more than its weight; allowed: a roughness below twice the gap, or a larger gap"
         )
 

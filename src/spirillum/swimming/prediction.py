@@ -24,6 +24,7 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import GAP_SHARE
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
@@ -39,9 +40,20 @@ from spirillum.swimming.steady import (
 )
 from spirillum.units import KINDS, parse_option, show
 
-__all__ = ["Prediction", "accuracy_limits", "calibration_warnings", "checked_batch", "predict", "prepared"]
+__all__ = [
+    "Prediction",
+    "accuracy_limits",
+    "calibration_warnings",
+    "checked_batch",
+    "flow_limit",
+    "predict",
+    "prepared",
+]
 
 _LARGEST_REYNOLDS = 0.1
+_GAP_STEP = 1.02
+"""Ratio of gaps to which the least one that a model resolves is told."""
+_INERTIA = "inertia is neglected (Stokes flow)"
 
 
 @dataclass(frozen=True)
@@ -295,10 +307,32 @@ def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None
     """
     batch = RobotBatch.of(robot, placement)
     check_placement(batch.placement, model)
-    outside = broken(requirements(batch, model))
+    outside = broken(requirements(batch, quickest(model, batch)))
     if outside:
-        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}")
+        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_least_gap(batch, model)}")
     return batch
+
+
+def _least_gap(batch: RobotBatch, model: SwimmerModel) -> str:
+    """Where only a thin film keeps a model from an answer: the least gap that it resolves, to 2 %, and what else helps.
+
+    It is looked for between the gap that is asked for and the one that is taken where none is.
+    """
+    asked = batch.placement.gap
+    if asked is None or not model.placed:
+        return ""
+
+    def fits(gap: float) -> bool:
+        placed = batch.placement.model_copy(update={"gap": gap})
+        return not broken(requirements(replace(batch, placement=placed), model))
+
+    low, high = asked, GAP_SHARE * 0.5 * float(batch.body_diameter[0])
+    if low >= high or not fits(high):
+        return ""
+    while high > _GAP_STEP * low:
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if fits(middle) else (middle, high)
+    return f"; here at least placement.gap = {show(high, 'mm')}, or a table (`spirillum prepare`)"
 
 
 def _rate(value: str | float | None, placement: Placement) -> float | None:
@@ -312,26 +346,16 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
 
 def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
     """What has to hold for the answer to be accurate; each broken one is a warning."""
-    inertia = "inertia is neglected (Stokes flow)"
-    flow = abs(batch.placement.flow or 0.0)
     return [
         *model.cautions(batch),
-        Limit.of(
-            "Reynolds number (imposed flow, body diameter)",
-            batch.density * flow * batch.body_diameter / batch.viscosity,
-            "at most",
-            _LARGEST_REYNOLDS,
-            "1",
-            inertia,
-            "flow-reynolds-number",
-        ),
+        flow_limit(batch, abs(batch.placement.flow or 0.0)),
         Limit.of(
             "Reynolds number (body diameter)",
             result.reynolds_number,
             "at most",
             _LARGEST_REYNOLDS,
             "1",
-            inertia,
+            _INERTIA,
             "reynolds-number",
         ),
         Limit.of(
@@ -340,10 +364,23 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
             "at most",
             _LARGEST_REYNOLDS,
             "1",
-            inertia,
+            _INERTIA,
             "tail-reynolds-number",
         ),
     ]
+
+
+def flow_limit(batch: RobotBatch, flow: float) -> Limit:
+    """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
+    return Limit.of(
+        "Reynolds number (imposed flow, body diameter)",
+        batch.density * flow * batch.body_diameter / batch.viscosity,
+        "at most",
+        _LARGEST_REYNOLDS,
+        "1",
+        _INERTIA,
+        "flow-reynolds-number",
+    )
 
 
 def _why_not(

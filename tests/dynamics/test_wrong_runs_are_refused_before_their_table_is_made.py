@@ -1,0 +1,75 @@
+"""A table takes minutes: whatever is wrong in a run is said before one is made, and a written run is never lost."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import spirillum as sp
+from spirillum.cli.app import app
+from spirillum.dynamics import simulation
+from spirillum.errors import InputError
+
+ODD = {"channel.diameter": "39.5 mm"}  # of which no table is there
+
+
+@pytest.fixture(autouse=True)
+def no_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def made(*_: Any, **__: Any) -> Any:
+        raise AssertionError("a table would be made")
+
+    monkeypatch.setattr(simulation, "table_for", made)
+    monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"timing": {"duration": "bad"}}, 'duration = "bad" is not a time'),
+        ({"timing": {"duration": "-1 s"}}, 'duration = "-1 s" is out of range'),
+        ({"timing": {"turns": 0.0}}, "turns = 0.0; allowed"),
+        ({"timing": {"samples_per_turn": 0}}, "samples-per-turn = 0; allowed"),
+        ({"timing": {"on": [("1 s", "0 s")]}}, "on = 1 s to 0 s; allowed"),
+        ({"timing": {"duty": "nowhere.csv"}}, "nowhere.csv does not exist"),
+        ({"friction": "bad"}, "friction = 'bad'; allowed"),
+        ({"draws": 3}, "draws = 3; allowed"),
+        ({"roughness": "-1 um"}, 'roughness = "-1 um" is out of range'),
+        ({"roughness": "10 mm"}, "roughness = 1e.04 um with a gap of 500 um at the start"),
+        ({"placement": {"gap": "1 um"}}, "placement.gap = 0.001 mm; allowed: at least 0.018 mm"),
+        ({"placement": {"gap": "15 mm"}}, "placement.gap = 15 mm; allowed: at most 10.75 mm"),
+        ({"in_tube": {"flow": "nowhere.csv"}}, "nowhere.csv does not exist"),
+    ],
+    ids=str,
+)
+def test_wrong_input_costs_no_table(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        sp.simulate(sp.load("biorob2012-wide", **ODD), model="tube", **wrong)
+
+
+def test_thin_gap_is_no_reason_against_a_table() -> None:
+    """A table knows films that are too thin to be resolved directly."""
+    with pytest.raises(AssertionError, match="a table would be made"):
+        sp.simulate(sp.load("biorob2012-wide", **ODD), model="tube", placement={"gap": "0.03 mm"})
+
+
+def test_least_gap_that_is_resolved_directly_is_told() -> None:
+    robot = sp.load("biorob2012-wide", **ODD)
+    with pytest.raises(InputError, match=r"here at least placement.gap = .* mm, or a table") as refused:
+        sp.predict(robot, model="tube", placement={"gap": "0.02 mm", "pitch": 0.0})
+    told = float(str(refused.value).split("placement.gap = ")[-1].split(" mm")[0])
+    assert 0.02 < told < 0.5
+    from spirillum.swimming.prediction import prepared
+
+    prepared(robot, "tube", placement={"gap": 1.001e-3 * told, "pitch": 0.0})  # is not refused
+    with pytest.raises(InputError, match="unknowns"):
+        prepared(robot, "tube", placement={"gap": 0.97e-3 * told, "pitch": 0.0})
+
+
+def test_run_is_kept_where_its_picture_cannot_be_written(tmp_path: Path) -> None:
+    run, lost = tmp_path / "run.nc", "/proc/run.png"
+    arguments = ["simulate", "biorob2012-wide", "--motion", "held", "--turns", "0.1", "-o", str(run), "--plot", lost]
+    found = CliRunner().invoke(app, arguments)
+    assert found.exit_code != 0
+    assert run.exists()
+    assert "the run is written, the plot is not: /proc/run.png cannot be written" in str(found.exception)
