@@ -29,7 +29,7 @@ def test_a_folder_in_the_place_of_a_new_file_stays(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["x" * 300, "a\0b"])
 def test_a_name_that_no_file_can_have_gets_a_sentence(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="cannot be written; allowed: a file name"):
+    with pytest.raises(InputError, match="allowed: a file name"):
         new_file(tmp_path / name, "text")
 
 

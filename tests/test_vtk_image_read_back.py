@@ -97,9 +97,9 @@ def test_written_whole_or_not_at_all(box: xr.Dataset, tmp_path: Path, monkeypatc
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    (tmp_path / "flow.vti").write_text("earlier")
+    (tmp_path / "flow.vti").write_text("earlier, written by spirillum")
     monkeypatch.setattr(hl, "imageToVTK", full)
     with pytest.raises(OSError, match="No space"):
         write_vti(box, tmp_path / "flow.vti")
     assert [path.name for path in tmp_path.iterdir()] == ["flow.vti"]
-    assert (tmp_path / "flow.vti").read_text() == "earlier"
+    assert (tmp_path / "flow.vti").read_text() == "earlier, written by spirillum"

@@ -30,7 +30,7 @@ def test_a_file_that_no_calibration_wrote_is_refused_and_stays(found: Any, tmp_p
     foreign = tmp_path / name
     foreign.parent.mkdir(exist_ok=True)
     foreign.write_bytes(b"my own\n")
-    with pytest.raises(InputError, match=f"holds {name} of unknown origin; allowed: a new folder"):
+    with pytest.raises(InputError, match=f"{name} is there and of unknown origin, not written by spirillum; allowed"):
         check_folder(tmp_path)
     with pytest.raises(InputError, match="unknown origin"):
         write_calibration(found, tmp_path, figures=False)
@@ -65,5 +65,5 @@ def test_figures_of_an_earlier_run_go_and_changed_ones_stay(
     assert kept == {"calibration.toml", "predictions.csv", "figures/my-own.png"}
     write_calibration(found, tmp_path)
     (tmp_path / "figures" / "residuals.png").write_bytes(b"drawn anew by hand")
-    with pytest.raises(InputError, match=r"figures/residuals\.png of unknown origin"):
+    with pytest.raises(InputError, match=r"figures/residuals\.png is there and of unknown origin"):
         check_folder(tmp_path)

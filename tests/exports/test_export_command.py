@@ -45,7 +45,7 @@ def test_answer_agrees_with_the_file(run: Callable[..., Outcome], tmp_path: Path
     assert [item["file"] for item in answer["files"]] == [str(tmp_path / "robot.stl")]
     data = (tmp_path / "robot.stl").read_bytes()
     assert len(data) == 84 + 50 * answer["solid"]["triangles"]
-    assert data[:80].decode().strip() == f"{WIDE}, unit mm"
+    assert data[:80].decode().strip() == f"written by spirillum: {WIDE}, unit mm"
     assert answer["solid"]["watertight"]
     assert [piece["name"] for piece in answer["pieces"]] == ["body", "shaft", "coupling", "stub", "tail"]
     assert all(piece["watertight"] for piece in answer["pieces"])
@@ -73,14 +73,20 @@ def test_a_description_refers_to_files_beside_it(run: Callable[..., Outcome], tm
     assert ("MuJoCo's own fluid must stay off" in outcome.out) == (ending != "urdf")
 
 
-def test_files_that_are_there_are_replaced_and_others_stay(run: Callable[..., Outcome], tmp_path: Path) -> None:
-    (tmp_path / "robot-meshes").mkdir()
-    for name in ("robot.urdf", "robot-meshes/body.stl", "robot-meshes/mine.stl"):
-        (tmp_path / name).write_text("mine")
-    assert run("export", WIDE, str(tmp_path / "robot.urdf"), "--no-sidecar").code == 0
+def test_own_files_are_replaced_and_others_stay(run: Callable[..., Outcome], tmp_path: Path) -> None:
+    command = ("export", WIDE, str(tmp_path / "robot.urdf"), "--no-sidecar")
+    assert run(*command).code == 0
+    (tmp_path / "robot-meshes" / "mine.stl").write_text("mine")
+    assert run(*command).code == 0
     assert (tmp_path / "robot-meshes" / "mine.stl").read_text() == "mine"
-    assert (tmp_path / "robot-meshes" / "body.stl").stat().st_size > 100
-    assert "<robot" in (tmp_path / "robot.urdf").read_text()
+    for name in ("robot.urdf", "robot-meshes/body.stl"):
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_text("mine")
+        outcome = run(*command)
+        assert outcome.code == 2
+        assert f"{name} is there and of unknown origin" in outcome.err
+        assert (tmp_path / name).read_text() == "mine"
+        (tmp_path / name).write_bytes(whole)
 
 
 MICRO = (
@@ -116,7 +122,7 @@ MICRO = (
         (["robot.stl", "--set", "seal.length=30mm"], "seal.length = 30 mm; allowed: at most 26 mm"),
         (["robot.stl", "--set", "motor.shaft_diameter=0.8"], "has no unit"),
         (["taken.urdf", "--no-sidecar"], "taken-meshes cannot be written; allowed: a new name"),
-        (["blocked.urdf"], "blocked.resistance.json cannot be written; allowed: a new name"),
+        (["blocked.urdf"], "blocked.resistance.json is not a regular file; allowed: a new file"),
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_nothing(
@@ -161,7 +167,7 @@ def test_a_failure_on_the_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest
         return written(self, data)
 
     monkeypatch.setattr(Path, "write_bytes", full)
-    with pytest.raises(sp.InputError, match="No space left on device"):
+    with pytest.raises(OSError, match="No space left on device"):
         sp.export(WIDE, tmp_path / "robot.urdf", sidecar=False)
     assert list(tmp_path.iterdir()) == []
 

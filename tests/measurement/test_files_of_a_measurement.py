@@ -132,7 +132,7 @@ def test_no_trial_writes_over_another(
 
 
 def test_a_name_that_is_no_text_is_refused_at_once(tmp_path: Path, setup_file: Path) -> None:
-    with pytest.raises(InputError, match=r"video = 'a\\udcff.mp4'; allowed: a name that is text"):
+    with pytest.raises(InputError, match=r"'a\\udcff.mp4' is not text; allowed: a name that is text"):
         measure(["b.mp4", "a\udcff.mp4"], setup_file, tmp_path / "out")
 
 
@@ -172,7 +172,7 @@ def test_tables_of_others_stay_and_datasets_of_others_are_said(
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "observations.csv").write_text("my own")
-    with pytest.raises(InputError, match=r"observations\.csv is there and not from a measurement"):
+    with pytest.raises(InputError, match=r"observations\.csv is there and of unknown origin"):
         measure("a.mp4", setup_file, folder, annotated=False, figures=False)
     assert (folder / "observations.csv").read_text() == "my own"
     (folder / "observations.csv").unlink()

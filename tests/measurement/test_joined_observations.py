@@ -24,15 +24,15 @@ def test_rows_and_comments_are_those_of_all_files(tmp_path: Path) -> None:
     read = [(item.wavelength, item.trial, item.forward_velocity) for item in read_observations(target)]
     assert read == [(i.wavelength, i.trial, i.forward_velocity) for file in files for i in read_observations(file)]
     text = target.read_text(encoding="utf-8")
-    assert text.startswith("# SYNTHETIC: a\n# b\n")
+    assert text.startswith("# SYNTHETIC: a\n# b\n# joined, written by spirillum\n")
     assert "body_rate_Hz" not in text
 
 
 def test_what_contradicts_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
     file, target = made(tmp_path / "a.csv", 15, "a"), tmp_path / "all.csv"
-    with pytest.raises(InputError, match="the joined file, rows 4 and 6 are both trial 1"):
+    with pytest.raises(InputError, match="the joined file, rows 5 and 7 are both trial 1"):
         join_observations([file, made(tmp_path / "b.csv", 15, "b")], target)
-    with pytest.raises(InputError, match="one of the files to join"):
+    with pytest.raises(InputError, match="is read by this command"):
         join_observations([file, file], file)
     with pytest.raises(InputError, match="two or more"):
         join_observations([file], target)

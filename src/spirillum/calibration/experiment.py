@@ -18,6 +18,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.calibration.outliers import outlying_trials
 from spirillum.errors import InputError
+from spirillum.files import read_bytes
+from spirillum.files.limits import LARGEST_TABLE
 from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
 from spirillum.measurement.statistics import student_t_quantile
 from spirillum.robot.robot import Robot
@@ -165,7 +167,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         tail_rate=np.array([found.tail_rate for found in ratios]),
         correlation=_correlation([(found.advance.values, found.turning.values) for found in ratios]),
         source=path.name,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=hashlib.sha256(read_bytes(path, "an observations file", LARGEST_TABLE)).hexdigest(),
         synthetic="synthetic" in " ".join(comments).lower(),
         outliers=outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )

@@ -5,10 +5,14 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 from itertools import pairwise
+from pathlib import Path
+from typing import TextIO
 
 __all__ = ["main"]
 
@@ -27,27 +31,47 @@ def main(arguments: Sequence[str] | None = None) -> None:
     standard error; 130 interrupted.
     """
     own = arguments is None  # a process of its own, not a caller's
+    try:
+        if own:
+            _prepare()
+        code = _run(arguments)
+    except KeyboardInterrupt:  # while errors were being explained
+        code = 130
     if own:
-        gc.set_threshold(_OBJECTS)
-    code = _run(arguments)
-    if own:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done but for the interpreter to leave
         gc.freeze()
     sys.exit(code)
 
 
-def _run(arguments: Sequence[str] | None) -> int:
-    from spirillum.cli.app import app
+def _prepare() -> None:
+    """What only a process of its own may set."""
+    gc.set_threshold(_OBJECTS)
+    # A user's settings of figures are not ours, and a damaged file of them stops the library.
+    os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
+    for number in range(3):  # else a file that is opened could take the place of a closed stream
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)
 
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without box characters shows others instead
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
+        from spirillum.cli.app import app
+
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):
+                stream.reconfigure(errors="replace")  # a terminal without box characters shows others instead
         _check_names(sys.argv[1:] if arguments is None else arguments)
         code = app(args=arguments, prog_name="spirillum", standalone_mode=False)
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except BrokenPipeError:  # the reader of our output has left, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered goes nowhere
+        _to_nowhere(sys.stdout)
         return 0
     except BaseException as error:
+        if isinstance(error, OSError):
+            _flushed(sys.stdout)
         code = _explained(error)
         if code is None:
             raise
@@ -101,6 +125,27 @@ def _of_place(error: OSError) -> str:
 
 
 def _fail(sentence: str, code: int) -> int:
-    if sentence:
-        sys.stderr.write(f"spirillum: {sentence}\n")
+    if sentence and sys.stderr is not None:
+        with suppress(OSError, ValueError):  # nobody listens; the exit code still says it
+            sys.stderr.write(f"spirillum: {sentence}\n")
+        _flushed(sys.stderr)
     return code
+
+
+def _flushed(stream: TextIO | None) -> None:
+    """Write out what a stream still holds, or drop it: else the interpreter tries again and ends with another code."""
+    try:
+        if stream is not None:
+            stream.flush()
+    except (OSError, ValueError):
+        _to_nowhere(stream)
+
+
+def _to_nowhere(stream: TextIO | None) -> None:
+    """What is still buffered goes nowhere."""
+    if stream is None:
+        return
+    with suppress(OSError, ValueError):
+        handle = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(handle, stream.fileno())
+        os.close(handle)

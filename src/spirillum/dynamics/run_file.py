@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from pydantic import BaseModel
 
 from spirillum.errors import InputError
+from spirillum.files import loaded_netcdf
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 from spirillum.units import Kind
@@ -30,34 +30,9 @@ def open_run(path: str | Path) -> xr.Dataset:
         path: NetCDF file.
 
     Raises:
-        InputError: if it is missing, no NetCDF file, or damaged.
+        InputError: if it is missing, no NetCDF file, too large, or damaged.
     """
-    path = Path(path)
-    try:
-        if not path.exists():
-            raise InputError(f"{str(path)[:200]} does not exist; allowed: {_WHAT}")
-        if not path.is_file():
-            raise InputError(f"{str(path)[:200]} is not a regular file; allowed: {_WHAT}")
-        with path.open("rb") as stream:
-            start = stream.read(8)
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{str(path)[:200]!r} cannot be read ({error}); allowed: {_WHAT}") from error
-    if start != b"\x89HDF\r\n\x1a\n":
-        raise InputError(f"{path} is not a NetCDF-4 file; allowed: {_WHAT}")
-    import xarray as xr
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a foreign file; what matters of it is checked
-            return xr.load_dataset(path, engine="h5netcdf", decode_times=False)
-    except Exception as error:  # a damaged file raises whatever the library meets first
-        raise InputError(f"{path} cannot be read ({_first_line(error)}); allowed: {_WHAT}") from error
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:150]
+    return loaded_netcdf(path, _WHAT)
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:

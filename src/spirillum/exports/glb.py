@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from spirillum.files import MARK
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.surface import corner_normals
 
@@ -62,9 +64,13 @@ def glb_bytes(name: str, pieces: Sequence[RobotMesh], phase: float) -> bytes:
             )
             scene.add_geometry(surface, node_name=f"{label} surface", geom_name=label, parent_node_name=piece.part)
     scene.metadata |= {"robot": name, "unit": "m", "axes": "robot: x forward (nose), z up; joint: x axis of rotor"}
-    return bytes(scene.export(file_type="glb", include_normals=True))
+    return bytes(scene.export(file_type="glb", include_normals=True, tree_postprocessor=_signed))
 
 
 def _linear(colour: np.ndarray) -> np.ndarray:
     """Linear light from sRGB, both 0 to 1 (IEC 61966-2-1)."""
     return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+
+
+def _signed(tree: dict[str, Any]) -> None:
+    tree["asset"]["generator"] = MARK

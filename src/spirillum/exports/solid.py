@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.files import MARK
 from spirillum.robot.mesh import RobotMesh
 from spirillum.robot.surface import Faces, mass_properties
 
@@ -81,7 +82,7 @@ def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:
     Args:
         vertices: in the unit of the file, (n, 3).
         faces: outward oriented, (m, 3).
-        title: for the head of the file, which has room for 80 characters.
+        title: for the head of the file, which has room for 80 characters with the mark of this program.
     """
     corners = vertices.astype(np.float32)[faces]
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
@@ -90,5 +91,5 @@ def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:
     record = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
     record["normal"] = normal / np.where(length > 0, length, 1.0)
     record["corners"] = corners
-    head = title.encode("ascii", "replace")[:80].ljust(80)
+    head = f"{MARK}: {title}".encode("ascii", "replace")[:80].ljust(80)
     return head + np.uint32(len(faces)).tobytes() + record.tobytes()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check
 from spirillum.exports.mjcf import FLUID_WARNING
 from spirillum.exports.sidecar import sidecar_of
 from spirillum.exports.solid import is_watertight
-from spirillum.files import output_target
+from spirillum.files import output_folder, output_target, protected, whole_files
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
@@ -116,7 +116,9 @@ def export(
         InputError: for wrong input, a file that cannot be written, masses that a description needs and the robot
             lacks, or a robot outside the model's domain.
     """
-    target = output_target(path, KINDS_OF_FILES, "robot.stl")
+    inputs = [robot] if isinstance(robot, (str, Path)) else []
+    with protected(*inputs):
+        target = output_target(path, KINDS_OF_FILES, "robot.stl")
     described = target.suffix in _DESCRIPTIONS
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
         raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")
@@ -156,21 +158,18 @@ def _commit(target: Path, contents: Mapping[str, bytes]) -> None:
         InputError: if one of them cannot be written.
     """
     target = target.resolve()
+    final = {target if name == target.name else target.parent / name: data for name, data in contents.items()}
+    for folder in dict.fromkeys(path.parent for path in final):
+        if folder.exists() and not (folder.is_dir() and os.access(folder, os.W_OK)):
+            raise InputError(f"{folder} cannot be written; allowed: a new name, or files to replace")
+    made = [folder for folder in dict.fromkeys(path.parent for path in final) if not folder.exists()]
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
-            for name, data in contents.items():
-                place = Path(folder) / name
-                place.parent.mkdir(exist_ok=True)
-                place.write_bytes(data)
-            final = {name: target if name == target.name else target.parent / name for name in contents}
-            for path in final.values():
-                for place, kind in ((path.parent, Path.is_dir), (path, Path.is_file)):
-                    if place.exists() and not (kind(place) and os.access(place, os.W_OK)):
-                        raise InputError(f"{place} cannot be written; allowed: a new name, or files to replace")
-            for path in final.values():
-                path.parent.mkdir(exist_ok=True)
-            for name, path in reversed(final.items()):
-                (Path(folder) / name).replace(path)
-    except OSError as error:
-        where = error.filename2 or error.filename or target
-        raise InputError(f"{where} cannot be written ({error.strerror}); allowed: a folder you may write to") from error
+        for folder in made:
+            output_folder(folder, target.parent)
+        with whole_files(list(reversed(final))) as parts:
+            for path, data in final.items():
+                parts[path].write_bytes(data)
+    finally:
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()  # only where it is empty: nothing was written

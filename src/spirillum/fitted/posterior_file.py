@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import netcdf_file
+from spirillum.files import netcdf_file, open_netcdf, read_bytes
+from spirillum.files.limits import LARGEST_NETCDF
+from spirillum.files.netcdf import group_of
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
@@ -22,6 +23,7 @@ from spirillum.fitted.calibration_file import (
     friction_of_tails,
     nearest_channel,
 )
+from spirillum.fitted.posterior_content import Content
 from spirillum.robot.options import Calibration, FittedTo
 from spirillum.robot.robot import Robot
 
@@ -34,9 +36,9 @@ SCHEMA = "spirillum.posterior/1"
 _DRAWS = 1000
 _WHAT = "posterior.nc of `spirillum calibrate --method posterior`"
 _TAIL = ("channel_diameter", "wavelength", "amplitude")
-_CHECKED = ("schema", "model", "channels", "parameters", "friction", "friction_reading", "quantities")
-_CHECKED_LATER = ("tails",)
-"""Attributes that older files do not have."""
+_SMALLEST, _GREATEST = 1e-15, 1e12
+"""Of a draw, SI."""
+_LARGEST_DISCREPANCY = 100.0
 _MAY_BE_ZERO = ("pitch",)
 
 
@@ -199,14 +201,14 @@ def _of_another_tail(others: Sequence[float], size: int, rng: np.random.Generato
 
 
 def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Samples]) -> str:
-    """Checksum over a posterior's draws and over what says how to read them.
+    """Checksum over a posterior's draws and all that its file says of them.
 
     Args:
-        attributes: attributes of the file.
+        attributes: attributes of the file; its checksum is left out.
         values: draws by label.
     """
     found = hashlib.sha256()
-    for name in (*_CHECKED, *(name for name in _CHECKED_LATER if name in attributes)):
+    for name in sorted(set(attributes) - {"checksum"}):
         found.update(f"{name}={attributes[name]}\n".encode())
     for name in sorted(values):
         found.update(f"{name}\n".encode() + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
@@ -215,8 +217,8 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
 
 def _possible(name: str, values: Samples) -> bool:
     """Whether draws of a parameter lie where it is defined."""
-    above = np.all(values >= 0) if name in _MAY_BE_ZERO else np.all(values > 0)
-    return bool(np.all(np.isfinite(values)) and above)
+    least = 0.0 if name in _MAY_BE_ZERO else _SMALLEST
+    return bool(values.size and np.all((values >= least) & (values < _GREATEST)))
 
 
 def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
@@ -229,28 +231,23 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     Raises:
         InputError: if it is no such file, is damaged, has not converged, or is of another model.
     """
-    import xarray as xr
-
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; allowed: {_WHAT}")
-    if not path.is_file():
-        raise InputError(f"{path} does not exist; allowed: {_WHAT}")
+    with open_netcdf(path, _WHAT) as file:
+        attributes = {str(name): item for name, item in file.attrs.items()}
+        if str(attributes.get("schema")) != SCHEMA:
+            raise InputError(f"{path} is no posterior of a calibration; allowed: {_WHAT}")
+        draws = group_of(file, "posterior")
+        values = {str(name): np.asarray(item.values, float) for name, item in draws.data_vars.items()}
     try:
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            attributes = {str(name): item for name, item in tree.attrs.items()}
-            if attributes.get("schema") != SCHEMA:
-                raise InputError(f"{path} is no posterior of a calibration; allowed: {_WHAT}")
-            values = {str(name): np.asarray(item.values, float) for name, item in tree["posterior"].data_vars.items()}
-        whole = attributes["checksum"] == posterior_checksum(attributes, values)
-        found = _read(path, attributes, values, hashlib.sha256(path.read_bytes()).hexdigest())
-    except (OSError, ValueError, KeyError, TypeError, IndexError, RuntimeError) as error:
+        content = Content.of(attributes)
+        found = _read(path, content, values, hashlib.sha256(read_bytes(path, _WHAT, LARGEST_NETCDF)).hexdigest())
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{path} is no posterior, or damaged; allowed: {_WHAT}") from error
-    if not whole:
+    if attributes.get("checksum") != posterior_checksum(attributes, values):
         raise InputError(f"{path} is no posterior, or damaged (its checksum is another); allowed: {_WHAT}")
-    if not attributes.get("converged"):
+    if not content.converged:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
         )
@@ -265,40 +262,39 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     return found
 
 
-def _read(path: Path, attributes: Mapping[str, Any], values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
-    channels = tuple(float(item) for item in json.loads(attributes["channels"]))
-    listed = json.loads(attributes["parameters"])
+def _read(path: Path, content: Content, values: Mapping[str, Samples], sha256: str) -> PosteriorFile:
     flat = {name: array.reshape(-1) for name, array in values.items()}
     size = min(array.size for array in flat.values())
     kept = np.linspace(0, size - 1, min(size, _DRAWS)).round().astype(int)
     draws: dict[str, Samples] = {}
     middle: dict[str, Samples] = {}
-    for name in dict.fromkeys(item["parameter"] for item in listed):
-        columns = sorted((item for item in listed if item["parameter"] == name), key=lambda item: item["channel"] or 0)
-        draws[name] = np.stack([flat[item["label"]][kept] for item in columns], axis=1)
-        middle[name] = np.array([np.median(flat[item["label"]]) for item in columns])
-    quantities = json.loads(attributes["quantities"])
-    body = json.loads(attributes["settings"])[0]["body"]
-    if not (draws and channels and all(_possible(name, array) for name, array in draws.items())):
+    for name in dict.fromkeys(item.parameter for item in content.parameters):
+        columns = sorted(
+            (item for item in content.parameters if item.parameter == name), key=lambda item: item.channel or 0
+        )
+        draws[name] = np.stack([flat[item.label][kept] for item in columns], axis=1)
+        middle[name] = np.array([np.median(flat[item.label]) for item in columns])
+    body = content.settings[0].body
+    if size < 2 or not all(_possible(name, array) for name, array in draws.items()):
         raise InputError(f"{path} holds draws that are no numbers, or impossible ones; allowed: {_WHAT}")
-    sizes = [flat[f"{kind}_{name}"] for kind in ("discrepancy", "error") for name in quantities]
-    if not all(np.all(np.isfinite(array)) and np.all(array >= 0) for array in sizes):
+    sizes = [flat[f"{kind}_{name}"] for kind in ("discrepancy", "error") for name in content.quantities]
+    if not all(np.all((array >= 0) & (array < _LARGEST_DISCREPANCY)) for array in sizes):
         raise InputError(f"{path} holds a discrepancy or an error that is none; allowed: {_WHAT}")
     return PosteriorFile(
-        source=f"{path.name} ({attributes['observations']})",
+        source=f"{path.name} ({content.observations})",
         sha256=sha256,
-        model=str(attributes["model"]),
-        observations=str(attributes["observations"]),
-        synthetic=bool(attributes["synthetic"]),
-        channels=channels,
-        body=(float(body["diameter"]), float(body["length"])),
+        model=content.model,
+        observations=content.observations,
+        synthetic=content.synthetic,
+        channels=content.channels,
+        body=(body.diameter, body.length),
         draws=draws,
         middle=middle,
-        discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in quantities},
-        error={name: flat[f"error_{name}"][kept] for name in quantities},
-        friction=tuple(json.loads(attributes["friction"])),
-        friction_reading=str(attributes["friction_reading"]),
-        tails=tuple(json.loads(attributes.get("tails", "[]"))),
+        discrepancy={name: flat[f"discrepancy_{name}"][kept] for name in content.quantities},
+        error={name: flat[f"error_{name}"][kept] for name in content.quantities},
+        friction=tuple(item.model_dump() for item in content.friction),
+        friction_reading=content.friction_reading,
+        tails=tuple(item.model_dump() for item in content.tails),
     )
 
 

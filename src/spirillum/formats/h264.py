@@ -86,7 +86,7 @@ def h264_writer(
     if name is None:
         missing = " or ".join(encoders)
         raise InputError(f"{path.name} cannot be encoded: PyAV has no {missing} for H.264 here; allowed: {instead}")
-    with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as container:
+    with av.open(f"file:{path}", "w", format="mp4", options={"movflags": "+faststart"}) as container:
         container.metadata.update(tags)
         stream = container.add_stream(name, rate=rate, options=dict(quality) if name == "libx264" else {})
         stream.width, stream.height = size

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.files import csv_rows, read_text
+from spirillum.files import checked_path, csv_rows, read_text
+from spirillum.files.limits import LARGEST_TABLE, MOST_COLUMNS
 from spirillum.formats.parquet import parquet_table
 
 __all__ = ["Row", "Table", "check_known", "check_present", "number_in", "read_readings", "read_table"]
 
-_LARGEST = 256 << 20
-_MOST_COLUMNS = 500
 _LARGEST_NUMBER = 1e12
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?", re.ASCII)
 
@@ -116,7 +115,7 @@ class Table:
 
 
 def read_table(
-    path: str | Path, what: str, headers: int = 1, *, largest: int = _LARGEST, parquet: bool = False
+    path: str | Path, what: str, headers: int = 1, *, largest: int = LARGEST_TABLE, parquet: bool = False
 ) -> Table:
     """Read a CSV file; lines that start with `#` are comments.
 
@@ -130,10 +129,10 @@ def read_table(
     Raises:
         InputError: if it cannot be read, or is not CSV.
     """
-    path = Path(path)
+    path = checked_path(path, what)
     comments: list[str] = []
     if parquet and path.suffix == ".parquet":
-        found = parquet_table(path, what)
+        found = parquet_table(path, what, largest)
     else:
         text = read_text(path, what, largest)
         comments = [line.strip() for line in text.splitlines() if line.lstrip().startswith("#")]
@@ -159,8 +158,8 @@ def read_readings(path: str | Path, what: str, headers: int = 1) -> Table:
     width = len(table.header)
     if width == 1 and (other := next((mark for mark in ";\t|" if mark in table.header[0]), None)):
         raise InputError(f"{path}: its columns are separated by {other!r}; allowed: commas")
-    if width > _MOST_COLUMNS:
-        raise InputError(f"{path} has {width} columns; allowed: at most {_MOST_COLUMNS}")
+    if width > MOST_COLUMNS:
+        raise InputError(f"{path} has {width} columns; allowed: at most {MOST_COLUMNS}")
     return table
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_text
+from spirillum.files.limits import LARGEST_TABLE
 from spirillum.formats.tables import Row, read_readings
 from spirillum.measurement.flags import IMPORTED
 from spirillum.measurement.marks import EDGE, Ruled
@@ -49,7 +50,7 @@ def read_track(
         InputError: if it is neither, or a cell is wrong; the sentence names row and column.
     """
     path = Path(path)
-    first = read_text(path, _WHAT, 256 << 20).lstrip().split(",", 1)[0].strip().lower()
+    first = read_text(path, _WHAT, LARGEST_TABLE).lstrip().split(",", 1)[0].strip().lower()
     frame, nose, rear, centre = (_deeplabcut if first == "scorer" else _trackpy)(path, ruled.size)
     order = np.argsort(frame, kind="stable")
     frame, nose, rear, centre = frame[order], nose[order], rear[order], centre[order]

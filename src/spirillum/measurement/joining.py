@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
+from spirillum.files import MARK, output_target, protected, whole_file
 from spirillum.measurement.observations import COLUMNS, observation_table, read_observations
 
 __all__ = ["join_observations"]
@@ -32,9 +32,8 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     paths = [Path(file) for file in files]
     if len(paths) < 2:
         raise InputError(f"{len(paths)} file of observations; allowed: two or more to join")
-    target = output_target(Path(output), _TABLES, "observations.csv")
-    if any(path.exists() and target.exists() and path.samefile(target) for path in paths):
-        raise InputError(f"{target} is one of the files to join; allowed: another file")
+    with protected(*paths):
+        target = output_target(output, _TABLES, "observations.csv")
     rows: list[dict[str, str]] = []
     comments: list[str] = []
     for path in paths:
@@ -47,8 +46,9 @@ def join_observations(files: Sequence[str | Path], output: str | Path) -> int:
     writer = csv.DictWriter(text, used, restval="", extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    with whole_file(target) as temporary:
-        temporary.write_text("".join(f"{line}\n" for line in comments) + text.getvalue(), encoding="utf-8")
+    with protected(*paths), whole_file(target) as temporary:
+        own = [] if any(MARK in line for line in comments) else [f"# joined, {MARK}"]
+        temporary.write_text("".join(f"{line}\n" for line in (*comments, *own)) + text.getvalue(), encoding="utf-8")
         try:
             read_observations(temporary)
         except InputError as error:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
+from spirillum.files import checked_path, file_name
 from spirillum.measurement.imported import read_track
 from spirillum.measurement.marks import (
     Marks,
@@ -157,8 +158,8 @@ def asked_of(
     given = [videos] if isinstance(videos, (str, Path)) else list(videos)
     words = [*(("video", video) for video in given), ("marks", marks), ("track", track)]
     for what, word in words:
-        if word == "":  # else it would be the folder one works in
-            raise InputError(f'{what} = ""; allowed: a name')
+        if word is not None:
+            checked_path(word, f"the name of a {what}")
     paths = [Path(video) for video in given]
     chosen, robot = _loaded(setup, overrides, start, end)
     readings = _readings(paths, marks, track, tracking=tracking)
@@ -262,26 +263,25 @@ def _names(paths: Sequence[Path]) -> list[str]:
     if not paths:
         raise InputError("no video; allowed: at least one, or --feasibility")
     found: list[str] = []
-    real = [path.resolve() for path in paths]
+    real = [_resolved(path) for path in paths]
     for place, path in enumerate(paths):
-        if not _is_text(str(path)):
-            raise InputError(f"video = {str(path)!a}; allowed: a name that is text in UTF-8, as results carry it")
         if real[place] in real[:place]:
             raise InputError(f"{path} is given twice; allowed: each video once, as trials are independent")
-        stem = path.resolve().name if path.is_dir() else path.stem
-        name, number = stem or "trial", 2
+        stem = file_name((real[place].name if path.is_dir() else path.stem) or "trial")
+        name, number = stem, 2
         while any(_clash(name, other) for other in found):
             name, number = f"{stem}-{number}", number + 1
         found.append(name)
     return found
 
 
-def _is_text(name: str) -> bool:
+def _resolved(path: Path) -> Path:
     try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+        return path.resolve()
+    except (OSError, RuntimeError) as error:
+        raise InputError(
+            f"video = {str(path)[:200]!r} is a loop of links; allowed: a film, or a folder of images"
+        ) from error
 
 
 def _clash(one: str, other: str) -> bool:

@@ -7,6 +7,7 @@ import io
 import math
 from collections.abc import Sequence
 
+from spirillum.files import MARK, text_cell
 from spirillum.measurement.observations import RATES
 from spirillum.measurement.trials import Trial
 from spirillum.robot.robot import Robot
@@ -41,7 +42,9 @@ def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str |
     text = io.StringIO()
     if any(trial.synthetic for trial in kept):
         text.write("# SYNTHETIC: the videos say that they are computed; nothing was measured.\n")
-    text.write(f"# Measured from video with {_safe(setup)}: one row a trial, signed about the swimming direction.\n")
+    text.write(
+        f"# Measured from video with {_safe(setup)}, {MARK}: one row a trial, signed about the swimming direction.\n"
+    )
     for trial in kept:
         flags = ", ".join(dict.fromkeys(flag.name for flag in trial.flags))
         text.write(f"# trial {_safe(trial.name)}: {_safe(trial.video)}{'; flags: ' + flags if flags else ''}\n")
@@ -70,5 +73,4 @@ def _trial(name: str) -> str:
 
 def _safe(text: str) -> str:
     """One printable line, and no comment sign at its beginning."""
-    line = "".join(c if c.isprintable() else " " for c in text).strip().lstrip("#").strip()
-    return line[:200] or "trial"
+    return text_cell(text).lstrip("#").strip()[:200] or "trial"

@@ -67,7 +67,9 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
     Raises:
         InputError: if the file is there or cannot be written.
     """
-    new_file(output_target(path, {".toml": "a setup file"}, "setup.toml"), _TEMPLATE, overwrite=overwrite)
+    new_file(
+        output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), _TEMPLATE, overwrite=overwrite
+    )
 
 
 def setup_answer(path: str | Path) -> dict[str, Any]:

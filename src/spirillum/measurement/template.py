@@ -34,7 +34,7 @@ def new_observations_file(path: str | Path, *, overwrite: bool = False) -> None:
     Raises:
         InputError: if the file is there or cannot be written.
     """
-    target = output_target(path, {".csv": "an observations file"}, "observations.csv")
+    target = output_target(path, {".csv": "an observations file"}, "observations.csv", replace="none")
     new_file(target, f"{_TEMPLATE}{','.join(COLUMNS)}\n", overwrite=overwrite)
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,10 +17,10 @@ from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
-from spirillum.errors import InputError
-from spirillum.files import output_folder, write_text
+from spirillum.files import MARK, check_replaceable, output_folder, protected, results_folder, whole_files
 from spirillum.fitted.posterior_file import write_posterior
 from spirillum.results.calibration_file import calibration_text
+from spirillum.robot.robot import Robot
 from spirillum.view.figures.calibration import calibration_figures
 from spirillum.view.figures.style import save
 
@@ -28,16 +28,10 @@ __all__ = ["calibrate", "predictions_text", "write_calibration"]
 
 _RESULTS = ("calibration.toml", "predictions.csv", "posterior.nc")
 _FIGURES = ("observed-", "residuals", "posterior", "profiles")
-_RECORD = ".written-by-spirillum"
-"""Checksums of the figures beside it: one with another checksum is the user's own."""
-_SYNTHETIC = "# the observations say that they are synthetic: nothing here is measured\n"
+_SYNTHETIC = f"# the observations say that they are synthetic: nothing here is measured; {MARK}\n"
 _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm", "rows")
-_MARKS: dict[str, str | tuple[str, ...]] = {
-    "calibration.toml": "# Written by `spirillum calibrate`",
-    "predictions.csv": (_SYNTHETIC, ",".join(_COLUMNS)),
-}
-"""What a file of ours begins with."""
-_SCHEMA = "spirillum.posterior/"
+_HEADER = ",".join(_COLUMNS)
+"""What `predictions.csv` begins with, which other programs read and has no comments."""
 
 
 def earlier_results(folder: Path) -> list[Path]:
@@ -54,52 +48,14 @@ def check_folder(folder: Path) -> None:
     """Refuse a folder for results before any work is done.
 
     Raises:
-        InputError: if it is a file, or holds a file of the same name that no calibration has written.
+        InputError: if it holds a file of the same name that this program has not written.
     """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file; allowed: a folder for the results (-o DIR)")
-    known = _recorded(folder)
     for path in earlier_results(folder):
-        if not _ours(path, known):
-            raise InputError(
-                f"{folder} holds {path.relative_to(folder)} of unknown origin; allowed: a new folder (-o DIR)"
-            )
+        check_replaceable(path, begins=_begins(path))
 
 
-def _recorded(folder: Path) -> dict[str, str]:
-    """Checksums of the figures that the calibration in a folder has drawn, by name."""
-    try:
-        lines = (folder / "figures" / _RECORD).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return {}
-    pairs = [line.split("  ", 1) for line in lines if "  " in line]
-    return {name: checksum for checksum, name in pairs}
-
-
-def _ours(path: Path, known: Mapping[str, str]) -> bool:
-    """Whether a calibration has written a file, by what it says of itself, or by its checksum."""
-    try:
-        if path.name == "posterior.nc":
-            return _is_posterior(path)
-        if path.name in _MARKS:
-            return path.read_text(encoding="utf-8").startswith(_MARKS[path.name])
-        return known.get(path.name) == _checksum(path)
-    except (OSError, UnicodeDecodeError):
-        return False
-
-
-def _is_posterior(path: Path) -> bool:
-    import h5netcdf
-
-    try:
-        with h5netcdf.File(path, "r") as stored:
-            return str(stored.attrs.get("schema", "")).startswith(_SCHEMA)
-    except (OSError, ValueError, KeyError, TypeError, RuntimeError):
-        return False
-
-
-def _checksum(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _begins(path: Path) -> bytes:
+    return _HEADER.encode() if path.name == "predictions.csv" else b""
 
 
 def calibrate(
@@ -138,29 +94,35 @@ def calibrate(
         InputError: for wrong input, or observations that cannot tell what is asked, or a folder that cannot be
             written to or holds files of the same names that no calibration has written.
     """
-    if output is not None and not str(output).strip():
-        raise InputError("output = ''; allowed: a folder for the results (-o DIR)")
-    folder = None if output is None else Path(output)
-    if folder is not None:
-        check_folder(folder)
-    found = fit_model(
-        observations,
-        robots,
-        model=model,
-        free=free,
-        method=method,
-        friction=friction,
-        assume_uncertainty=assume_uncertainty,
-        sampling=sampling,
-        progress=progress,
-    )
-    return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)
+    listed = [robots] if isinstance(robots, (str, Path, Mapping, Robot)) else list(robots)
+    inputs = (observations, *(robot for robot in listed if isinstance(robot, (str, Path))))
+    with ExitStack() as stack:
+        folder = None
+        if output is not None:
+            folder = stack.enter_context(results_folder(output))
+            stack.enter_context(protected(*inputs))
+            check_folder(folder)
+        found = fit_model(
+            observations,
+            robots,
+            model=model,
+            free=free,
+            method=method,
+            friction=friction,
+            assume_uncertainty=assume_uncertainty,
+            sampling=sampling,
+            progress=progress,
+        )
+        return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)
 
 
 def write_calibration(
     found: Calibrated, folder: Path, *, figures: bool = True, progress: Progress | None = None
 ) -> Calibrated:
     """Write all files of a calibration, the figures last; each is whole or not there.
+
+    The numbers are all made before the first takes the place of an earlier calibration's, and what that one had more
+    goes afterwards: half of an older calibration beside a new one would be believed.
 
     Returns:
         The calibration with the names of its files, and a warning where files of an earlier one are gone.
@@ -172,21 +134,22 @@ def write_calibration(
     check_folder(folder)
     output_folder(folder)
     earlier = earlier_results(folder)
-    for path in earlier:  # half of an older calibration beside a new one would be believed
-        path.unlink(missing_ok=True)
-    (folder / "figures" / _RECORD).unlink(missing_ok=True)
-    written = [folder / "calibration.toml", folder / "predictions.csv"]
-    write_text(written[0], calibration_text(found))
-    write_text(written[1], predictions_text(found))
-    if found.posterior is not None:
-        written.append(folder / "posterior.nc")
-        write_posterior(posterior_tree(found), written[-1])
+    names = _RESULTS if found.posterior is not None else _RESULTS[:2]
+    written = [folder / name for name in names]
+    with whole_files({path: _begins(path) for path in written}) as parts:
+        parts[written[0]].write_text(calibration_text(found), encoding="utf-8")
+        parts[written[1]].write_text(predictions_text(found), encoding="utf-8")
+        if found.posterior is not None:
+            write_posterior(posterior_tree(found), parts[written[2]])
+    for path in earlier:
+        if path not in written:
+            path.unlink(missing_ok=True)
     if figures:
         written += _drawn(found, folder, progress)
-    names = sorted(str(path.relative_to(folder)) for path in written)
+    files = sorted(str(path.relative_to(folder)) for path in written)
     gone = _gone([path.relative_to(folder) for path in earlier if path not in written])
     said = [f"{folder} held an earlier calibration: its {gone} are gone"] if gone else []
-    return replace(found, folder=folder, files=tuple(names), warnings=(*found.warnings, *said))
+    return replace(found, folder=folder, files=tuple(files), warnings=(*found.warnings, *said))
 
 
 def _gone(paths: Sequence[Path]) -> str:
@@ -200,14 +163,10 @@ def _gone(paths: Sequence[Path]) -> str:
 def _drawn(found: Calibrated, folder: Path, progress: Progress | None) -> list[Path]:
     tell = progress or (lambda _what, _done, _total: None)
     tell("figures", 0, 1)
-    inside = output_folder(folder / "figures")
+    inside = output_folder(folder / "figures", folder)
     written: list[Path] = []
     for name, figure in calibration_figures(found).items():
-        try:
-            save(figure, inside / name)
-        finally:  # what an interrupted run has drawn may be replaced by the next one too
-            written += [path for path in (inside / f"{name}.png", inside / f"{name}.svg") if path.is_file()]
-            write_text(inside / _RECORD, "".join(f"{_checksum(path)}  {path.name}\n" for path in written))
+        written += save(figure, inside / name)
     tell("figures", 1, 1)
     return written
 

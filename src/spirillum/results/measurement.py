@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.errors import InputError
-from spirillum.files import output_folder, whole_file, write_text
+from spirillum.files import check_replaceable, protected, results_folder, whole_file, write_text
 from spirillum.measurement.flags import says_synthetic
 from spirillum.measurement.measure import (
     TABLE,
@@ -68,30 +68,21 @@ def measure(
         KeyboardInterrupt: if it was interrupted; the trials that were finished are written.
         OSError: if a file could not be written, for want of space, say; the trials that were finished are written.
     """
-    if output == "":  # else it would be the folder one works in
-        raise InputError('output = ""; allowed: a name')
     asked = asked_of(
         videos, setup, marks=marks, track=track, tracking=tracking, start=start, end=end, overrides=overrides
     )
     tell: Progress = progress or (lambda _what, _done, _total: None)
     if output is None:
         return _measured(asked, None, tell)
-    folder = Path(output)
-    fresh = not folder.exists()
-    _check_folder(output_folder(folder))
-    try:
-        return _measured(asked, _Folder(folder, annotated=annotated, figures=figures), tell)
-    except InputError:
-        if fresh and not any(folder.iterdir()):
-            folder.rmdir()
-        raise
+    inputs = (*asked.videos, setup, marks, track, asked.folder / asked.setup.robot.file)
+    with results_folder(output) as path, protected(*inputs):
+        folder = _Folder(path, annotated=annotated, figures=figures)
+        folder.check(asked)
+        return _measured(asked, folder, tell)
 
 
-def _check_folder(folder: Path) -> None:
-    """Refuse to replace a table of observations that no measurement has written."""
-    table = folder / TABLE
-    if table.exists() and not any(folder.glob("*.nc")):
-        raise InputError(f"{table} is there and not from a measurement; allowed: another folder for the results")
+_ENDINGS = ("nc", "movement.nc")
+_FILM = "annotated.mp4"
 
 
 @dataclass
@@ -105,6 +96,19 @@ class _Folder:
     """Names of the files that were written."""
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     """JPEG of an annotated frame by the trial's name."""
+
+    def check(self, asked: Asked) -> None:
+        """Look at all that will be written, before any video is measured.
+
+        Raises:
+            InputError: if a file is there that no measurement has written, or is one of the videos.
+        """
+        names = [TABLE, *(["report.html"] if self.figures else [])]
+        for name in asked.names:
+            names += [f"{name}.{ending}" for ending in (*_ENDINGS, *([_FILM] if self.annotated else []))]
+            names += [f"figures/series-{name}.{end}" for end in ("png", "svg") if self.figures]
+        for name in names:
+            check_replaceable(self.path / name)
 
 
 def _measured(asked: Asked, folder: _Folder | None, tell: Progress) -> Measurement:
@@ -143,7 +147,7 @@ def _trial(asked: Asked, number: int, folder: _Folder | None, tell: Callable[[in
         trial = _annotated_trial(asked, number, folder, tell)
     else:
         trial = measured_trial(asked, number, path, progress=tell)
-    for ending, arrays in (("nc", series_of(trial, asked.robot)), ("movement.nc", movement_of(trial, asked.robot))):
+    for ending, arrays in zip(_ENDINGS, (series_of(trial, asked.robot), movement_of(trial, asked.robot)), strict=True):
         arrays.write(folder.path / f"{name}.{ending}")
         folder.files.append(f"{name}.{ending}")
     return trial
@@ -155,7 +159,7 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
     def thumbnail(picture: bytes) -> None:
         folder.thumbnails[name] = picture
 
-    target = folder.path / f"{name}.annotated.mp4"
+    target = folder.path / f"{name}.{_FILM}"
     video = open_video(path, asked.setup.camera.frames_per_second)
     words = {"title": f"{path.name}, annotated"}
     if says_synthetic(video.words):

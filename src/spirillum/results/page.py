@@ -46,7 +46,7 @@ def draw_pictures(
     Raises:
         InputError: if the folder cannot be written to.
     """
-    figures = output_folder(folder / "figures")
+    figures = output_folder(folder / "figures", folder)
     found = []
     for done, (name, picture) in enumerate(pictures.items()):
         tell(name, done)

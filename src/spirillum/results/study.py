@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer import envelope
-from spirillum.files import claim_folder, output_folder, write_dataset
+from spirillum.files import output_folder, protected, results_folder, write_dataset
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.papers.registry import claims_of
 from spirillum.results.study_report import write_report
@@ -69,16 +69,17 @@ def study(
     tell = progress or (lambda _what, _done, _total: None)
     if output is None:
         return computed_study(loaded, observed, fingerprint, None, tell)
-    folder = Path(output)
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
-    claim_folder(folder, "study.json", mark, "study", _RESULTS)
-    dataset = read_dataset(folder / "dataset.nc")
-    if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
-        parts = output_folder(folder / f"parts-{fingerprint[:16]}")
-        dataset = computed_study(loaded, observed, fingerprint, parts, tell)
-        write_dataset(dataset, folder / "dataset.nc")
-        shutil.rmtree(parts, ignore_errors=True)  # another run of the same study may be at it too
-    write_report(dataset, folder, tell)
+    claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
+    inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
+    with protected(*inputs), results_folder(output, claim=claim) as folder:
+        dataset = read_dataset(folder / "dataset.nc", loaded.count)
+        if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
+            parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
+            dataset = computed_study(loaded, observed, fingerprint, parts, tell)
+            write_dataset(dataset, folder / "dataset.nc", replace="any")
+            shutil.rmtree(parts, ignore_errors=True)
+        write_report(dataset, folder, tell)
     return dataset
 
 

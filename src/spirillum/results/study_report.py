@@ -41,7 +41,9 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
     )
     tell("report", len(pictures), steps)
     claims = [claim.to_dict() for claim in claims_of(dataset)]
-    write_text(folder / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(
+        folder / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n", replace="any"
+    )
     write_text(folder / "report.html", page("report.html.jinja", pictures=embedded, claims=claims, **content(dataset)))
     tell("report", steps, steps)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Values
+from spirillum.errors import InputError
+from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.band import BandTask, placed_at, with_band
@@ -80,7 +83,24 @@ def assembled(
         "versions": versions(),
         "Conventions": "CF-1.11",
     }
+    dataset.attrs["checksum"] = _checksum(dataset)
     return dataset
+
+
+def _checksum(dataset: xr.Dataset) -> str:
+    """Of all values and attributes but itself: damage is noticed, and the dataset computed anew."""
+    found = hashlib.sha256()
+    for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
+        found.update(f"{name}={value}\n".encode())
+    for name in sorted(map(str, dataset.variables)):
+        variable = dataset.variables[name]
+        found.update(f"{name} {variable.dims} {variable.shape}\n".encode())
+        if variable.dtype.kind in "OUS":
+            found.update("\n".join(map(str, variable.values.flat)).encode())
+        else:
+            found.update(np.ascontiguousarray(variable.values, dtype="<f8").tobytes())
+        found.update(" ".join(f"{key}={variable.attrs[key]}" for key in sorted(variable.attrs)).encode())
+    return found.hexdigest()
 
 
 def _gathered(loaded: LoadedStudy, answers: Iterable[tuple[Task, Part]], count: int) -> dict[str, Values]:
@@ -173,14 +193,21 @@ def _observed_variables(observed: ObservedArrays, robots: Sequence[str], shape: 
     return found
 
 
-def read_dataset(path: Path) -> xr.Dataset | None:
-    """A dataset that an earlier run has written; None if there is none or it is damaged."""
-    import xarray as xr
+_LARGEST_LEFT, _LARGEST_OF_A_ROBOT = 16 << 20, 1 << 16
+"""Bytes of a dataset: of its attributes, and of each of its robots with all models, readings, rates and places."""
 
+
+def read_dataset(path: Path, robots: int) -> xr.Dataset | None:
+    """A dataset that an earlier run has written; None if there is none, it is damaged, or absurdly large.
+
+    Args:
+        path: the file.
+        robots: number of robots of the study.
+    """
     if not path.is_file():
         return None
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as stored:
-            return stored.load()
-    except (OSError, ValueError, KeyError, RuntimeError):
+        found = loaded_netcdf(path, "a dataset of this study", _LARGEST_LEFT + _LARGEST_OF_A_ROBOT * robots)
+    except InputError:
         return None
+    return found if found.attrs.get("checksum") == _checksum(found) else None

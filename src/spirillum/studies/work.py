@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, cast
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
-from spirillum.files import whole_file
+from spirillum.files import opened, whole_file
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
@@ -311,17 +311,28 @@ def kept(task: Keepable, folder: Path | None, readings: int) -> Part | None:
     if folder is None or not (folder / task.file_name).is_file():
         return None
     try:
-        with (folder / task.file_name).open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            part = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, EOFError, TypeError, AttributeError, zipfile.BadZipFile):
+        with opened(folder / task.file_name, "a part of a study", _LARGEST_PART) as stream:
+            if any(not _as_kept(item) for item in zipfile.ZipFile(stream).infolist()):
+                return None
+            with np.load(stream, allow_pickle=False) as stored:
+                part = {name: stored[name] for name in stored.files}
+    except Exception:  # a damaged file raises whatever the libraries meet first
         return None
     whole = task.needed <= set(part) <= task.allowed
     fits = all(array.dtype == np.float64 and array.shape[:2] == (task.size, readings) for array in part.values())
     return part if whole and fits else None
 
 
+_LARGEST_PART = 1 << 30
+
+
+def _as_kept(item: zipfile.ZipInfo) -> bool:
+    """Whether an array stands in the file as it is: what is compressed could be a thousand times as large."""
+    return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
+
+
 def keep(task: Keepable, part: Part, folder: Path | None) -> None:
     """Keep a finished answer."""
     if folder is not None:
-        with whole_file(folder / task.file_name) as path, path.open("wb") as stream:
+        with whole_file(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
             np.savez(stream, **cast("dict[str, Any]", part))

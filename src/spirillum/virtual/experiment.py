@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -17,7 +17,18 @@ from pydantic import BeforeValidator
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
-from spirillum.files import claim_folder, output_folder, write_text
+from spirillum.files import (
+    MARK,
+    file_name,
+    is_own,
+    opened,
+    output_folder,
+    protected,
+    read_json,
+    results_folder,
+    text_cell,
+    write_text,
+)
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
@@ -154,7 +165,6 @@ def virtual_experiment(
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model)
         warnings += [f"{name}: {sentence}" for sentence in said]
-    folder = Path(output)
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,
@@ -170,19 +180,21 @@ def virtual_experiment(
         "spread": plan.spread,
         "seed": plan.seed,
     }
-    claim_folder(folder, _MARK, mark, "virtual experiment")
     planned = [
         item
         for place, name in enumerate(robots)
         for item in _planned(name, robots[name], steady[name], plan, camera, place)
     ]
-    missing = [item for item in planned if not _finished(folder, item)]
-    for name in robots:
-        output_folder(folder / name)
-    render_one = _renderer(folder, camera, degradation)
-    _render_all(render_one, missing, len(planned), plan.jobs, progress or (lambda _what, _done, _total: None))
-    table = folder / _TABLE
-    write_text(table, _table(planned))
+    claim = {"mark": _MARK, "content": mark, "what": "virtual experiment"}
+    inputs = study if isinstance(study, (str, Path)) else None
+    with protected(inputs), results_folder(output, claim=claim) as folder:
+        missing = [item for item in planned if not _finished(folder, item)]
+        for name in robots:
+            output_folder(folder / name, folder)
+        render_one = _renderer(folder, camera, degradation)
+        _render_all(render_one, missing, len(planned), plan.jobs, progress or (lambda _what, _done, _total: None))
+        table = folder / _TABLE
+        write_text(table, _table(planned))
     return VirtualExperiment(
         folder=folder,
         robots=tuple(robots),
@@ -212,10 +224,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Rob
             tail = robot.tail
             name = f"{name}-{1e3 * tail.wavelength:g}-{1e3 * tail.amplitude:g}"
             robot = robot.model_copy(update={"name": name})
-        name = re.sub(r"[^\w.-]+", "-", name)[:100]
-        if name in found:
-            name = f"{name}-{place + 1}"
-        found[name] = robot
+        found[file_name(name, {*found, _MARK, _TABLE})] = robot
     return found, loaded.study.models[0]
 
 
@@ -252,17 +261,23 @@ def _finished(folder: Path, planned: Planned) -> bool:
     trial = folder / planned.label
     known = ["setup.toml"] if is_preset(planned.robot) else ["setup.toml", "robot.toml"]
     try:
-        json.loads(trial.with_name(f"{trial.name}.truth.json").read_text(encoding="utf-8"))
+        read_json(trial.with_name(f"{trial.name}.truth.json"), "the truth of a trial")
         begins = {end: _first_bytes(trial.with_name(f"{trial.name}.{end}")) for end in ("mp4", "truth.nc")}
         whole = begins["mp4"][4:] == b"ftyp" and begins["truth.nc"] == b"\x89HDF\r\n\x1a\n"
         return whole and all((trial.parent / name).stat().st_size > 0 for name in known)
-    except (OSError, ValueError, RecursionError):
+    except (OSError, ValueError):
         return False
+
+
+def _files_of(folder: Path, planned: Planned) -> list[Path]:
+    trial = folder / planned.label
+    beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
+    return [*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"]
 
 
 def _first_bytes(path: Path) -> bytes:
     """The eight bytes that tell a kind of file."""
-    with path.open("rb") as file:
+    with opened(path, "a file of a trial", sys.maxsize) as file:
         return file.read(8)
 
 
@@ -281,6 +296,9 @@ def _renderer(folder: Path, camera: CameraOptions, degradation: Degradation) -> 
             if stop.is_set():
                 raise _Stopped
 
+        for damaged in _files_of(folder, planned):
+            if damaged.is_file() and not is_own(damaged):  # the folder is claimed: it was ours
+                damaged.unlink()
         render(
             planned.robot,
             folder / f"{planned.label}.mp4",
@@ -324,12 +342,12 @@ def _render_all(
 def _table(planned: list[Planned]) -> str:
     """The truth as an observations file."""
     about = f"# {SYNTHETIC.replace('synthetic', 'SYNTHETIC', 1)}; true rates, with planted differences between trials"
-    lines = [about, ",".join(_COLUMNS + _RATES)]
+    lines = [about, f"# {MARK}", ",".join(_COLUMNS + _RATES)]
     for item in planned:
         robot, rates = item.robot, item.rates
         channel = "" if robot.channel is None else f"{1e3 * robot.channel.diameter:.9g}"
         tail, body = rates["tail_rotation_rate"] / Hz, rates["body_rotation_rate"] / Hz
         numbers = (1e3 * rates["forward_velocity"], tail, body, tail - body)
         shape = f"{channel},{1e3 * robot.tail.wavelength:.9g},{1e3 * robot.tail.amplitude:.9g}"
-        lines.append(f"{item.folder},{shape},{item.number},{','.join(f'{value:.9g}' for value in numbers)}")
+        lines.append(f"{text_cell(item.folder)},{shape},{item.number},{','.join(f'{value:.9g}' for value in numbers)}")
     return "\n".join(lines) + "\n"

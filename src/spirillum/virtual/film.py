@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from fractions import Fraction
@@ -12,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
+from spirillum.files import check_replaceable, output_target, whole_file, whole_folder
 from spirillum.formats.h264 import h264_writer
 
 __all__ = ["FrameWriter", "video_target", "video_writer"]
@@ -41,6 +40,8 @@ def video_target(path: str | Path) -> Path:
         return output_target(path, {".mp4": "a video, or a folder without an ending"}, "trial.mp4")
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
+    if not path.is_dir():
+        check_replaceable(path)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
     return path
@@ -101,17 +102,5 @@ class _Pngs:
 
 @contextmanager
 def _png_writer(folder: Path, tags: Mapping[str, str]) -> Iterator[FrameWriter]:
-    part = folder.parent / f".{folder.name}.part"
-    shutil.rmtree(part, ignore_errors=True)
-    try:
-        part.mkdir()
-    except OSError as error:
-        why = error.strerror
-        raise InputError(f"{folder} cannot be written ({why}); allowed: a folder you may write to") from error
-    try:
+    with whole_folder(folder) as part:
         yield _Pngs(part, tags)
-        if folder.exists():
-            folder.rmdir()
-        part.replace(folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from spirillum.files import MARK
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot
@@ -25,7 +26,7 @@ def robot_text(robot: Robot) -> str:
         robot: a checked robot.
     """
     units = {item.path: item.unit for item in field_values(robot) if item.unit is not None}
-    return "\n".join(["# every field of a checked robot", *_lines(robot, "", units)]) + "\n"
+    return "\n".join([f"# every field of a checked robot, {MARK}", *_lines(robot, "", units)]) + "\n"
 
 
 def _lines(section: Section, path: str, units: dict[str, str]) -> Iterator[str]:

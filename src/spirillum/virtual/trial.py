@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.files import whole_file, write_dataset
+from spirillum.files import protected, whole_files, write_dataset
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.version import versions
@@ -127,7 +126,9 @@ def render(
     Raises:
         InputError: for wrong input, or a target that cannot be written.
     """
-    target = video_target(path)
+    inputs = [item for item in (robot, run) if isinstance(item, (str, Path))]
+    with protected(*inputs):
+        target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     degradation, setup_errors = Degradation.of(degradation), SetupErrors.of(setup_errors)
     seed = Seeded.of({"seed": seed}).seed
@@ -173,11 +174,15 @@ def render(
         texts["robot"] = robot_text(robot)
     frames = Frames(Painter(robot, tank, lens), disturbances, trajectory, camera.exposure)
     tell = progress or (lambda _what, _done, _total: None)
-    with ExitStack() as files:  # all of them appear together, or none
-        for name, text in texts.items():
-            files.enter_context(whole_file(names[name])).write_text(text, encoding="utf-8")
-        write_dataset(truth, files.enter_context(whole_file(names["nc"])))
-        writer = files.enter_context(video_writer(target, camera.size, camera.fps, degradation.crf, tags))
+    beside = {names[name]: text for name, text in texts.items()}
+    with (
+        protected(*inputs),
+        whole_files([*beside, names["nc"]]) as parts,  # all of them appear together, or none
+        video_writer(target, camera.size, camera.fps, degradation.crf, tags) as writer,
+    ):
+        for place, text in beside.items():
+            parts[place].write_text(text, encoding="utf-8")
+        write_dataset(truth, parts[names["nc"]])
         _write_frames(writer, frames, kept, camera.fps, tell)
         tell("render: writing", len(kept), len(kept))
     return written

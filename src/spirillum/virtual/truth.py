@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.answer import as_json, envelope, quantity
 from spirillum.arrays import Samples
+from spirillum.files import MARK
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.options import CameraOptions
 from spirillum.virtual.trajectory import TrialTrajectory
@@ -48,7 +49,7 @@ def setup_text(
     """
     height, uncertainty = axis
     lines = [
-        f"# {SYNTHETIC}",
+        f"# {SYNTHETIC}; {MARK}",
         "[camera]",
         f'view = "{camera.view}"',
         f"height = {_mm(lens.eye)}",

@@ -22,7 +22,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import whole_file
+from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
 __all__ = ["cache_folder", "digest_of", "imported_sources", "kept_or_computed", "sealed", "unsealed"]
@@ -48,9 +48,11 @@ def _folder(named: str) -> Path | None:
     if named.lower() == "off":
         return None
     folder = Path(named) if named else user_cache_path("spirillum", appauthor=False)
+    if not named and not folder.is_absolute():  # no home is known: `~` would be a folder where one works
+        return None
     try:
         (folder / "tube").mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, ValueError):
         return None
     return folder / "tube"
 
@@ -73,7 +75,7 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         found = compute(question)
         content = np.ascontiguousarray(found, dtype="<f8").tobytes()
         try:
-            with whole_file(path) as temporary:
+            with whole_file(path, replace="any", sync=False) as temporary:
                 temporary.write_bytes(sealed(content))
         except (InputError, OSError):  # a full or read-only disk costs time only
             pass
@@ -83,8 +85,8 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
 def _kept(path: Path) -> Samples | None:
     """A kept answer; None if there is none, or its checksum does not fit."""
     try:
-        stored = path.read_bytes()
-    except OSError:
+        stored = read_bytes(path, "a kept answer", 1 << 16)
+    except InputError:
         return None
     content = unsealed(stored)
     if content is None or len(content) != 8 * MOTIONS**2:

@@ -20,7 +20,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.files import whole_file
+from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.cache import sealed, unsealed
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.tube.film import FilmTable
@@ -99,7 +99,7 @@ class TubeTable:
         start = kernel.film_start(self.packed)
         numbers = self.packed[:start].astype("<f4").tobytes() + self.packed[start:].astype("<f8").tobytes()
         content = zlib.compress(json.dumps(head | {"rest": start}).encode() + b"\n" + numbers, 9)
-        with whole_file(path) as temporary:
+        with whole_file(path, replace="any") as temporary:
             temporary.write_bytes(sealed(content))
 
     @classmethod
@@ -146,9 +146,7 @@ class TubeTable:
 def _read(path: Path) -> TubeTable | None:
     """The table in a file; None for any other file."""
     try:
-        if path.stat().st_size > _LARGEST_FILE:
-            return None
-        content = unsealed(path.read_bytes())
+        content = unsealed(read_bytes(path, "a table", _LARGEST_FILE))
         if content is None:
             return None
         words, _, numbers = zlib.decompressobj().decompress(content, _LARGEST_TABLE).partition(b"\n")

@@ -8,17 +8,18 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rc_context, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import PlaceHolderLayoutEngine
 
 from spirillum.arrays import Values
-from spirillum.files import whole_file
+from spirillum.files import MARK, whole_file
 from spirillum.units import for_people, shown_in
 
 __all__ = [
@@ -75,10 +76,12 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
     "svg.fonttype": "path",
     "svg.hashsalt": "spirillum",
 }
+_OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
+"""Settings that say where a session shows its own figures, not how ours look."""
 DPI = 200
 """Of PNG files."""
 _NO_DATE: dict[str, dict[str, Any]] = {
-    "png": {"Software": None},
+    "png": {"Software": MARK},
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
@@ -157,13 +160,23 @@ class Scale:
         return values / self.factor
 
 
+@lru_cache(maxsize=1)
+def _settings() -> dict[Any, Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of settings that the library means to drop
+        own: dict[Any, Any] = {name: value for name, value in rcParamsDefault.items() if name not in _OTHERS}
+    own.update(_STYLE)
+    return own
+
+
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw and save in the look of all figures; the caller's own settings are untouched.
+    """Draw and save in the look of all figures, whatever the user's settings are, which stay untouched.
 
+    All that this module does not set is as matplotlib comes, not as a `matplotlibrc` or a session has it.
     Names may hold characters that the font lacks; they become boxes, not warnings.
     """
-    with rc_context(_STYLE), warnings.catch_warnings():
+    with rc_context(_settings()), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from", category=UserWarning)
         yield
 

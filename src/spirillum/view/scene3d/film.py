@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.poses import Pose, Poses, poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
+from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.robot import Robot
 from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.view.scene3d.encode import FILMS, film_writer
@@ -124,7 +124,7 @@ def film(
     follows = camera == "follow" or (camera == "auto" and poses.travelled > 0.5 * solids.length)
     turn, warnings = _aliasing(poses, times, speed)
     model = str(dataset.attrs.get("model", ""))[:60]
-    words = {"title": robot.name, "comment": "computed motion and geometry, drawn by spirillum"}
+    words = {"title": robot.name, "comment": f"computed motion and geometry, {MARK}"}
     shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset))
     tell = progress or (lambda _what, _done, _total: None)
     with whole_file(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:

@@ -14,7 +14,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.dynamics.poses import Pose
 from spirillum.errors import InputError
-from spirillum.files import output_target, whole_file
+from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.units import KINDS, parse_option
@@ -210,6 +210,7 @@ def _write_png(image: np.ndarray, path: Path, robot: Robot, view: View) -> None:
 
     facts = PngImagePlugin.PngInfo()
     facts.add_itxt("Title", robot.name)
+    facts.add_text("Software", MARK)
     facts.add_itxt("Description", _words(robot, view))
     with whole_file(path) as temporary:
         Image.fromarray(image).save(temporary, format="png", optimize=True, pnginfo=facts)

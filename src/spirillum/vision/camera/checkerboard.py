@@ -10,6 +10,7 @@ import numpy as np
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.vision.setup import Checkerboard
+from spirillum.vision.video.pictures import read_image
 
 __all__ = ["Lens", "lens_of"]
 
@@ -57,7 +58,7 @@ def lens_of(board: Checkerboard, folder: Path, size: tuple[int, int]) -> Lens:
     names = sorted(entry for entry in images.iterdir() if entry.suffix.lower() in _PICTURES)
     pattern, found = (board.columns, board.rows), []
     for name in names:
-        grey = cv2.imdecode(np.fromfile(name, dtype=np.uint8), cv2.IMREAD_GRAYSCALE) if name.stat().st_size else None
+        grey = read_image(name, grey=True)
         if grey is None:
             raise InputError(f"camera.checkerboard: {name} cannot be read as an image; allowed: png, jpg, tif, bmp")
         if grey.shape[::-1] != size:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -15,7 +16,10 @@ import numpy as np
 
 from spirillum.errors import InputError
 from spirillum.extras import required
+from spirillum.files import checked_path, opened
+from spirillum.files.limits import MOST_IMAGES, MOST_PIXELS, SMALLEST_SIDE
 from spirillum.vision.flag import Flag
+from spirillum.vision.video.pictures import read_image
 from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.read_ahead import ahead
 
@@ -30,9 +34,12 @@ _WHAT = "a film (mp4, avi, mov, mkv) or a folder of images (png, jpg, tif, bmp)"
 _PURPOSE = "measuring a video"
 _AHEAD = 12
 """Frames that are decoded ahead of the analysis; memory does not grow with a video's length."""
-_LARGEST = 50_000_000
-"""Most pixels of a picture."""
-_SMALLEST = 32
+_OPENING = {
+    "protocol_whitelist": "file",
+    "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc",
+    "max_streams": "100",
+}
+"""A film is one file: no playlist that opens other files, or asks a network for them."""
 _SAME_RATE = 0.01
 """Relative difference from which on two rates are not the same."""
 _FEW = 10
@@ -243,18 +250,15 @@ def open_video(path: str | Path, frames_per_second: float | None = None) -> Vide
     Raises:
         InputError: if it is missing, empty, not a video, has no pictures or an absurd size, or a folder has no rate.
     """
-    path = Path(path)
+    path = checked_path(path, _WHAT)
     try:
         if path.is_dir():
             return _folder(path, frames_per_second)
-        if not path.exists():
-            raise InputError(f"{path} does not exist; allowed: {_WHAT}")
-        if not path.is_file():
-            raise InputError(f"{path} is not a regular file; allowed: {_WHAT}")
-        if path.stat().st_size == 0:
-            raise InputError(f"{path} is empty; allowed: {_WHAT}")
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); allowed: {_WHAT}") from error
+    with opened(path, _WHAT, sys.maxsize) as stream:
+        if not stream.read(1):
+            raise InputError(f"{path} is empty; allowed: {_WHAT}")
     return _film(path, frames_per_second)
 
 
@@ -264,6 +268,8 @@ def _film(path: Path, frames_per_second: float | None) -> Video:
         if not container.streams.video:
             raise InputError(f"{path} has no pictures; allowed: {_WHAT}")
         stream = container.streams.video[0]
+        if stream.width and stream.height:
+            _check_size(path, (stream.width, stream.height))
         try:
             frame = next(container.decode(stream), None)
         except (av.error.FFmpegError, ValueError) as error:
@@ -299,6 +305,8 @@ def _replaced(given: float | None, own: float) -> list[Flag]:
 def _folder(path: Path, frames_per_second: float | None) -> Video:
     pictures = (entry for entry in path.iterdir() if entry.suffix.lower() in PICTURES and entry.is_file())
     names = [entry for entry in pictures if not entry.name.startswith(".")]
+    if len(names) > MOST_IMAGES:
+        raise InputError(f"{path} holds {len(names)} images; allowed: at most {MOST_IMAGES}")
     if not names:
         raise InputError(f"{path} holds no images; allowed: {_WHAT}")
     if frames_per_second is None:
@@ -331,28 +339,24 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
 def _opened(path: Path) -> Any:
     av = required("av", _PURPOSE, "video")
     try:
-        return av.open(str(path))
+        return av.open(f"file:{path}", options=_OPENING, metadata_errors="replace")
     except (av.error.FFmpegError, ValueError, OSError) as error:
         raise InputError(f"{path} cannot be read as a film ({_short(error)}); allowed: {_WHAT}") from error
 
 
 def _check_size(path: Path, size: tuple[int, int]) -> None:
-    if min(size) < _SMALLEST or size[0] * size[1] > _LARGEST:
+    if min(size) < SMALLEST_SIDE or size[0] * size[1] > MOST_PIXELS:
         raise InputError(
-            f"{path} has pictures of {size[0]} x {size[1]} pixels; allowed: sides of at least {_SMALLEST} and at most "
-            f"{_LARGEST // 1_000_000} million pixels"
+            f"{path} has pictures of {size[0]} x {size[1]} pixels; allowed: sides of at least {SMALLEST_SIDE} and at "
+            f"most {MOST_PIXELS // 1_000_000} million pixels"
         )
 
 
 def _read_image(path: Path) -> np.ndarray | None:
-    cv2 = required("cv2", _PURPOSE, "video")
     try:
-        data = np.fromfile(path, dtype=np.uint8)
-    except OSError:
+        picture = read_image(path)
+    except InputError:
         return None
-    if data.size == 0:
-        return None
-    picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
     return None if picture is None else np.ascontiguousarray(picture[:, :, ::-1])
 
 

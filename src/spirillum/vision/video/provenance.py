@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
 from pathlib import Path
+
+from spirillum.errors import InputError
+from spirillum.files import opened, read_bytes
+from spirillum.files.limits import LARGEST_PICTURE
 
 __all__ = ["one_line", "words_of_images"]
 
@@ -18,7 +24,7 @@ def words_of_images(folder: Path, image: Path) -> str:
     """
     found = []
     if image.suffix.lower() == ".png":
-        data = image.read_bytes()
+        data = read_bytes(image, "an image", LARGEST_PICTURE)
         at = 8
         while at + 8 <= len(data):
             length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
@@ -27,9 +33,8 @@ def words_of_images(folder: Path, image: Path) -> str:
             at += 12 + length
     for place in (folder, folder.parent):
         for name in ("README", "README.txt", "README.md"):
-            if (place / name).is_file():
-                with (place / name).open("rb") as file:
-                    found.append(file.read(_MOST_WORDS).decode("utf-8", "replace"))
+            with suppress(InputError), opened(place / name, "a text", sys.maxsize) as file:
+                found.append(file.read(_MOST_WORDS).decode("utf-8", "replace"))
     return one_line(" ".join(found))
 
 

@@ -1,0 +1,75 @@
+"""Names of the user's that become part of a path, of a table's cell, or of a label: checked in one place."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+from spirillum.errors import InputError
+from spirillum.files.limits import LONGEST_PATH
+
+__all__ = ["checked_path", "file_name", "is_text", "text_cell"]
+
+_LONGEST_NAME = 100
+_NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
+_FORMULAS = ("=", "+", "-", "@")
+"""With what a cell begins that a spreadsheet takes for a formula."""
+_DEVICES = re.compile(r"(?i)(con|prn|aux|nul|com\d|lpt\d)(\..*)?")
+"""Names that are devices on Windows."""
+
+
+def is_text(name: str) -> bool:
+    """Whether a name can be written as UTF-8: names of files may be any bytes."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def checked_path(path: str | os.PathLike[str], what: str) -> Path:
+    """A path that results may name and libraries may open.
+
+    Args:
+        path: as the user gave it.
+        what: what it should be, for the sentence of an error.
+
+    Raises:
+        InputError: if it is empty, holds a null byte, is absurdly long, or is not text in UTF-8.
+    """
+    name = os.fspath(path)
+    if not name:
+        raise InputError(f"an empty name of a file; allowed: {what}")
+    if "\0" in name or len(name) > LONGEST_PATH:
+        wrong = "holds a null character" if "\0" in name else f"has {len(name)} characters"
+        raise InputError(f"{name[:80]!r} {wrong}; allowed: {what}")
+    if not is_text(name):
+        raise InputError(f"{name[:200]!a} is not text; allowed: a name that is text in UTF-8, as results carry it")
+    return Path(path)
+
+
+def file_name(name: str, taken: Collection[str] = ()) -> str:
+    """A name as part of a path: one folder or file, not hidden, other than others also where capitals do not count.
+
+    Letters, digits, `_`, `.`, `+` and `-` stay; other signs become `-`. It is never `.` or `..`.
+
+    Args:
+        name: any text.
+        taken: names that are taken; a number is added to one of them.
+    """
+    safe = _NOT_IN_NAMES.sub("-", name).lstrip(".-")[:_LONGEST_NAME].rstrip(".") or "unnamed"
+    if _DEVICES.fullmatch(safe):
+        safe = f"{safe}-"
+    lower = {other.casefold() for other in taken}
+    found, number = safe, 2
+    while found.casefold() in lower:
+        found, number = f"{safe}-{number}", number + 1
+    return found
+
+
+def text_cell(text: str) -> str:
+    """A text as a cell of a CSV file: one printable line that no spreadsheet takes for a formula."""
+    line = "".join(c if c.isprintable() else " " for c in text).strip()
+    return f"'{line}" if line.startswith(_FORMULAS) else line

@@ -1,0 +1,201 @@
+"""NetCDF-4 files: made in memory and written whole; read once their declared sizes are known to be small enough."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.errors import InputError
+from spirillum.files.limits import LARGEST_NETCDF, MOST_VARIABLES
+from spirillum.files.reading import opened
+from spirillum.files.writing import Replace, whole_file
+
+if TYPE_CHECKING:
+    import h5netcdf
+    import h5py
+    import xarray as xr
+
+__all__ = ["loaded_netcdf", "netcdf_file", "open_netcdf", "write_dataset"]
+
+_BEGINS = b"\x89HDF\r\n\x1a\n"
+_DEEPEST = 6
+_LONGEST_TEXTS = 64 << 20
+_LARGEST_CHUNK = 64 << 20
+
+
+@contextmanager
+def netcdf_file(path: Path, *, replace: Replace = "own") -> Iterator[h5netcdf.File]:
+    """A new NetCDF-4 file, written whole or not at all when the block ends.
+
+    It is made in memory: HDF5 takes the whole process down where it finds no space on a disk.
+
+    Args:
+        path: the file.
+        replace: what it may replace, see `whole_file`.
+    """
+    import h5netcdf
+
+    content = BytesIO()
+    with h5netcdf.File(content, "w") as file:
+        yield file
+    with whole_file(path, replace=replace) as temporary:
+        temporary.write_bytes(content.getbuffer())
+
+
+def write_dataset(dataset: xr.Dataset, path: Path, *, replace: Replace = "own") -> None:
+    """Write NetCDF-4, compressed, whole or not at all.
+
+    Args:
+        dataset: what is written.
+        path: the file.
+        replace: what it may replace, see `whole_file`.
+    """
+    from xarray.backends import H5NetCDFStore
+
+    encoding = {
+        str(name): {"zlib": True, "complevel": 4} for name, variable in dataset.data_vars.items() if variable.ndim > 0
+    }
+    with netcdf_file(path, replace=replace) as file:
+        dataset.dump_to_store(H5NetCDFStore(file), encoding=encoding)
+
+
+@contextmanager
+def open_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF) -> Iterator[h5netcdf.File]:
+    """A NetCDF-4 file for reading, of which is known that all of it fits into memory.
+
+    Refused are pipes and folders, files or arrays that are too large, also those whose values were never stored, links
+    into other files, and compressed pieces that are larger than they declare.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        largest: of the file, and of all its arrays together, bytes.
+
+    Raises:
+        InputError: if it is no such file, is damaged, or too large; also where the block meets damage.
+    """
+    with opened(path, what, largest) as stream:
+        if stream.read(len(_BEGINS)) != _BEGINS:
+            raise InputError(f"{path} is not a NetCDF-4 file; allowed: {what}")
+    import h5netcdf
+    import h5py
+
+    class File(h5netcdf.File):  # type: ignore[misc]
+        _writable = False  # the library asks for it when it closes a file that it could not open
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of a foreign file; what matters of it is checked
+            with h5py.File(path, "r") as stored:
+                _check(stored, Path(path), what, largest)
+                with File(stored, "r") as file:
+                    yield file
+    except (InputError, KeyboardInterrupt, SystemExit):
+        raise
+    except Exception as error:  # a damaged file raises whatever the libraries meet first
+        raise InputError(f"{path} cannot be read ({_first_line(error)}); allowed: {what}") from error
+
+
+def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, group: str | None = None) -> xr.Dataset:
+    """A dataset from its file, loaded whole.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        largest: as `open_netcdf`.
+        group: the group that holds it.
+
+    Raises:
+        InputError: as `open_netcdf`.
+    """
+    with open_netcdf(path, what, largest) as file:
+        return group_of(file, group)
+
+
+def group_of(file: h5netcdf.File, group: str | None = None) -> xr.Dataset:
+    """A group of an open file as a dataset, loaded whole.
+
+    Args:
+        file: from `open_netcdf`.
+        group: its name; None: the file itself.
+    """
+    import xarray as xr
+    from xarray.backends import H5NetCDFStore
+
+    found: xr.Dataset = xr.open_dataset(
+        H5NetCDFStore(file if group is None else file[group]), decode_times=False, cache=False
+    ).load()
+    return found
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:150]
+
+
+def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:
+    """Walk through all groups without reading a value.
+
+    Raises:
+        InputError: if there is too much, or something that no NetCDF file has.
+    """
+    import h5py
+
+    ahead: list[tuple[h5py.Group, int]] = [(stored, 0)]
+    count = total = 0
+    while ahead:
+        group, depth = ahead.pop()
+        for name in group:
+            count += 1
+            if count > MOST_VARIABLES or depth > _DEEPEST:
+                raise InputError(f"{path} holds more than {MOST_VARIABLES} variables or deep groups; {_only(what)}")
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise InputError(f"{path} holds a link to another place; {_only(what)}")
+            item = group[name]
+            if isinstance(item, h5py.Group):
+                ahead.append((item, depth + 1))
+            elif isinstance(item, h5py.Dataset):
+                total += _declared(item, path, what)
+                if total > largest:
+                    raise InputError(f"{path} declares arrays of more than {largest} bytes; {_only(what)}")
+
+
+def _only(what: str) -> str:
+    return f"allowed: {what}"
+
+
+def _declared(item: Any, path: Path, what: str) -> int:
+    """Bytes of a variable in memory, as it declares them; texts are counted as they are."""
+    import h5py
+
+    if item.external or item.is_virtual:
+        raise InputError(f"{path} takes values from other files; {_only(what)}")
+    size: int = prod(item.shape or ()) * item.dtype.itemsize
+    if item.chunks is not None:
+        chunk = prod(item.chunks) * item.dtype.itemsize
+        if chunk > _LARGEST_CHUNK or any(
+            item.id.get_chunk_info(number).size > 2 * chunk + 1024 for number in range(item.id.get_num_chunks())
+        ):
+            raise InputError(f"{path} holds pieces that are larger than they should be; {_only(what)}")
+    if h5py.check_string_dtype(item.dtype) is not None and item.dtype.hasobject:
+        size += _texts(item, path, what)
+    return size
+
+
+def _texts(item: Any, path: Path, what: str) -> int:
+    """Bytes of all texts of a variable; several may stand at one place in the file."""
+    count = prod(item.shape or ())
+    if count * item.file.id.get_filesize() <= _LONGEST_TEXTS or item.ndim != 1:
+        if item.ndim > 1 and count > MOST_VARIABLES:
+            raise InputError(f"{path} holds {count} texts; {_only(what)}")
+        return 64 * count
+    total = 0
+    for start in range(0, count, 64):
+        total += sum(len(text) for text in item[start : start + 64])
+        if total > _LONGEST_TEXTS:
+            raise InputError(f"{path} holds texts of more than {_LONGEST_TEXTS} bytes; {_only(what)}")
+    return total + 64 * count

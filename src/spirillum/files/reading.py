@@ -1,0 +1,190 @@
+"""Reading users' files: regular files only, their size checked first, wrong ones refused in a sentence."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import json
+import os
+import re
+import stat
+import tomllib
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from spirillum.errors import InputError
+from spirillum.files.limits import LARGEST_TEXT, MOST_CELLS, MOST_LEVELS, MOST_ROWS
+from spirillum.files.names import checked_path
+
+__all__ = ["checked_file", "csv_rows", "opened", "parse_toml", "read_bytes", "read_json", "read_text", "read_toml"]
+
+_QUOTED = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'')
+_LINE_ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"
+"""Where Python ends a line."""
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*){{{MOST_LEVELS}}}")
+
+
+def opened(path: str | Path, what: str, largest: int) -> BinaryIO:
+    """A user's file opened for reading: a regular file, whose kind is looked at once it is open.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        largest: largest size, bytes.
+
+    Raises:
+        InputError: if it is missing, a folder, a pipe or a device, unreadable, or too large.
+    """
+    path = checked_path(path, what)
+    try:
+        stream = open(path, "rb", opener=_at_once)  # noqa: SIM115 - the caller closes it
+    except OSError as error:
+        raise _refused(path, error, what) from error
+    status = os.fstat(stream.fileno())
+    wrong = ""
+    if not stat.S_ISREG(status.st_mode):
+        wrong = "is not a regular file"
+    elif status.st_size > largest:
+        wrong, what = f"has {status.st_size} bytes", f"{what} of at most {largest} bytes"
+    if wrong:
+        stream.close()
+        raise InputError(f"{path} {wrong}; allowed: {what}")
+    return stream
+
+
+def _at_once(name: str, flags: int) -> int:
+    """Open without waiting for somebody to write into a pipe."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+
+
+def _refused(path: Path, error: OSError, what: str) -> InputError:
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{path} does not exist; allowed: {what}")
+    if isinstance(error, IsADirectoryError) or path.is_dir():
+        return InputError(f"{path} is a folder; allowed: {what}")
+    if error.errno == errno.ENXIO:  # a socket
+        return InputError(f"{path} is not a regular file; allowed: {what}")
+    return InputError(f"{str(path)[:200]!r} cannot be read ({error.strerror}); allowed: {what}")
+
+
+def checked_file(path: str | Path, what: str, largest: int) -> Path:
+    """A user's file that a library is to open by its name.
+
+    Raises:
+        InputError: as `opened`.
+    """
+    with opened(path, what, largest) as stream:
+        stream.read(1)
+    return Path(path)
+
+
+def read_bytes(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> bytes:
+    """All of a user's file, at most `largest` bytes even if it grows while it is read.
+
+    Raises:
+        InputError: as `opened`.
+    """
+    with opened(path, what, largest) as stream:
+        try:
+            found = stream.read(largest + 1)
+        except OSError as error:
+            raise _refused(Path(path), error, what) from error
+    if len(found) > largest:
+        raise InputError(f"{path} has more than {largest} bytes; allowed: {what} of at most {largest} bytes")
+    return found
+
+
+def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
+    """Text of a user's file.
+
+    Args:
+        path: the file.
+        what: what it should be, for the sentence of an error.
+        largest: largest size, bytes.
+
+    Raises:
+        InputError: as `opened`; or if it is empty, or not UTF-8 text.
+    """
+    try:
+        text = read_bytes(path, what, largest).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not text (byte {error.start} is not UTF-8); allowed: {what}") from error
+    if not text.strip():
+        raise InputError(f"{path} is empty; allowed: {what}")
+    return text
+
+
+def read_json(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> Any:
+    """What a JSON file holds.
+
+    Raises:
+        InputError: as `read_text`; or if it is not JSON, or nested too deeply.
+    """
+    text = read_text(path, what, largest)
+    with suppress(ValueError, RecursionError):
+        return json.loads(text)
+    raise InputError(f"{path} is damaged; allowed: {what}")
+
+
+def parse_toml(text: str, source: str, what: str) -> dict[str, Any]:
+    """Tables of a TOML text.
+
+    Raises:
+        InputError: if it is not TOML; the sentence names source and line.
+    """
+    if _DEEP_KEY.search(_QUOTED.sub("q", text)):  # the library's memory grows with the square of a key's parts
+        raise InputError(f"{source} holds a key of more than {MOST_LEVELS} parts between dots; allowed: {what}")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source} is not TOML: {str(error)[:200]}; allowed: {what}") from error
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"{source} holds values nested too deeply or too long; allowed: {what}") from error
+
+
+def read_toml(path: str | Path, what: str) -> dict[str, Any]:
+    """Tables of a user's TOML file.
+
+    Raises:
+        InputError: as `read_text` and `parse_toml`.
+    """
+    return parse_toml(read_text(path, what), str(path), what)
+
+
+def csv_rows(text: str, path: Path, what: str) -> list[tuple[int, list[str]]]:
+    """Rows of a CSV text, its header among them, each with the number of its line; cells without spaces around them.
+
+    Lines that start with `#` are comments. They are left out, and so are rows of commas alone, as spreadsheets write.
+
+    Args:
+        text: what stands in the file.
+        path: the file, for the sentence of an error.
+        what: what it should be.
+
+    Raises:
+        InputError: if it is not CSV, or has too many rows or cells.
+    """
+    _check_extent(text, path, what)
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip(" ,\t")]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    reader = csv.reader((f"{line}\n" for _, line in lines), strict=True)
+    found: list[tuple[int, list[str]]] = []
+    first = 0
+    try:
+        for cells in reader:
+            found.append((lines[first][0], [cell.strip() for cell in cells]))
+            first = reader.line_num  # a cell in quotation marks may go over several lines
+    except csv.Error as error:
+        raise InputError(f"{path} is not CSV ({error}); allowed: {what}") from error
+    return found
+
+
+def _check_extent(text: str, path: Path, what: str) -> None:
+    """Refuse a text that would make more rows or cells than fit into memory, before it is taken apart."""
+    rows, cells = sum(map(text.count, _LINE_ENDS)), text.count(",")
+    if rows > 2 * MOST_ROWS or cells > MOST_CELLS:
+        raise InputError(
+            f"{path} has {rows} lines and {cells} commas; allowed: {what} of at most {MOST_ROWS} rows and "
+            f"{MOST_CELLS} cells"
+        )

@@ -1,0 +1,339 @@
+"""The one way to write: made beside its place, synced, renamed; never over a file that is not this program's own.
+
+A file is made in a hidden folder beside its place that only this user can enter (`locks.private_folder`), written to
+the disk, and renamed: a kill or a full disk leaves the old file or the new one, whole. What the program writes says so
+(`is_own`); any other file that is there is refused, and so are inputs of the running command (`protected`).
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from spirillum.errors import InputError
+from spirillum.files.locks import private_folder
+from spirillum.files.names import checked_path
+
+__all__ = [
+    "MARK",
+    "PICTURES",
+    "Replace",
+    "check_replaceable",
+    "is_own",
+    "netcdf_target",
+    "new_file",
+    "output_folder",
+    "output_target",
+    "protected",
+    "whole_file",
+    "whole_files",
+    "whole_folder",
+    "write_text",
+]
+
+PICTURES = {".png": "a picture", ".pdf": "a picture", ".svg": "a picture"}
+"""Endings of the pictures that can be written, for `output_target`."""
+MARK = "written by spirillum"
+"""Stands in every file that may be replaced: at its end (`_AT_THE_END`), or in its title, comment or head."""
+Replace: TypeAlias = Literal["own", "any", "none"]
+"""What a new file may take the place of: this program's own files, any regular file, or nothing."""
+
+_XML = f"<!-- {MARK} -->\n".encode()
+_FREE_BOX = (8 + len(MARK)).to_bytes(4, "big") + b"free" + MARK.encode()
+_AT_THE_END = {
+    ".nc": f"\n{MARK}\n".encode(),  # behind the end that the file's head states
+    ".pdf": f"% {MARK}\n".encode(),
+    ".mp4": _FREE_BOX,
+    **dict.fromkeys((".svg", ".html", ".urdf", ".mjcf", ".xml", ".vti", ".vtp"), _XML),
+}
+_OWN = re.compile(rb"(?i)written by `?spirillum|\"schema\": ?\"spirillum\.[a-z-]+/\d")
+_HEAD, _TAIL = 1 << 16, 1 << 12
+_ANYTHING = "a file name"
+_inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
+
+
+def is_own(path: Path, begins: bytes = b"") -> bool:
+    """Whether a file is one of this program's, or empty.
+
+    Args:
+        path: a regular file.
+        begins: what a file of this kind begins with, where it has no room for the mark; none: the mark only.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD)
+        stream.seek(max(stream.seek(0, os.SEEK_END) - _TAIL, 0))
+        tail = stream.read(_TAIL)
+    return not head or bool(begins and head.startswith(begins)) or any(map(_OWN.search, (head, tail)))
+
+
+@contextmanager
+def protected(*inputs: str | Path | None) -> Iterator[None]:
+    """While the block runs, these files and folders are not written over.
+
+    Args:
+        inputs: files or folders that are read; None is passed over.
+    """
+    found: list[Path] = []
+    for path in inputs:
+        with suppress(OSError, RuntimeError, ValueError):
+            found += [Path(path).resolve()] if path else []
+    token = _inputs.set((*_inputs.get(), *found))
+    try:
+        yield
+    finally:
+        _inputs.reset(token)
+
+
+def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"") -> Path:
+    """The file behind a path, links followed, which a new one may take the place of.
+
+    Args:
+        path: where a file is to be written.
+        replace: what it may replace.
+        begins: as `is_own`.
+
+    Raises:
+        InputError: if something is there that is no regular file, is an input, or may not be replaced.
+    """
+    checked_path(path, _ANYTHING)
+    try:
+        real = path.resolve()
+        there, wrong = real.exists(), real.exists() and not real.is_file()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise InputError(f"{str(path)[:200]!r} cannot be written; allowed: {_ANYTHING}") from error
+    if wrong:
+        raise InputError(f"{path} is not a regular file; allowed: a new file, or one to replace")
+    if not there:
+        return real
+    if replace == "none":
+        raise InputError(f"{path} exists; allowed: a new file, or --force to overwrite one")
+    if any(_same(real, source) for source in _inputs.get()):
+        raise InputError(f"{path} is read by this command and would be written over; allowed: another name or folder")
+    try:
+        if replace == "own" and not is_own(real, begins):
+            raise InputError(
+                f"{path} is there and of unknown origin, not written by spirillum; allowed: another name or folder, "
+                "or to move it away"
+            )
+    except OSError as error:
+        raise InputError(f"{path} is there and cannot be read ({error.strerror}); allowed: another name") from error
+    return real
+
+
+def _same(path: Path, source: Path) -> bool:
+    if path == source or source in path.parents:
+        return True
+    try:
+        return path.samefile(source)
+    except OSError:
+        return False
+
+
+@contextmanager
+def whole_file(path: Path, *, replace: Replace = "own", begins: bytes = b"", sync: bool = True) -> Iterator[Path]:
+    """Give a temporary path; when the block ends well, what was written there takes the place of `path`.
+
+    Args:
+        path: the file; its folder has to be there.
+        replace: what it may replace.
+        begins: what a file of this kind begins with, see `is_own`.
+        sync: wait until the disk has it; not needed for what is computed again where it is damaged.
+
+    Raises:
+        InputError: if the folder cannot be written to, or something is there that may not be replaced.
+        OSError: if there is no space.
+    """
+    with whole_files({path: begins}, replace=replace, sync=sync) as temporary:
+        yield temporary[path]
+
+
+@contextmanager
+def whole_files(
+    paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
+) -> Iterator[dict[Path, Path]]:
+    """As `whole_file`, for files that belong together: all are made before the first takes its place.
+
+    Args:
+        paths: the files in the order in which they take their places; perhaps with what they begin with.
+        replace: what they may replace.
+        sync: wait until the disk has them.
+    """
+    begins = dict(paths) if isinstance(paths, Mapping) else dict.fromkeys(paths, b"")
+    places = {path: check_replaceable(path, replace, start) for path, start in begins.items()}
+    with ExitStack() as stack:
+        folders: dict[Path, Path] = {}
+        temporary: dict[Path, Path] = {}
+        for number, (path, place) in enumerate(places.items()):
+            if place.parent not in folders:
+                try:
+                    folders[place.parent] = stack.enter_context(private_folder(place.parent))
+                except OSError as error:
+                    raise _unwritable(path, error) from error
+            inside = folders[place.parent]
+            if len(places) > 1:
+                inside = inside / str(number)
+                inside.mkdir()
+            temporary[path] = inside / place.name
+        yield temporary
+        made = {path: made for path, made in temporary.items() if made.exists()}
+        for part in made.values():
+            _finish(part, sync=sync)
+        for path, part in made.items():
+            check_replaceable(path, replace, begins[path])  # it may have come meanwhile
+            try:
+                part.replace(places[path])
+            except OSError as error:
+                raise _unwritable(path, error) from error
+        if sync:
+            for folder in folders:
+                _sync(folder)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """Give a temporary folder; when the block ends well it takes the place of `path`, with all that is in it.
+
+    Args:
+        path: a new folder, or an empty one.
+
+    Raises:
+        InputError: if the folder above cannot be written to, or something has come to stand there meanwhile.
+        OSError: if there is no space.
+    """
+    checked_path(path, "a new folder")
+    try:
+        parent = path.parent.resolve()
+        with private_folder(parent) as hidden:
+            part = hidden / path.name
+            part.mkdir()
+            yield part
+            for made in part.iterdir():
+                _finish(made, sync=True)
+            if path.is_dir() and not path.is_symlink():
+                path.rmdir()
+            elif path.exists() or path.is_symlink():
+                raise FileExistsError(errno.EEXIST, "something of this name is there", str(path))
+            part.rename(parent / path.name)
+            _sync(parent)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> Exception:
+    """A sentence on a place that cannot be written to; want of space stays what it is."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return error
+    return InputError(f"{path} cannot be written ({error.strerror}); allowed: a folder you may write to")
+
+
+def _finish(part: Path, *, sync: bool) -> None:
+    """Mark a file that was made as the program's own, and wait until the disk has it."""
+    mark = _AT_THE_END.get(part.suffix, b"")
+    with part.open("r+b") as stream:
+        stream.seek(max(stream.seek(0, os.SEEK_END) - len(mark), 0))
+        if mark and stream.read() != mark:
+            stream.write(mark)
+        stream.flush()
+        if sync:
+            os.fsync(stream.fileno())
+
+
+def _sync(folder: Path) -> None:
+    """Wait until the disk knows the names in a folder, where that can be asked for."""
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def netcdf_target(path: str | Path) -> Path:
+    """The path of a NetCDF file to write, checked before any work is done.
+
+    Raises:
+        InputError: as `output_target`.
+    """
+    return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
+
+
+def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:
+    """The path of a file to write, checked before any work is done.
+
+    Args:
+        path: the file.
+        kinds: allowed endings, and what each of them is.
+        example: a name that would do.
+        replace: what it may replace.
+
+    Raises:
+        InputError: if it has another ending, is no regular file, or one that this program has not written, or its
+            folder is not there or closed to you.
+    """
+    path = Path(path)
+    if path.suffix not in kinds:
+        endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
+        raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
+    real = check_replaceable(path, "any" if replace == "none" else replace)
+    if real.exists() and not os.access(real, os.W_OK):
+        raise InputError(f"{path} is there and closed to writing (permission denied); allowed: a file you may replace")
+    folder = real.parent
+    if not folder.is_dir():
+        raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{path} cannot be written (permission denied); allowed: a folder you may write to")
+    return path
+
+
+def write_text(path: Path, text: str, *, replace: Replace = "own", begins: str = "") -> None:
+    """Write a text file whole or not at all.
+
+    Args:
+        path: the file.
+        text: what it holds.
+        replace: what it may replace.
+        begins: what a file of this kind begins with, see `is_own`.
+    """
+    with whole_file(path, replace=replace, begins=begins.encode()) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def new_file(path: Path, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file that a user edits and would not lose: whole, and not over one that is there.
+
+    Args:
+        path: the file.
+        text: what it holds.
+        overwrite: replace a file that is there.
+
+    Raises:
+        InputError: if the file is there or cannot be written.
+    """
+    write_text(path, text, replace="any" if overwrite else "none")
+
+
+def output_folder(path: Path, within: Path | None = None) -> Path:
+    """Create the folder for results.
+
+    Args:
+        path: the folder.
+        within: the folder of results that it is part of: a link there could lead out of it.
+
+    Raises:
+        InputError: if it is a file, cannot be created, or is a link out of the folder of results.
+    """
+    checked_path(path, "a folder for results (-o DIR)")
+    if within is not None and path.is_symlink():
+        raise InputError(f"{path} is a link; allowed: a folder of its own in {within}")
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path} cannot be a folder for results ({why}); allowed: a new folder") from error
+    return path

@@ -1,0 +1,61 @@
+"""Images decoded, once it is known how large they are."""
+
+from __future__ import annotations
+
+import warnings
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.files import read_bytes
+from spirillum.files.limits import LARGEST_PICTURE, MOST_PIXELS
+
+__all__ = ["read_image"]
+
+_WHAT = "an image (png, jpg, tif, bmp)"
+_KINDS = ("PNG", "JPEG", "MPO", "TIFF", "BMP")
+
+
+def read_image(path: Path, *, grey: bool = False) -> np.ndarray | None:
+    """A picture of 8-bit BGR or grey values; None if it cannot be decoded.
+
+    Args:
+        path: the file.
+        grey: grey values, (height, width), in place of colours, (height, width, 3).
+
+    Raises:
+        InputError: if it is no regular file, too large, or has too many pixels.
+    """
+    cv2 = required("cv2", "measuring a video", "video")
+    data = read_bytes(path, _WHAT, LARGEST_PICTURE)
+    size = _size(data)
+    if size is None:
+        return None
+    if size[0] * size[1] > MOST_PIXELS:
+        many = f"{size[0]} x {size[1]} pixels"
+        raise InputError(f"{path} has {many}; allowed: at most {MOST_PIXELS // 1_000_000} million")
+    try:
+        found: np.ndarray | None = cv2.imdecode(
+            np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
+        )
+    except cv2.error:
+        return None
+    return found
+
+
+def _size(data: bytes) -> tuple[int, int] | None:
+    """Width and height as the head of an image states them; None where it is no image."""
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large pictures: they are refused by our own limit
+            with Image.open(BytesIO(data), formats=_KINDS) as image:
+                return image.size
+    except Image.DecompressionBombError:
+        return MOST_PIXELS, 2
+    except Exception:  # a damaged file raises whatever the library meets first
+        return None
