@@ -53,7 +53,7 @@ def test_wrong_parquet_is_refused_with_row_and_column(tmp_path: Path, rows: list
 def test_what_is_no_parquet_is_refused(tmp_path: Path) -> None:
     (tmp_path / "o.parquet").write_text("wavelength_mm\n")
     for name in ("o.parquet", "missing.parquet"):
-        with pytest.raises(InputError, match="cannot be read|does not exist"):
+        with pytest.raises(InputError, match=r"cannot be read|does not exist"):
             read_observations(tmp_path / name)
 
 
