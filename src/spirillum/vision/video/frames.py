@@ -36,7 +36,8 @@ _AHEAD = 12
 """Frames that are decoded ahead of the analysis; memory does not grow with a video's length."""
 _OPENING = {
     "protocol_whitelist": "file",
-    "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc,wav,mp3",
+    "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc,"
+    "wav,mp3",
     "max_streams": "100",
 }
 """A film is one file: no playlist that opens other files, or asks a network for them."""
