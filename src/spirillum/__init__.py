@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from spirillum.swimming.prediction import predict as predict
     from spirillum.swimming.preparation import Prepared as Prepared
     from spirillum.swimming.preparation import prepare as prepare
+    from spirillum.swimming.preparation import prepare_all as prepare_all
     from spirillum.swimming.steady import swim as swim
     from spirillum.view.scene3d.film import Film as Film
     from spirillum.view.scene3d.film import film as film
@@ -83,6 +84,7 @@ _HOME = {
     "measure": "spirillum.results.measurement",
     "predict": "spirillum.swimming.prediction",
     "prepare": "spirillum.swimming.preparation",
+    "prepare_all": "spirillum.swimming.preparation",
     "rank_models": "spirillum.calibration.ranking",
     "render": "spirillum.virtual.trial",
     "resistance": "spirillum.fluid.resistance",

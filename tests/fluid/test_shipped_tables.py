@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.fluid.tube import library
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.places import Places
+from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import matrix_of
 from spirillum.fluid.tube.solids import Fineness
-from spirillum.fluid.tube.table import RESPONSES, TubeTable, response_errors
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import INSIDE
@@ -33,6 +37,23 @@ def test_presets_have_tables_that_state_their_errors(name: str) -> None:
     table, _ = shipped(name)
     assert set(table.error) == set(RESPONSES)
     assert 0 < table.error["forward_velocity"] < 0.03
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
+    table, _ = shipped(name)
+    image = find_table(table.geometry._replace(hand=-1.0), table.radius)
+    assert image is not None
+    assert image.geometry.hand == -1.0
+    own, other = table.at(0.004, 0.02, 0.01, 0.5)[0], image.at(0.004, 0.02, -0.01, np.pi - 0.5)[0]
+    np.testing.assert_allclose(other[0, 6], -own[0, 6], rtol=1e-9)  # thrust of a tail that turns the other way
+    np.testing.assert_allclose(np.diag(other), np.diag(own), rtol=1e-9)
+
+
+def test_files_are_small() -> None:
+    files = list((Path(library.__file__).parent / "tables").glob("*.table"))
+    assert len(files) >= 2
+    assert max(path.stat().st_size for path in files) < 80_000
 
 
 @pytest.mark.parametrize("name", PRESETS)

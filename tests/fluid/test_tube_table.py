@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.fluid.tube import tube
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import Places, rings_of
-from spirillum.fluid.tube.rest import even_phases, factor_of, fourier, matrix_of, mirrored, seen_in_mirror
-from spirillum.fluid.tube.table import RESPONSES, TubeTable, key_of, response_errors, response_of
+from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
+from spirillum.fluid.tube.rest import (
+    Solution,
+    even_phases,
+    factor_of,
+    fourier,
+    matrix_of,
+    mirrored,
+    seen_in_mirror,
+    solutions,
+)
+from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.robot.batch import RobotBatch
@@ -164,14 +180,14 @@ def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
 
 @pytest.mark.parametrize("radius", [R, 0.015])
 def test_yawed_places_keep_the_tail_off_the_glass(geometry: RobotGeometry, radius: float) -> None:
-    tube, wire = Places(geometry, radius), geometry.wire()
+    yawed, wire = Places(geometry, radius), geometry.wire()
     clear = [
-        tube.seat(float(t), float(f), tube.yaw).tail_clearance(wire.points, wire.radius).clearance
-        for t in tube.yaw_gaps
-        for f in tube.yaw_pitches
+        yawed.seat(float(t), float(f), yawed.yaw).tail_clearance(wire.points, wire.radius).clearance
+        for t in yawed.yaw_gaps
+        for f in yawed.yaw_pitches
     ]
     assert min(clear) > 0.7 * wire.radius
-    assert tube.yaw > np.radians(2.0)
+    assert yawed.yaw > np.radians(2.0)
 
 
 def test_a_tail_much_wider_than_its_body_has_no_table(geometry: RobotGeometry) -> None:
@@ -248,9 +264,10 @@ def test_a_table_is_written_and_read(
     table.write(tmp_path / "robot.table")
     read = TubeTable.read(tmp_path / "robot.table")
     assert (read.geometry, read.radius, read.key) == (geometry, R, table.key)
-    np.testing.assert_allclose(
-        read.at(0.0101, 0.01, 0.0, 0.4)[0], table.at(0.0101, 0.01, 0.0, 0.4)[0], rtol=2e-5, atol=1e-9
-    )
+    for offset, pitch in ((0.0101, 0.01), (0.003, -0.05), (0.0, 0.0)):
+        kept, made = read.at(offset, pitch, 0.0, 0.4)[0], table.at(offset, pitch, 0.0, 0.4)[0]
+        scale = np.sqrt(np.diag(made))
+        assert np.abs((kept - made) / np.outer(scale, scale)).max() < 1e-4
     (tmp_path / "broken.table").write_bytes((tmp_path / "robot.table").read_bytes()[:3000])
     for path in ("broken.table", "missing.table"):
         with pytest.raises(sp.InputError, match="is no table of this version"):
@@ -261,6 +278,70 @@ def test_another_robot_or_tube_has_another_key(geometry: RobotGeometry) -> None:
     keys = {key_of(geometry, R), key_of(geometry, 0.015), key_of(geometry._replace(hand=-1.0), R)}
     assert len(keys) == 3
     assert key_of(geometry._replace(wavelength=geometry.wavelength * (1 + 1e-14)), R) == key_of(geometry, R)
+
+
+def test_the_mirror_image_of_a_table_is_the_mirror_image_of_its_answers(places: Places, film: np.ndarray) -> None:
+    table = packed(places, film, smooth, lambda t, f: np.stack([smooth(t, f), 3.0 - smooth(t, f)]))
+    image = kernel.mirror_image(table)
+    for e, pitch, yaw, phase in ((0.009, 0.02, 0.05, 0.3), (0.004, -0.04, -0.1, 2.0), (0.0, 0.01, 0.0, 5.0)):
+        found = at(image, e, pitch, yaw, phase)[0]
+        own = seen_in_mirror(at(table, e, pitch, -yaw, np.pi - phase)[0])
+        scale = np.sqrt(np.diag(found))
+        np.testing.assert_allclose(found / np.outer(scale, scale), own / np.outer(scale, scale), atol=1e-9)
+    again = kernel.parts_of(kernel.mirror_image(image))
+    for found, own in zip(again, kernel.parts_of(table), strict=True):
+        np.testing.assert_array_equal(found, own)
+
+
+def test_tails_of_one_amplitude_have_all_places_in_common(geometry: RobotGeometry, places: Places) -> None:
+    other = Places(geometry._replace(wavelength=0.01, hand=-1.0), R)
+    np.testing.assert_array_equal(other.most, places.most)
+    assert other.yaw == places.yaw
+    wider = Places(geometry._replace(amplitude=0.0035), R)
+    assert np.all(wider.most[:, 0] < places.most[:, 0])
+    np.testing.assert_array_equal(wider.gaps, places.gaps)
+
+
+def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
+    geometry: RobotGeometry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPIRILLUM_CACHE", "off")
+    coarse = Fineness("standard", 0.05)
+    tails = [geometry._replace(tail_length=0.02, wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
+    seat, elsewhere = Seat(R, 0.0), Seat(R, 0.002)
+    want = [Solution(((tail, (0.4,)),), seat, coarse) for tail in tails]
+    told: list[int] = []
+    together = solutions(
+        [want[0], Solution(((tails[0], (0.1,)),), elsewhere, coarse), want[1]],
+        "places",
+        lambda _what, _done, total: told.append(total),
+        workers=1,
+    )
+    assert set(told) == {2}  # two places in all
+    for place, found in zip(want, (together[0], together[2]), strict=True):
+        tube._answer.cache_clear()
+        (alone,) = solutions([place], "alone", workers=1)
+        scale = np.sqrt(np.outer(np.diag(alone[0][0]), np.diag(alone[0][0])))
+        np.testing.assert_allclose(found[0][0] / scale, alone[0][0] / scale, atol=1e-5)
+
+
+_UNGUARDED = """
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from spirillum.fluid.tube.rest import _no_main
+print("once")
+with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+    with _no_main():
+        answer = pool.submit(abs, -1)
+    print(answer.result())
+"""
+
+
+def test_a_script_without_a_guard_is_not_run_again_by_processes(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(_UNGUARDED)
+    ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert ended.stdout.split() == ["once", "1"], ended.stderr
 
 
 def test_on_the_axis_every_tilt_is_a_pitch() -> None:

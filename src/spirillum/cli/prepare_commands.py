@@ -6,28 +6,43 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Json, RobotArgument, Settings
+from spirillum.cli.inputs import loaded_robot, overrides_from
+from spirillum.cli.options import Json, Settings, complete_robots
 
 __all__ = ["prepare"]
 
 
 def prepare(
-    robot: RobotArgument,
+    robots: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[ROBOT]...", autocompletion=complete_robots, help="Presets' names or TOML files."),
+    ] = None,
+    study: Annotated[
+        str | None,
+        typer.Option(metavar="FILE", help="All robots of a study file; biorob2012 is the paper's study."),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes.")] = 2,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Make the table of a robot in its tube: minutes, once; then `predict` and `simulate` take it.
+    """Make the tables of robots in their tubes: minutes, once; then `predict` and `simulate` take them.
 
-    An interrupted preparation goes on where it was.
+    Robots that differ in their tails share most of the work. An interrupted preparation goes on where it was.
 
     Example: `spirillum prepare biorob2012-wide`
     """
     from spirillum.cli import renderer
-    from spirillum.swimming.preparation import prepare as answer
+    from spirillum.errors import InputError
+    from spirillum.papers.biorob2012.study import paper_study
+    from spirillum.studies.spec import load_study
+    from spirillum.swimming.preparation import preparations_answer, prepare_all
 
-    loaded = loaded_robot(robot, settings)
+    if not robots and study is None:
+        raise InputError("no robot; allowed: a preset's name or a robot file, several of them, or --study FILE")
+    asked = [loaded_robot(robot, settings) for robot in robots or []]
+    if study is not None:
+        loaded = load_study(paper_study() if study == "biorob2012" else study, overrides_from(settings))
+        asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
-        found = answer(loaded, workers=workers, progress=progress)
-    renderer.show(found.to_dict(), json=json)
+        found = prepare_all(asked, workers=workers, progress=progress)
+    renderer.show(found[0].to_dict() if len(found) == 1 else preparations_answer(found), json=json)

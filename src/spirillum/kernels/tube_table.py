@@ -13,6 +13,7 @@ linear in t below the first, quadratic in yaw, and a Fourier sum in the phase: t
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,21 +23,31 @@ from spirillum.kernels.film_table import film_at
 
 __all__ = [
     "INSIDE",
+    "MIRROR",
     "MOTIONS",
     "PARAMETERS",
     "TOO_FAR_PITCHED",
     "TOO_FAR_YAWED",
     "YAW_SLACK",
+    "Parts",
+    "Range",
     "contact_offset",
     "cut_of_film",
     "film_start",
+    "mirror_image",
     "packed",
+    "parts_of",
+    "range_of",
     "resistance_at",
     "rest_coefficients",
+    "shapes_of",
+    "yaw_of",
 ]
 
 MOTIONS = 8
 """U and Omega of the body, omega_m of the rotor against it, and the mean flow."""
+MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+"""Sign of each motion in a mirror to the side."""
 PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
 """Entries of a Cholesky factor."""
 INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED = 0, 1, 2
@@ -84,6 +95,83 @@ def packed(
     header = [radius, yaw, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
     parts = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, rest, yawed, film)
     return np.concatenate([np.ravel(part) for part in parts])
+
+
+class Range(NamedTuple):
+    """Where a table holds."""
+
+    gaps: Samples
+    """Gaps of a level robot at which the next two are stated, (n,), m."""
+    up: Samples
+    """Largest pitch nose up, (n,), rad."""
+    down: Samples
+    """Largest pitch nose down, positive, (n,), rad."""
+    yaw: float
+    """Largest yaw to either side, rad."""
+
+
+def range_of(table: Samples) -> Range:
+    """Where a packed table holds."""
+    at_gaps = _HEADER + 4 * int(table[_RINGS])
+    gaps = int(table[_GAPS])
+    at_most = at_gaps + gaps + int(table[_UP] + table[_DOWN])
+    most = table[at_most : at_most + 2 * gaps].reshape(gaps, 2)
+    room = contact_offset(table[_HEADER:at_gaps].reshape(-1, 4), float(table[_RADIUS]), 0.0)
+    return Range(table[at_gaps : at_gaps + gaps] * room, most[:, 0], most[:, 1], YAW_SLACK * yaw_of(table))
+
+
+class Parts(NamedTuple):
+    """What a packed table is made of."""
+
+    nodes: Samples
+    """Head, rings and nodes."""
+    rest: Samples
+    """(gaps, up + down - 1, phases, 36)."""
+    yawed: Samples
+    """(yaw gaps, yaw pitches, 2, phases, 36)."""
+    film: Samples
+    """Packed film."""
+
+    def packed(self) -> Samples:
+        """All in one array again."""
+        return np.concatenate([self.nodes, self.rest.ravel(), self.yawed.ravel(), self.film])
+
+
+def shapes_of(table: Samples) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Shapes of `rest` and `yawed` of a packed table, or of its nodes."""
+    gaps, pitches = int(table[_GAPS]), int(table[_UP] + table[_DOWN]) - 1
+    yaw_gaps, yaw_pitches, phases = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES]), int(table[_PHASES])
+    return (gaps, pitches, phases, PARAMETERS), (yaw_gaps, yaw_pitches, 2, phases, PARAMETERS)
+
+
+def yaw_of(table: Samples) -> float:
+    """Yaw at which yawed places were computed, rad."""
+    return float(table[_YAW])
+
+
+def parts_of(table: Samples) -> Parts:
+    """The parts of a packed table."""
+    shapes, film = shapes_of(table), film_start(table)
+    yawed = film - int(np.prod(shapes[1]))
+    rest = yawed - int(np.prod(shapes[0]))
+    return Parts(table[:rest], table[rest:yawed].reshape(shapes[0]), table[yawed:film].reshape(shapes[1]), table[film:])
+
+
+def mirror_image(table: Samples) -> Samples:
+    """The packed table of the mirror image to the side.
+
+    Motions to the side and turns out of it change their signs, a yaw is one to the other side, and a tail at the phase
+    phi is one at pi - phi.
+    """
+    parts = parts_of(table)
+    row, column = np.tril_indices(MOTIONS)
+    order = np.arange(parts.rest.shape[2])
+    harmonic = (order + 1) // 2
+    phases = np.where(order % 2 == 0, -1.0, 1.0) * (-1.0) ** harmonic  # of sin, of cos
+    phases[0] = 1.0
+    signs = phases[:, None] * (MIRROR[row] * MIRROR[column])
+    yaws = np.array([-1.0, 1.0])[:, None, None]
+    return parts._replace(rest=parts.rest * signs, yawed=parts.yawed * signs * yaws).packed()
 
 
 @compiled

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,22 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import tube_radius
-from spirillum.fluid.tube.library import prepared_table
-from spirillum.fluid.tube.places import Places
-from spirillum.fluid.tube.table import RESPONSES, TubeTable
+from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
+from spirillum.fluid.tube.responses import RESPONSES
+from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import range_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import prepared
 
-__all__ = ["Prepared", "prepare"]
+__all__ = ["Prepared", "preparations_answer", "prepare", "prepare_all"]
+
+
+_NOT_KEPT = (
+    "the table is not kept, for there is no folder to keep it in (SPIRILLUM_CACHE is off, or the folder cannot be "
+    "written to): the next command makes it anew"
+)
 
 
 @dataclass(frozen=True)
@@ -31,11 +38,8 @@ class Prepared:
     """The robot."""
     table: TubeTable = field(repr=False)
     """Its table."""
-
-    @property
-    def places(self) -> Places:
-        """The places at which the flow was solved for."""
-        return Places(self.table.geometry, self.table.radius)
+    kept: bool = True
+    """Whether the table is there the next time."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -46,29 +50,46 @@ class Prepared:
             for name, allowed in RESPONSES.items()
             if self.table.error[name] > allowed
         ]
-        return (*self.robot.warnings, *worse)
+        lost = () if self.kept else (_NOT_KEPT,)
+        return (*self.robot.warnings, *worse, *lost)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum prepare --json`."""
-        places = self.places
-        content = {
+        return envelope("preparation", self.content, self.warnings)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The answer without its schema and warnings."""
+        held, geometry = range_of(self.table.packed), self.table.geometry
+        return {
             "robot": self.robot.name,
+            "wavelength": quantity(geometry.wavelength, "m"),
+            "amplitude": quantity(geometry.amplitude, "m"),
+            "channel_diameter": quantity(2.0 * self.table.radius, "m"),
             "model": "tube",
             "places": self.table.places,
             "error": {name: quantity(value, "1") for name, value in self.table.error.items()},
             "valid": {
-                "gap": quantity(places.level_gaps, "m", meaning="of a level robot, where the next two hold"),
-                "pitch_up": quantity(places.most[:, 0], "rad", meaning="largest pitch nose up"),
-                "pitch_down": quantity(places.most[:, 1], "rad", meaning="largest pitch nose down"),
-                "yaw": quantity(places.largest_yaw, "rad", meaning="largest yaw to either side"),
+                "gap": quantity(held.gaps, "m", meaning="of a level robot, where the next two hold"),
+                "pitch_up": quantity(held.up, "rad", meaning="largest pitch nose up"),
+                "pitch_down": quantity(held.down, "rad", meaning="largest pitch nose down"),
+                "yaw": quantity(held.yaw, "rad", meaning="largest yaw to either side"),
             },
             "seconds": quantity(self.table.seconds, "s"),
         }
-        return envelope("preparation", content, self.warnings)
+
+
+def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
+    """The answer of `spirillum prepare --json` for several robots: that of each, and what to be careful about."""
+    warnings = {f"{one.robot.name}: {sentence}": None for one in found for sentence in one.warnings}
+    return envelope("preparations", {"robots": [one.content for one in found]}, warnings)
+
+
+Source = str | Path | Mapping[str, Any] | Robot
 
 
 def prepare(
-    robot: str | Path | Mapping[str, Any] | Robot,
+    robot: Source,
     *,
     workers: int = 1,
     progress: Callable[[str, int, int], None] | None = None,
@@ -77,12 +98,33 @@ def prepare(
 
     With it the model `tube` answers in microseconds, for any viscosity, drive, weight, friction and roughness, and
     `simulate` moves the robot in its tube. Places that were solved for are kept as they come: an interrupted
-    preparation goes on where it was.
+    preparation goes on where it was. A robot whose mirror image has a table needs none.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
-        workers: number of processes; with more than one, a script that calls this guards what it does at its top by
-            `if __name__ == "__main__":`.
+        workers: number of processes.
+        progress: told what is being solved, how many places are done, and of how many.
+
+    Raises:
+        InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
+    """
+    return prepare_all([robot], workers=workers, progress=progress)[0]
+
+
+def prepare_all(
+    robots: Sequence[Source],
+    *,
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> tuple[Prepared, ...]:
+    """Make the tables of several robots, as `prepare` does that of one.
+
+    Robots that differ in their tails share wall and body at every place that they have in common: tails of one
+    amplitude have all of them, others about half.
+
+    Args:
+        robots: see `prepare`.
+        workers: number of processes.
         progress: told what is being solved, how many places are done, and of how many.
 
     Raises:
@@ -91,8 +133,14 @@ def prepare(
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
     # A table holds for all places: the robot is checked on the axis, where a tail wider than its body is off the glass.
-    ready, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
-    return Prepared(ready, table_for(batch, workers=workers, progress=progress))
+    ready = [prepared(robot, "tube", placement={"eccentricity": 0.0}) for robot in robots]
+    asked = [_asked(batch) for _, _, batch in ready]
+    new = {key_of(*robot) for robot in asked if find_table(*robot) is None}
+    tables = prepared_tables(asked, workers=workers, progress=progress)
+    return tuple(
+        Prepared(robot, table, kept=tables_are_kept() or table.key not in new)
+        for (robot, _, _), table in zip(ready, tables, strict=True)
+    )
 
 
 _MOST_WORKERS = 64
@@ -102,7 +150,12 @@ def table_for(
     batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
     """The table of the first robot of a batch in its tube; arguments as `prepare`."""
+    return prepared_tables([_asked(batch)], workers=workers, progress=progress)[0]
+
+
+def _asked(batch: RobotBatch) -> tuple[RobotGeometry, float]:
+    """What decides the table of the first robot of a batch."""
     radius = tube_radius(batch)
     if not np.isfinite(radius):
         raise InputError("there is no [channel]; allowed: a channel.diameter, for a table holds in its tube")
-    return prepared_table(RobotGeometry.of(batch), radius, workers=workers, progress=progress)
+    return RobotGeometry.of(batch), radius

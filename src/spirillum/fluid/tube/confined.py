@@ -23,7 +23,7 @@ from spirillum.fluid.wire.sources import Sources
 from spirillum.fluid.wire.stokeslets import Wire, WireSystem, wire_system
 from spirillum.robot.seat import Seat
 
-__all__ = ["Held", "Strengths", "held_in_tube"]
+__all__ = ["Held", "Strengths", "held_in_tube", "share_basis"]
 
 _EIGHT_PI = 8.0 * np.pi
 
@@ -173,12 +173,31 @@ class _Link:
         )
 
 
+def share_basis(solids: Solids, tails: Sequence[Wire]) -> None:
+    """Let tails have their basis in common: it is made when the first of them is solved for.
+
+    Args:
+        solids: solids and wall.
+        tails: one wire each, at any phase, in body axes.
+    """
+    solids.tails = tuple(_turned(wire) for wire in tails)
+
+
 def _reduced(solids: Solids, sources: Sources) -> Reduced:
-    """The last one is kept: phases of one tail come one after the other."""
-    found = solids.kept.get("reduced")
-    if not isinstance(found, Reduced) or not found.serves(sources):
-        found = solids.kept["reduced"] = Reduced.of(solids, sources)
-    return found
+    """The last ones are kept: phases of a tail, and tails that share a basis, come one after the other."""
+    kept = solids.kept.get("reduced")
+    known: list[Reduced] = kept if isinstance(kept, list) else []
+    served = [reduced for reduced in known if reduced.serves(sources)]
+    if served:
+        return served[0]
+    together = [sources]
+    for wire in solids.tails:
+        other = Sources.of((wire,), wire_system([(wire, 1)], solids.fineness.wire))
+        if not any(other.alike(one) for one in together):
+            together.append(other)
+    found = Reduced.of(solids, together)
+    solids.kept["reduced"] = found
+    return found[0]
 
 
 def _near_wall(wire: Wire, seat: Seat) -> Samples:

@@ -6,16 +6,18 @@ the solver asks for a new one. The folder is that of `cache`; it is safe to dele
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from spirillum.errors import InputError
+from spirillum.fluid.tube.building import built_tables
 from spirillum.fluid.tube.cache import cache_folder, digest_of
 from spirillum.fluid.tube.rest import Progress
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
-__all__ = ["find_table", "prepared_table"]
+__all__ = ["find_table", "prepared_tables", "tables_are_kept"]
 
 _SHIPPED = Path(__file__).parent / "tables"
 
@@ -39,47 +41,75 @@ def _found(path: Path | None, key: str) -> TubeTable | None:
 
 def _kept(key: str) -> Path | None:
     """File of a table in the user's cache."""
-    folder, code = cache_folder(), digest_of("spirillum.fluid.tube.table")
+    folder, code = cache_folder(), digest_of(built_tables.__module__)
     if folder is None or code is None:
         return None
     return folder / f"{key}-{code[:16]}.table"
 
 
 def find_table(geometry: RobotGeometry, radius: float) -> TubeTable | None:
-    """The table of a robot in a tube, if there is one.
+    """The table of a robot in a tube, if there is one, of itself or of its mirror image.
 
     Args:
         geometry: of the robot.
         radius: R of the tube, m.
     """
-    key = key_of(geometry, radius)
-    return _found(_SHIPPED / f"{key}.table", key) or _found(_kept(key), key)
+    own = _of_key(key_of(geometry, radius))
+    if own is not None:
+        return own
+    key = key_of(geometry._replace(hand=-geometry.hand), radius)
+    image = _of_key(key)
+    return None if image is None else _mirrored(key, image)
 
 
-def prepared_table(
-    geometry: RobotGeometry, radius: float, *, workers: int = 2, progress: Progress | None = None
-) -> TubeTable:
-    """The table of a robot in a tube, made and kept in the user's cache if there is none.
+def prepared_tables(
+    robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
+) -> list[TubeTable]:
+    """The tables of robots in their tubes; those that there are not are made, and kept in the user's cache.
 
     Args:
-        geometry: of the robot.
-        radius: R of the tube, m.
+        robots: geometry, and R of its tube, m; those with the same body and tube share their work.
         workers: number of processes.
         progress: told what is being solved, how much is done, and of how much.
 
     Raises:
         InputError: for a robot without a table.
     """
-    found = find_table(geometry, radius)
-    if found is not None:
-        return found
-    made = TubeTable.of(geometry, radius, workers=workers, progress=progress)
-    path = _kept(made.key)
+    missing = [robot for robot in dict.fromkeys(robots) if find_table(*robot) is None]
+    made = built_tables(missing, workers=workers, progress=progress) if missing else []
+    fresh = {(table.geometry, table.radius): _put(table) for table in made}
+    tables = [fresh.get(robot) or find_table(*robot) for robot in robots]
+    return [table for table in tables if table is not None]
+
+
+def tables_are_kept() -> bool:
+    """Whether tables that are made are there again the next time."""
+    return _kept("") is not None
+
+
+def _of_key(key: str) -> TubeTable | None:
+    return _found(_SHIPPED / f"{key}.table", key) or _found(_kept(key), key)
+
+
+_mirrors: dict[str, tuple[TubeTable, TubeTable]] = {}
+
+
+def _mirrored(key: str, table: TubeTable) -> TubeTable:
+    """The mirror image of a table, made once for each."""
+    known = _mirrors.get(key)
+    if known is None or known[0] is not table:
+        known = _mirrors[key] = (table, table.mirrored())
+    return known[1]
+
+
+def _put(table: TubeTable) -> TubeTable:
+    """Keep a table; as the next call will find it."""
+    path = _kept(table.key)
     if path is not None:
         try:
-            made.write(path)
+            table.write(path)
         except (InputError, OSError):  # a full or read-only disk costs time only
             pass
         else:
-            return TubeTable.read(path)  # the numbers that the next call will find
-    return made
+            return TubeTable.read(path)
+    return table

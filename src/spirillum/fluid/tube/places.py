@@ -17,13 +17,14 @@ from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import YAW_SLACK, contact_offset
+from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
-__all__ = ["Places", "rings_of"]
+__all__ = ["LARGEST_YAW", "STEEPEST", "Places", "rings_of"]
 
-_STEEPEST = (np.radians(12.0), np.radians(8.0))
+STEEPEST = (np.radians(12.0), np.radians(8.0))
 """Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
 _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
@@ -35,10 +36,13 @@ _UPPER = (0.55, 0.78, 1.0)
 """Nodes t far from the floor."""
 _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
-_UP = (0.0, 0.3, 0.6, 0.85, 1.0)
+_UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
 _DOWN = (0.0, 0.3, 0.65, 1.0)
-_YAW = float(np.radians(4.0))
+LARGEST_YAW = float(np.radians(4.0))
+"""Largest yaw of yawed places, rad."""
 _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
+_SWEPT = 121
+"""Points along the tail between which it is asked how near it comes to the glass."""
 _LEAST_PITCH = np.radians(0.2)
 _SEARCH = (31, 1e-6)
 """Steps of the search for contact, and its accuracy, rad."""
@@ -68,6 +72,23 @@ class Places:
     def rings(self) -> Samples:
         """See `rings_of`."""
         return rings_of(self.geometry.body)
+
+    @cached_property
+    def swept(self) -> Samples:
+        """Points of the wire's centreline, at angle 0 about the axis: what it sweeps does not know its wavelength."""
+        g = self.geometry
+        xi = np.linspace(0.0, g.tail_length, _SWEPT)
+        reach, _ = amplitude_envelope(xi, np.array(g.amplitude), np.array(g.tail_length), np.array(g.taper))
+        return np.stack([-0.5 * g.body_length - g.coupling_length - xi, reach, np.zeros_like(xi)], axis=1)
+
+    def tail_clearance(self, seat: Seat) -> float:
+        """Smallest distance between the wire's surface and the glass over a turn of the tail, m."""
+        return seat.tail_clearance(self.swept, 0.5 * self.geometry.wire_diameter).clearance
+
+    @property
+    def least_clearance(self) -> float:
+        """Of the tail's wire that the model resolves, m."""
+        return WIRE_FILM * 0.5 * self.geometry.wire_diameter
 
     @cached_property
     def gaps(self) -> Samples:
@@ -112,14 +133,14 @@ class Places:
     @cached_property
     def yaw(self) -> float:
         """Yaw of yawed places, rad: at most 4 degrees, and at all of them the tail is off the glass as elsewhere."""
-        wire = self.geometry.wire()
-        film = WIRE_FILM * wire.radius
 
         def spare(yaw: float) -> float:
             seats = [self.seat(float(t), float(f), yaw) for t in self.yaw_gaps for f in self.yaw_pitches]
-            return min(seat.tail_clearance(wire.points, wire.radius).clearance for seat in seats) - film
+            return min(self.tail_clearance(seat) for seat in seats) - self.least_clearance
 
-        return max(float(_LEAST_PITCH), last_clear(spare, min(_YAW, 2.0 / 3.0 * float(self.most[-1].min())), *_SEARCH))
+        return max(
+            float(_LEAST_PITCH), last_clear(spare, min(LARGEST_YAW, 2.0 / 3.0 * float(self.most[-1].min())), *_SEARCH)
+        )
 
     @cached_property
     def most(self) -> Samples:
@@ -139,11 +160,6 @@ class Places:
         return self._seat(t, pitch, yaw)
 
     @property
-    def level_gaps(self) -> Samples:
-        """Gaps of a level robot at the nodes t, m."""
-        return self.gaps * contact_offset(self.rings, self.radius, 0.0)
-
-    @property
     def largest_yaw(self) -> float:
         """Yaw up to which the table is used, rad."""
         return YAW_SLACK * self.yaw
@@ -151,28 +167,26 @@ class Places:
     @cached_property
     def thinnest(self) -> float:
         """Gap of the first node of a level robot, m: the tail, too, is as far from the glass as the model resolves."""
-        wire, body = self.geometry.wire(), 0.5 * self.geometry.body_diameter
-        tail = float(np.max(np.hypot(wire.points[:, 1], wire.points[:, 2]))) + wire.radius
-        return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * WIRE_FILM * wire.radius)
+        body = 0.5 * self.geometry.body_diameter
+        tail = float(np.max(self.swept[:, 1])) + 0.5 * self.geometry.wire_diameter
+        return max(_THINNEST_REST * body, tail - body + _TAIL_FILM * self.least_clearance)
 
     def _seat(self, t: float, pitch: float, yaw: float = 0.0) -> Seat:
         return Seat(self.radius, (1.0 - t) * contact_offset(self.rings, self.radius, pitch), pitch, yaw=yaw)
 
     def _steepest(self, t: float, sign: float) -> float:
         """Largest pitch in one sense at a node t."""
-        g = self.geometry
-        wire, outlines = g.wire(), g.outlines
-        film = WIRE_FILM * wire.radius
+        outlines, film = self.geometry.outlines, self.least_clearance
 
         def spare(size: float) -> float:
             seat = self._seat(t, sign * size)
             if seat.offset < 0:
                 return -self.radius
             floor = t / (1.0 - t) * seat.offset if t < 1 else contact_offset(self.rings, self.radius, sign * size)
-            found = seat.tail_clearance(wire.points, wire.radius).clearance - film
+            found = self.tail_clearance(seat) - film
             found = min(found, seat.clearance(outlines["body"]) - 0.5 * floor)
             if "coupling" in outlines:
                 found = min(found, seat.clearance(outlines["coupling"]) - 0.5 * min(floor, film))
             return found
 
-        return max(float(_LEAST_PITCH), last_clear(spare, _STEEPEST[0 if sign > 0 else 1], *_SEARCH))
+        return max(float(_LEAST_PITCH), last_clear(spare, STEEPEST[0 if sign > 0 else 1], *_SEARCH))

@@ -1,15 +1,18 @@
-"""What a wire sends to the solids in a tube, and what they answer, at any phase: a reduced basis.
+"""What wires send to the solids in a tube, and what they answer, at any phase: a reduced basis.
 
 Over a turn, all that a wire sends to the solids lies in the span of some hundred fields: those of its ring forces in
 unbounded fluid, mode by mode, and those that the wall reflects. The solids answer them once. A phase then needs only
 the coefficients of its fields: in unbounded fluid they follow by turning, for the wall from as many unknowns as there
 are fields (empirical interpolation: Chaturantabut and Sorensen, SIAM J. Sci. Comput. 32:2737, 2010; which unknowns, by
 pivoted QR: Drmac and Gugercin, SIAM J. Sci. Comput. 38:A631, 2016).
+
+Tails of one body may share a basis: what they send is much the same.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -52,28 +55,35 @@ class Answers:
     parities: tuple[int, ...]
     """Of those waves."""
 
+    def only(self, low: int, high: int, stations: int) -> Answers:
+        """From the ring sources at stations `low` to `high` of `stations`."""
+        free = []
+        for parity, m, coefficients in self.free:
+            kinds = coefficients.shape[1] // stations
+            free.append((parity, m, np.ascontiguousarray(coefficients[:, kinds * low : kinds * high])))
+        return replace(self, free=tuple(free))
+
 
 @dataclass(frozen=True)
 class Reduced:
     """What wires send to the solids at any phase, and what these answer."""
 
-    x: Samples
-    """Of the stations, (n,), m."""
-    rho: Samples
-    """(n,), m."""
+    sources: Sources
+    """The wires, at any phase."""
     waves: Waves
     """Between wires and solids."""
     answers: tuple[Answers, ...]
     """For each system."""
 
     @classmethod
-    def of(cls, solids: Solids, sources: Sources) -> Reduced:
-        """The basis of wires that turn about the solids' axis.
+    def of(cls, solids: Solids, tails: Sequence[Sources]) -> list[Reduced]:
+        """The basis of wires that turn about the solids' axis, for each of some tails.
 
         Args:
             solids: solids and wall.
-            sources: the wires, at any phase.
+            tails: the wires of each, at any phase.
         """
+        sources = Sources.joined(tails)
         seat, placed = solids.seat, solids.seat.placed(_swept(sources))
         away = float(np.min(seat.distances(sources.x, sources.rho)))
         along = seat.rotation[0, 0]
@@ -93,14 +103,15 @@ class Reduced:
             gather = np.linalg.pinv(wall[rows])
             fields = [np.tensordot(gather, values[number], axes=1) for values in received]
             found.append(_answers(solids, number, crossing, wall, fields))
-        return cls(sources.x, sources.rho, waves, tuple(found))
+        edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
+        return [
+            cls(tail, waves, tuple(answers.only(low, high, sources.x.size) for answers in found))
+            for tail, (low, high) in zip(tails, pairwise(edges), strict=True)
+        ]
 
     def serves(self, sources: Sources) -> bool:
         """Whether these wires are the ones of the basis, at any phase."""
-        return sources.x.shape == self.x.shape and bool(
-            np.allclose(sources.x, self.x, rtol=0.0, atol=1e-9 * self.waves.radius)
-            and np.allclose(sources.rho, self.rho, rtol=0.0, atol=1e-9 * self.waves.radius)
-        )
+        return self.sources.alike(sources)
 
     def coefficients(self, sources: Sources, placed: Samples, along: Samples) -> list[Samples]:
         """Fields from unit forces and moments at the stations, for each system, (fields, 3 n + q n).

@@ -7,10 +7,13 @@ to contact, is kept as a Cholesky factor with logarithms on the diagonal.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +21,10 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.solids import MOTIONS, Fineness
-from spirillum.fluid.tube.tube import solved
+from spirillum.fluid.tube.tube import solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels.tube_table import MIRROR, cut_of_film
 from spirillum.kernels.tube_table import MOTIONS as RATES
-from spirillum.kernels.tube_table import cut_of_film
 from spirillum.robot.seat import Seat
 from spirillum.units import show
 
@@ -67,10 +70,7 @@ def matrix_of(full: Samples) -> Samples:
 
 def _solve(place: Solution) -> list[Samples]:
     """(phases, 8, 8) of every tail at one place, viscosity 1."""
-    return [
-        np.stack([matrix_of(solved(g, place.seat, place.fineness, phase)) for phase in phases])
-        for g, phases in place.tails
-    ]
+    return [matrix_of(full) for full in solved_together(place.tails, place.seat, place.fineness)]
 
 
 def solutions(
@@ -78,7 +78,7 @@ def solutions(
 ) -> list[list[Samples]]:
     """The 8x8 at every place, of every tail, (phases, 8, 8).
 
-    What was solved before is read from the cache.
+    What was solved before is read from the cache. Places that differ in their tails only are solved for together.
 
     Args:
         places: where.
@@ -86,6 +86,24 @@ def solutions(
         progress: told what is being solved, how many places are done, and of how many.
         workers: number of processes.
     """
+    shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
+    for number, place in enumerate(places):
+        bodies = {g.without_tail for g, _ in place.tails}
+        shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
+    together = [
+        places[numbers[0]]._replace(tails=tuple(tail for number in numbers for tail in places[number].tails))
+        for numbers in shared.values()
+    ]
+    found: list[list[Samples]] = [[] for _ in places]
+    for numbers, answers in zip(shared.values(), _solutions(together, what, progress, workers), strict=True):
+        ahead = iter(answers)
+        for number in numbers:
+            found[number] = [next(ahead) for _ in places[number].tails]
+    return found
+
+
+def _solutions(places: Sequence[Solution], what: str, progress: Progress | None, workers: int) -> list[list[Samples]]:
+    """As `solutions`, place by place."""
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
@@ -96,7 +114,8 @@ def solutions(
         return found
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
     try:
-        waiting: dict[Future[list[Samples]], int] = {pool.submit(_solve, place): n for n, place in enumerate(places)}
+        with _no_main():
+            waiting = {pool.submit(_solve, place): n for n, place in enumerate(places)}
         for done, future in enumerate(as_completed(waiting), start=1):
             found[waiting[future]] = future.result()
             tell(what, done, len(places))
@@ -112,6 +131,17 @@ def solutions(
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     return found
+
+
+@contextmanager
+def _no_main() -> Iterator[None]:
+    """Processes that are started here do not run the caller's script again: what they do is in this package."""
+    own = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = own
 
 
 _LOWER = np.tril_indices(RATES)
@@ -175,13 +205,9 @@ def mirrored(g: RobotGeometry, phases: tuple[float, ...]) -> tuple[RobotGeometry
     return g._replace(hand=-g.hand), tuple((np.pi - phase) % (2.0 * np.pi) for phase in phases)
 
 
-_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
-"""Sign of each rate in a mirror to the side."""
-
-
 def seen_in_mirror(matrices: Samples) -> Samples:
     """The 8x8 of the mirror image."""
-    found: Samples = _MIRROR[:, None] * matrices * _MIRROR
+    found: Samples = MIRROR[:, None] * matrices * MIRROR
     return found
 
 

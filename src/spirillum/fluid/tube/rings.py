@@ -271,6 +271,14 @@ def _take(block: Samples, matrix: Samples, rows: np.ndarray, columns: np.ndarray
         matrix[where[0], where[1]] -= block
 
 
+def _add_product(left: Samples, right: Samples, total: Samples) -> None:
+    """Add left @ right.T to a matrix in column-major order, in place: products of few columns cost their memory."""
+    from scipy.linalg.blas import dgemm
+
+    if total.size:
+        dgemm(1.0, left.T, right.T, 1.0, total, trans_a=True, overwrite_c=True)
+
+
 class _Tier(NamedTuple):
     """Panels at about one distance from the wall: steep waves do not reach those further away."""
 
@@ -348,15 +356,16 @@ class TiltedRings(Rings):
 
     def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
         """See `Rings.subtract`."""
-        tiers, lock = self._tiers(systems), Lock()
+        tiers = self._tiers(systems)
         alike = [tier.averaged is tier.sample for tier in tiers]  # among those the wall's part is symmetric
         blocks = {
-            (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size))
+            (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size), order="F")
             for a in range(len(tiers))
             for b in range(len(tiers))
             for s in range(len(systems))
             if not (alike[a] and alike[b] and a > b)
         }
+        locks = {where: Lock() for where in blocks}
 
         def lessen(number: int) -> None:
             nearest = min(tier.distance for tier in tiers)
@@ -376,9 +385,8 @@ class TiltedRings(Rings):
                     count = min(count_a, count_b, far)
                     for s in range(len(systems)) if count else ():
                         left, right = pressed[s][..., :count, :], sources[s][..., :count, :]
-                        block = left.reshape(len(left), -1) @ right.reshape(len(right), -1).T
-                        with lock:
-                            blocks[a, b, s] += block
+                        with locks[a, b, s]:
+                            _add_product(left.reshape(len(left), -1), right.reshape(len(right), -1), blocks[a, b, s])
 
         each(lessen, range(waves.k.size))
         duals = [np.concatenate([family.dual for family in system]) for system in systems]

@@ -22,7 +22,7 @@ from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System, TiltedRi
 from spirillum.fluid.tube.wall import Waves, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
-from spirillum.fluid.wire.stokeslets import Accuracy
+from spirillum.fluid.wire.stokeslets import Accuracy, Wire
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
@@ -81,6 +81,7 @@ class Solids:
         self.seat, self.fineness = seat, fineness
         self.parts = np.array([part for _, part in solids])
         self.kept: dict[str, object] = {}  # what others derive from the factors and want to use again
+        self.tails: tuple[Wire, ...] = ()  # those that share a basis, see `confined`
         near = np.zeros((0, 3)) if lines is None else lines
         if not solids:
             return

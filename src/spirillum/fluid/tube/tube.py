@@ -14,6 +14,7 @@ makes 3 pi R/8 of it (Dagan, Weinbaum and Pfeffer, J. Fluid Mech. 115:505, 1982)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -25,7 +26,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.cache import kept_or_computed
-from spirillum.fluid.tube.confined import Held, held_in_tube
+from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids
 from spirillum.fluid.wire.robot_geometry import PIECES, RobotGeometry, number_of
@@ -37,7 +38,7 @@ from spirillum.robot.options import ModelOptions
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
-__all__ = ["END_LOSS", "Tube", "held_robot", "solved"]
+__all__ = ["END_LOSS", "Tube", "held_robot", "solved", "solved_together"]
 
 END_LOSS = 1.09
 """Length of tube over R that the losses at both open ends are worth."""
@@ -144,6 +145,26 @@ def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float
         phase: of the tail, rad.
     """
     return _answer(_Question(geometry, "robot", seat, fineness, phase))
+
+
+def solved_together(
+    tails: Sequence[tuple[RobotGeometry, tuple[float, ...]]], seat: Seat, fineness: Fineness
+) -> list[Samples]:
+    """As `solved`, (phases, 13, 13) for each of some robots that differ in their tails: wall and body are shared.
+
+    Args:
+        tails: robots, and the phases of their tails, rad.
+        seat: where they are.
+        fineness: how finely the flow is resolved.
+    """
+    keys = {_solid_key(g, "robot", seat, fineness) for g, _ in tails}
+    if len(keys) != 1:
+        raise ValueError("robots that differ in more than their tails")
+    solids = _solids(keys.pop())
+    share_basis(solids, [g.wire() for g, _ in tails])
+    found = [np.stack([solved(g, seat, fineness, phase) for phase in phases]) for g, phases in tails]
+    share_basis(solids, [])
+    return found
 
 
 def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:

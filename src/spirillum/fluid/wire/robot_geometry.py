@@ -59,6 +59,11 @@ class RobotGeometry(NamedTuple):
         return cls(**shared, **numbers)  # type: ignore[arg-type]
 
     @property
+    def without_tail(self) -> RobotGeometry:
+        """The same for all robots that differ in their tails, made of the same wire; 0 in place of the tail's sizes."""
+        return self._replace(wavelength=0.0, amplitude=0.0, tail_length=0.0, taper=0.0, hand=0.0)
+
+    @property
     def body(self) -> Outline:
         """Outline of the body."""
         return body_outline(self.shape, self.body_diameter, self.body_length, self.fillet, self.front, self.rear)

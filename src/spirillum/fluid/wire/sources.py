@@ -6,6 +6,7 @@ with the transpose, weighted with their surface elements.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,7 @@ from spirillum.fluid.wire.stokeslets import Wire, WireSystem
 __all__ = ["Sources"]
 
 _TORQUE_MODES = 3  # torques along a wire are felt through modes 0 to 2 only: the others fade too fast
+_OF_STATIONS = ("x", "rho", "theta", "frames", "torques")
 _STEP = 1e-3  # of the differences that make couples from forces, over the blob radius
 
 
@@ -50,6 +52,19 @@ class Sources:
         frames = np.moveaxis(np.array(rows), -1, 0)
         rho = np.hypot(points[:, 1], points[:, 2])
         return cls(wires, points[:, 0], rho, theta, frames, frames @ system.torques)
+
+    @classmethod
+    def joined(cls, several: Sequence[Sources]) -> Sources:
+        """All of them as one; of one accuracy."""
+        rows = [np.concatenate([getattr(one, name) for one in several]) for name in _OF_STATIONS]
+        return cls(tuple(wire for one in several for wire in one.wires), *rows)
+
+    def alike(self, other: Sources) -> bool:
+        """Whether both sweep the same circles as they turn."""
+        near = 1e-9 * float(np.max(self.rho, initial=0.0))
+        return self.x.shape == other.x.shape and all(
+            np.allclose(one, two, rtol=0.0, atol=near) for one, two in ((self.x, other.x), (self.rho, other.rho))
+        )
 
     def turn(self, m: int, size: int) -> Amplitudes:
         """Phase exp(-i m theta) of each of `size` sources in mode m, and -i more for f_theta, T_x and T_rho."""

@@ -1,0 +1,196 @@
+"""Tables are made: the flow is solved for at their places, and what is left without the film is packed.
+
+Robots that differ in their tails have places in common: wall and body are solved for once for all of them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.film import FilmTable
+from spirillum.fluid.tube.on_axis import OnAxis
+from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, Places
+from spirillum.fluid.tube.responses import RESPONSES, response_errors
+from spirillum.fluid.tube.rest import (
+    Progress,
+    Solution,
+    even_phases,
+    mirrored,
+    rest_at,
+    seen_in_mirror,
+    solutions,
+)
+from spirillum.fluid.tube.solids import Fineness
+from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.kernels import tube_table as kernel
+from spirillum.kernels.film_table import film_at
+from spirillum.robot.outline import Outline
+from spirillum.robot.seat import Seat
+
+__all__ = ["built_tables"]
+
+_TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
+"""How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
+_HELD_OUT = 6
+_SEED = 20121
+
+
+def built_tables(
+    robots: Sequence[tuple[RobotGeometry, float]], *, workers: int = 2, progress: Progress | None = None
+) -> list[TubeTable]:
+    """Solve for the flow at every place of every robot and make their tables.
+
+    Args:
+        robots: geometry, and R of its tube, m; those with the same body and tube share their work.
+        workers: number of processes.
+        progress: told what is being solved, how much is done, and of how much.
+
+    Raises:
+        InputError: for a robot without a table, such as one whose tail is wider than its body.
+    """
+    start = time.perf_counter()
+    every = [Places(geometry, radius) for geometry, radius in robots]
+    nodes = [_nodes(places) for places in every]
+    found = iter(solutions([place for some in nodes for place in some], "table of the tube", progress, workers))
+    packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
+    held = [_held_out(places) for places in every]
+    true = iter(solutions([place for some in held for place in some], "checking the table", progress, workers))
+    tables = []
+    for places, some, table, checked in zip(every, nodes, packed, held, strict=True):
+        errors = _largest_errors(table, checked, [next(true) for _ in checked])
+        seconds = (time.perf_counter() - start) / len(every)
+        tables.append(TubeTable(places.geometry, places.radius, table, errors, len(some), seconds))
+    return tables
+
+
+@lru_cache(maxsize=4)
+def _tabulated_film(body: Outline, radius: float) -> Samples:
+    """Packed film of a body in a tube, for all the places that tables have."""
+    return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(STEEPEST)).packed
+
+
+def _nodes(places: Places) -> list[Solution]:
+    """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
+    own = places.geometry, even_phases()
+    level = [Solution((own,), place.seat, fineness_at(place.seat)) for place in _level(places)]
+    yawed = [Solution((own, mirrored(*own)), place.seat, fineness_at(place.seat)) for place in _yawed(places)]
+    return level + yawed
+
+
+def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
+    """The packed table from the answers to `_nodes`."""
+    count, film = len(_level(places)), _tabulated_film(places.geometry.body, places.radius)
+    return _assembled(places, film, [place[0] for place in found[:count]], found[count:])
+
+
+class _Place(NamedTuple):
+    """A node."""
+
+    t: float
+    f: float
+    seat: Seat
+
+
+def fineness_at(seat: Seat) -> Fineness:
+    level = seat.pitch == 0 and seat.yaw == 0
+    return Fineness("standard", _LEVEL_TOLERANCE if level else _TOLERANCE)
+
+
+def _level(places: Places) -> list[_Place]:
+    """Nodes without yaw that are solved for: for each t those nose up, then, off the axis, those nose down."""
+    return [
+        _Place(float(t), float(f), places.seat(float(t), float(f)))
+        for t in places.gaps
+        for f in (*places.up, *(-places.down[1:] if t < 1.0 else ()))
+    ]
+
+
+def _yawed(places: Places) -> list[_Place]:
+    """Nodes with yaw that are solved for: those off the axis."""
+    return [
+        _Place(float(t), float(f), places.seat(float(t), float(f), places.yaw))
+        for t in places.yaw_gaps
+        if t < 1.0
+        for f in places.yaw_pitches
+    ]
+
+
+def _film_of(film: Samples, seat: Seat) -> Samples:
+    out = np.empty((6, 6))
+    film_at(film, seat.offset, seat.pitch, seat.yaw, out)
+    return out
+
+
+def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: Sequence[Sequence[Samples]]) -> Samples:
+    """The packed table from the 8x8 at its nodes, and at those with yaw of the robot and of its mirror image."""
+    rest = [rest_at(m, _film_of(film, n.seat), n.t, n.seat) for n, m in zip(_level(places), level, strict=True)]
+    most = places.most[-1]
+    on_axis = OnAxis.of(places.up * most[0], np.stack(rest[-len(places.up) :]))
+    rest += [on_axis.coefficients(float(-f * most[1])) for f in places.down[1:]]
+    shape = len(places.gaps), len(places.up) + len(places.down) - 1, *rest[0].shape
+    parts = (places.gaps, places.up, places.down, places.most, np.reshape(rest, shape))
+    none = np.zeros(0)
+    straight = kernel.packed(places.radius, places.yaw, places.rings, *parts, none, none, none, film)
+    sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
+    for f in places.yaw_pitches:
+        pitch = float(f * (most[0] if f >= 0 else most[1]))
+        sides.append((on_axis.coefficients(pitch, places.yaw), on_axis.coefficients(pitch, -places.yaw)))
+    turned = []
+    for seat, (left, right) in zip(_yawed_seats(places), sides, strict=True):
+        middle = _interpolated(straight, seat, len(left))
+        turned.append([(left - right) / (2.0 * places.yaw), (0.5 * (left + right) - middle) / places.yaw**2])
+    return kernel.packed(
+        places.radius, places.yaw, places.rings, *parts, places.yaw_gaps, places.yaw_pitches, np.array(turned), film
+    )
+
+
+def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> tuple[Samples, Samples]:
+    """Fourier coefficients of the rest's factor with the nose to the left and to the right."""
+    back = replace(place.seat, yaw=-place.seat.yaw)
+    left = rest_at(own, _film_of(film, place.seat), place.t, place.seat)
+    return left, rest_at(seen_in_mirror(image), _film_of(film, back), place.t, back)
+
+
+def _yawed_seats(places: Places) -> list[Seat]:
+    """Seats of all nodes with yaw, without it."""
+    return [places.seat(float(t), float(f)) for t in places.yaw_gaps for f in places.yaw_pitches]
+
+
+def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
+    """Fourier coefficients of the factor of the rest, as the table without yaw has them at a seat."""
+    out = np.empty((count, kernel.PARAMETERS))
+    kernel.rest_coefficients(straight, seat.offset, seat.pitch, out)
+    return out
+
+
+def _held_out(places: Places) -> list[Solution]:
+    """Random places of a table that are no nodes, each with a random phase of the tail."""
+    draw = np.random.default_rng(_SEED)
+    chosen: list[Solution] = []
+    while len(chosen) < _HELD_OUT:
+        t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
+        f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * places.yaw
+        seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
+        clear = places.tail_clearance(seat) > places.least_clearance
+        if clear and seat.clearance(places.geometry.body) > 0.4 * places.thinnest:
+            chosen.append(Solution(((places.geometry, (phase,)),), seat, fineness_at(seat)))
+    return chosen
+
+
+def _largest_errors(table: Samples, places: Sequence[Solution], found: Sequence[Sequence[Samples]]) -> dict[str, float]:
+    """Largest relative error of `RESPONSES` at places whose answers are known."""
+    errors = []
+    for place, answers in zip(places, found, strict=True):
+        (_, phases), seat = place.tails[0], place.seat
+        out = np.empty((kernel.MOTIONS, kernel.MOTIONS))
+        kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phases[0], out)
+        errors.append(response_errors(out, answers[0][0]))
+    return dict(zip(RESPONSES, np.max(errors, axis=0).tolist(), strict=True))

@@ -1,0 +1,52 @@
+"""What a table is judged by: how a robot answers to its turning tail."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spirillum.arrays import Samples
+
+__all__ = ["RESPONSES", "response_errors", "response_of"]
+
+RESPONSES = {
+    "forward_velocity": 0.01,
+    "body_rotation_rate": 0.01,
+    "sideways_force": 0.02,
+    "pitching_torque": 0.03,
+    "yawing_torque": 0.03,
+    "normal_resistance": 0.05,
+}
+"""What a table is judged by, and the largest relative error that it should have."""
+
+
+def response_of(matrix: Samples) -> Samples:
+    """What a place does to a robot whose tail turns at 1 rad/s, held sideways and in tilt, closed ends, viscosity 1.
+
+    Args:
+        matrix: the 8x8.
+
+    Returns:
+        Forward velocity, body rate, forces y and z, torques y and z of the fluid, and the normal resistance, (7,).
+    """
+    free = [0, 3]
+    tail = matrix[:, 6]  # the rotor's lab rate is Omega + omega_m = 1
+    a = matrix[np.ix_(free, free)] - np.outer(tail[free], [0.0, 1.0])
+    speed, roll = np.linalg.solve(a, -tail[free])
+    rates = np.zeros(len(matrix))
+    rates[[0, 3, 6]] = speed, roll, 1.0 - roll
+    force = -matrix @ rates
+    return np.array([speed, roll, force[1], force[2], force[4], force[5], matrix[2, 2]])
+
+
+def response_errors(matrix: Samples, true: Samples) -> Samples:
+    """Relative errors of `RESPONSES`, sideways force and torques over the size of what acts on the robot in all.
+
+    Args:
+        matrix: the 8x8 judged.
+        true: what it should be.
+    """
+    a, b = response_of(matrix), response_of(true)
+    force, torque = np.hypot(b[2], b[3]), np.hypot(b[4], b[5])
+    scale = np.array([abs(b[0]), abs(b[1]), force, torque, torque, b[6]])
+    found: Samples = np.abs(a - b)[[0, 1, 2, 4, 5, 6]] / scale
+    return found

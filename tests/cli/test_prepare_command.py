@@ -1,0 +1,46 @@
+"""`spirillum prepare` with tables that are there: one robot, several, none."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import spirillum as sp
+from spirillum.swimming.preparation import Prepared
+
+
+def test_one_robot_and_several(run) -> None:  # type: ignore[no-untyped-def]
+    one = json.loads(run("prepare", "biorob2012-wide", "--json").out)
+    assert one["schema"] == "spirillum.preparation/1"
+    several = json.loads(run("prepare", "biorob2012-wide", "biorob2012-narrow", "--json").out)
+    assert several["schema"] == "spirillum.preparations/1"
+    assert several["robots"][0] == {name: one[name] for name in several["robots"][0]}
+    assert [robot["channel_diameter"]["value"] for robot in several["robots"]] == [0.04, 0.03]
+    printed = run("prepare", "biorob2012-wide", "biorob2012-narrow").out
+    assert "25 x 2.5" in printed
+    assert "biorob2012-narrow" in printed
+
+
+def test_a_left_handed_tail_takes_the_table_of_its_mirror_image(run) -> None:  # type: ignore[no-untyped-def]
+    answer = json.loads(run("prepare", "biorob2012-wide", "--set", "tail.handedness=left", "--json").out)
+    assert answer["places"] == json.loads(run("prepare", "biorob2012-wide", "--json").out)["places"]
+
+
+def test_no_robot_is_one_sentence(run) -> None:  # type: ignore[no-untyped-def]
+    outcome = run("prepare")
+    assert outcome.code == 2
+    assert "no robot; allowed: a preset's name" in outcome.err
+
+
+def test_a_table_that_is_not_kept_says_so() -> None:
+    found = sp.prepare("biorob2012-wide")
+    assert not [sentence for sentence in found.warnings if "SPIRILLUM_CACHE" in sentence]
+    lost = Prepared(found.robot, found.table, kept=False)
+    assert "SPIRILLUM_CACHE is off" in lost.warnings[-1]
+
+
+@pytest.mark.parametrize("workers", [0, 65, True])
+def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
+    with pytest.raises(sp.InputError, match="workers = "):
+        sp.prepare_all(["biorob2012-wide"], workers=workers)
