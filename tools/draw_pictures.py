@@ -8,6 +8,7 @@ import av
 
 import spirillum as sp
 from spirillum.papers.biorob2012.frenet_figure import frenet_figure
+from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.robot import robot_figure
@@ -27,7 +28,16 @@ def _frame(film: Path, number: int) -> Any:
 if __name__ == "__main__":
     flow = sp.flow("biorob2012-wide", tail_rate="1.2 Hz")
     tilted = sp.load("magnetic-helix", **{"magnetic.moment_angle": "75 deg"})
+    best = sp.design(
+        "biorob2012-wide",
+        {"tail.wavelength": "10 mm:40 mm", "tail.amplitude": "1 mm:5 mm"},
+        maximise="forward_velocity",
+        subject_to=["tail_rotation_rate >= 0.8 Hz"],
+        unknown={"friction.effective": "5e-6 N m s/rad:2e-5 N m s/rad"},
+        model="sbt",
+    )
     pictures = {
+        "design": (design_figure(best), 110),
         "overview": (robot_figure(sp.load("biorob2012-wide")), 150),
         "flow": (flow_figure(flow, flow.plane("xz")), 90),
         "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 110),

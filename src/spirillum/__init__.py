@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from spirillum.calibration.suggest import Suggestion as Suggestion
     from spirillum.calibration.suggest import suggest as suggest
     from spirillum.citations import citation as citation
+    from spirillum.designs.answer import Design as Design
+    from spirillum.designs.design import design as design
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
     from spirillum.dynamics.settling import Settling as Settling
     from spirillum.dynamics.settling import settle as settle
@@ -55,6 +57,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Calibrated": "spirillum.calibration.calibrated",
+    "Design": "spirillum.designs.answer",
     "Export": "spirillum.exports.write",
     "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.view.scene3d.film",
@@ -75,6 +78,7 @@ _HOME = {
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
+    "design": "spirillum.designs.design",
     "export": "spirillum.exports.write",
     "feasibility": "spirillum.measurement.feasibility",
     "film": "spirillum.view.scene3d.film",

@@ -96,6 +96,22 @@ REFERENCES: dict[str, str] = {
         "J. J. L. Higdon. The hydrodynamics of flagellar propulsion: helical waves. "
         "Journal of Fluid Mechanics 94:331-351, 1979."
     ),
+    "clopper1934": (
+        "C. J. Clopper and E. S. Pearson. The use of confidence or fiducial limits illustrated in the case of the "
+        "binomial. Biometrika 26:404-413, 1934."
+    ),
+    "haimes1971": (
+        "Y. Y. Haimes, L. S. Lasdon and D. A. Wismer. On a bicriterion formulation of the problems of integrated "
+        "system identification and system optimization. IEEE Transactions on Systems, Man, and Cybernetics 1:296-297, 1971."
+    ),
+    "iec60851": "IEC 60851-3. Winding wires, test methods, part 3: mechanical properties (mandrel winding test).",
+    "nelder1965": (
+        "J. A. Nelder and R. Mead. A simplex method for function minimization. The Computer Journal 7:308-313, 1965."
+    ),
+    "storn1997": (
+        "R. Storn and K. Price. Differential evolution, a simple and efficient heuristic for global optimization over "
+        "continuous spaces. Journal of Global Optimization 11:341-359, 1997."
+    ),
 }
 """Key to full reference."""
 

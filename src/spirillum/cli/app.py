@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
+from spirillum.cli.design_commands import design
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
 from spirillum.cli.inputs import angle, loaded_robot, overrides_from, placement_from
@@ -332,6 +333,7 @@ for _command in (
     calibrate,
     rank_models,
     suggest,
+    design,
     schema,
     citation,
 ):

@@ -10,7 +10,7 @@ from spirillum.units import KINDS, parse_option
 if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
 
-__all__ = ["angle", "gap_range", "loaded_robot", "overrides_from", "placement_from", "time_window"]
+__all__ = ["angle", "gap_range", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
@@ -51,6 +51,23 @@ def placement_from(
         "flow": flow,
     }
     return {name: value for name, value in fields.items() if value is not None}
+
+
+def pairs_of(items: list[str], option: str) -> dict[str, str]:
+    """FIELD=VALUE texts by field.
+
+    Raises:
+        InputError: if one is none, or names a field twice.
+    """
+    found: dict[str, str] = {}
+    for text in items:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise InputError(f"{option} {text[:60]!r} is not FIELD=LOW:HIGH, for example tail.wavelength=5mm:40mm")
+        if name in found:
+            raise InputError(f"{option} names {name[:60]} twice; allowed: each field once")
+        found[name] = value
+    return found
 
 
 def angle(text: str) -> float:

@@ -179,6 +179,16 @@ class RobotBatch:
             placement=placement or Placement(),
         )
 
+    @staticmethod
+    def numbers() -> tuple[str, ...]:
+        """Dotted fields of the robot file that are columns of a batch."""
+        return tuple(source.path for source in _columns("RobotBatch").values())
+
+    def taken(self, rows: Sequence[int] | np.ndarray) -> RobotBatch:
+        """Robots by their numbers, in that order, each as often as it is named."""
+        chosen = np.asarray(rows, dtype=np.intp)
+        return _cut(self, chosen) if self.size > 1 else self
+
     def placed(self, placement: Placement) -> RobotBatch:
         """Return the same robots placed otherwise."""
         return replace(self, placement=placement)
@@ -253,8 +263,8 @@ class RobotBatch:
 _S = TypeVar("_S", RobotBatch, Electrics, CalibrationFactors)
 
 
-def _cut(struct: _S, cut: slice) -> _S:
-    """Cut every column of a struct of arrays."""
+def _cut(struct: _S, cut: slice | np.ndarray) -> _S:
+    """Cut every column of a struct of arrays, by a slice or by rows."""
 
     def part(value: Any) -> Any:
         if isinstance(value, np.ndarray):

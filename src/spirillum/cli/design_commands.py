@@ -1,0 +1,111 @@
+"""The command `spirillum design`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot, pairs_of
+from spirillum.cli.options import Json, Model, Posterior, RobotArgument, Settings, TailRate
+
+__all__ = ["design"]
+
+_Pairs = Annotated[
+    list[str],
+    typer.Option(
+        metavar="FIELD=LOW:HIGH",
+        help="A field to choose, with its range, such as tail.wavelength=5mm:40mm or tail.turns=2:6; repeatable.",
+    ),
+]
+
+
+def design(
+    robot: RobotArgument,
+    vary: _Pairs,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Robot file of the best design (.toml).")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Draw objective, sensitivity and front: .png, .pdf or .svg.")
+    ] = None,
+    maximise: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="QUANTITY",
+            help="Quantity to make large, such as forward_velocity, or a condition to make likely; two: a front.",
+        ),
+    ] = None,
+    minimise: Annotated[list[str] | None, typer.Option(metavar="QUANTITY", help="Quantity to make small.")] = None,
+    subject_to: Annotated[
+        list[str] | None,
+        typer.Option(metavar="CONDITION", help="Condition, such as 'motor_current <= 0.4 A'; repeatable."),
+    ] = None,
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
+    ] = None,
+    posterior: Posterior = None,
+    model: Model = "sbt",
+    tail_rate: TailRate = None,
+    statistic: Annotated[
+        str, typer.Option(metavar="mean|quantile", help="Of the objective over what is not known.")
+    ] = "mean",
+    level: Annotated[float, typer.Option(help="Of the quantile: share of the draws that are worse.")] = 0.1,
+    confidence: Annotated[float, typer.Option(help="Share of the draws in which a condition has to hold.")] = 0.95,
+    draws: Annotated[int, typer.Option(help="Draws of what is not known under which designs are compared.")] = 256,
+    seed: Annotated[int, typer.Option(help="Seed of draws and search.")] = 1,
+    mandrel: Annotated[
+        float, typer.Option(help="Least diameter around which the wire is bent, in wire diameters.")
+    ] = 1.0,
+    clearance: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Least distance of tail and glass; else a wire diameter.")
+    ] = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Find the tail to build: the best values of some fields, under conditions and what is not known.
+
+    Example: `spirillum design biorob2012-wide --vary tail.wavelength=5mm:40mm --maximise forward_velocity`
+    """
+    from spirillum.cli import renderer
+    from spirillum.designs.design import design as answer
+    from spirillum.files import PICTURES, output_target, write_text
+    from spirillum.robot.text import robot_text
+
+    target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
+    picture = None if plot is None else output_target(plot, PICTURES, "design.png")
+    loaded = loaded_robot(robot, settings)
+    judged = {
+        "statistic": statistic,
+        "level": level,
+        "confidence": confidence,
+        "draws": draws,
+        "seed": seed,
+    }
+    with renderer.progress_bar(quiet=json) as progress:
+        found = answer(
+            loaded,
+            pairs_of(vary, "--vary"),
+            maximise=maximise or (),
+            minimise=minimise or (),
+            subject_to=subject_to or (),
+            unknown=pairs_of(unknown or [], "--unknown"),
+            posterior=posterior,
+            judged=judged,
+            bench={"mandrel": mandrel, "clearance": clearance},
+            model=model,
+            tail_rate=tail_rate,
+            progress=progress,
+        )
+    if picture is not None:
+        from spirillum.view.figures.design import design_figure
+        from spirillum.view.figures.style import save_as
+
+        save_as(design_figure(found), picture)
+    if target is not None:
+        words = f"Best design of {loaded.name}: {found.objectives[0].words}, model {found.model}."
+        write_text(target, robot_text(found.robot, words))
+    files = {"file": None if output is None else str(output), "picture": None if plot is None else str(plot)}
+    renderer.show(renderer.with_files(found.to_dict(), **files), json=json)

@@ -1,0 +1,368 @@
+"""Which values of some fields of a robot are best: for its motor, its tube, and what is not known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Flags, Samples
+from spirillum.designs.answer import LEVEL, Alternative, Design, Profile, Uncertainty
+from spirillum.designs.bench import Bench
+from spirillum.designs.evaluation import Evaluation, Objective
+from spirillum.designs.options import Judged
+from spirillum.designs.reading import condition_of, quantity_of
+from spirillum.designs.search import Archive, best_design, pareto_front
+from spirillum.designs.space import Space, space_of
+from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
+from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.limits import all_hold, broken
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.robot.text import with_numbers
+from spirillum.swimming.answer import STEADY
+from spirillum.units import KINDS, display_unit, in_unit, parse_option
+
+__all__ = ["design"]
+
+_MORE_DRAWS = 4
+"""Draws of what is stated over those of the search."""
+_PROFILE_POINTS = 41
+_NEAR = 0.1
+"""The runner-up differs from the best design by at least this share of a range."""
+_FLAT = 0.01
+"""Loss of the objective up to which a variable is free, relative."""
+_FRONT_POINTS = 13
+_TOUCHES = 1e-3
+"""Share of a range, or relative excess of a condition, within which the best design lies at it."""
+_STATED_SEED = 7919
+"""Added to the seed for the draws of what is stated."""
+
+Tell = Callable[[str, int, int], None]
+
+
+def design(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    vary: Mapping[str, str | Sequence[object]],
+    *,
+    maximise: str | Sequence[str] = (),
+    minimise: str | Sequence[str] = (),
+    subject_to: Sequence[str] = (),
+    unknown: Mapping[str, str | Sequence[object]] | None = None,
+    posterior: str | Path | None = None,
+    judged: Judged | Mapping[str, Any] | None = None,
+    bench: Bench | Mapping[str, Any] | None = None,
+    model: str = "sbt",
+    tail_rate: str | float | None = None,
+    progress: Tell | None = None,
+) -> Design:
+    """Find the best values of some numeric fields of a robot.
+
+    What a bench can wind, what fits into the tube and what the model describes is always a condition. Under unknowns
+    every design is swum under the same draws. The best one is then stated from new draws: it owes part of its lead to
+    those by which it was chosen.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        vary: dotted field to its range, as ``{"tail.wavelength": "5 mm:40 mm"}``, or two values; `tail.turns` are whole
+            turns, which set the tail's length.
+        maximise: a quantity to make large, as `forward_velocity`; or a condition, as ``"forward_velocity >= 1 mm/s"``,
+            of which the probability is made large. Two objectives, from here or `minimise`, give a Pareto front.
+        minimise: a quantity to make small.
+        subject_to: conditions, as ``"motor_current <= 0.4 A"``.
+        unknown: dotted field to the range over which it is uniform.
+        posterior: file of a calibration's posterior, whose draws are what is not known.
+        judged: `statistic`, `level`, `confidence`, `draws`, `seed`.
+        bench: `mandrel`, `clearance`.
+        model: `sbt`, `rft` or `slender`.
+        tail_rate: lab rotation rate of the tail; None: the robot's own drive.
+        progress: told what is being done, how much of it, and of how much.
+
+    Raises:
+        InputError: for wrong input, or where no design can be wound and keeps all conditions.
+    """
+    given = load(robot)
+    options, chosen = Judged.of(judged), find_swimmer_model(model)
+    if chosen.placed:
+        raise InputError(f"model = '{model}' solves for one tail at a time; allowed: sbt, rft or slender")
+    unknowns = unknowns_of(given, unknown, posterior, model)
+    if not chosen.closed_form and not unknowns.known:
+        raise InputError(
+            f"model = '{model}' with unknowns would solve for every design and draw; allowed: sbt or rft, or nothing "
+            "unknown"
+        )
+    space = space_of(unknowns.robot, vary)
+    twice = {item.path for item in unknowns.ranges} & {item.path for item in space.variables}
+    if twice:
+        raise InputError(f"{twice.pop()} is varied and unknown; allowed: one of them")
+    rate = None if tail_rate is None else parse_option("tail_rate", tail_rate, KINDS["rate"])
+    if rate is None and given.drive is None:
+        raise InputError(f"{given.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
+    objectives = _objectives(maximise, minimise, options)
+    conditions = tuple(condition_of(text) for text in ([subject_to] if isinstance(subject_to, str) else subject_to))
+    wound = Bench.of(bench)
+
+    def under(drawn: Drawn) -> Evaluation:
+        return Evaluation(space, chosen, objectives, conditions, wound, drawn, options.confidence, rate)
+
+    searched = under(unknowns.draws(options.draws, options.seed))
+    archive, tell = Archive(), progress or (lambda _what, _done, _total: None)
+    best = best_design(searched, archive, seed=options.seed, tell=tell)
+    if not best.possible:
+        raise InputError(_none_is_possible(searched, best.shares, archive))
+    front = None
+    if len(objectives) > 1:
+        front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, tell=tell)
+    stated = under(unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED))
+    return _answer(given, unknowns, searched, stated, best.shares, archive, front)
+
+
+def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], options: Judged) -> tuple[Objective, ...]:
+    """One objective or two."""
+    found = []
+    for sign, option, names in ((1.0, "maximise", maximise), (-1.0, "minimise", minimise)):
+        for name in [names] if isinstance(names, str) else names:
+            if "=" in name:
+                if sign < 0:
+                    raise InputError(
+                        f"minimise = {name[:60]!r} is a condition; allowed: maximise, or the other condition"
+                    )
+                target = condition_of(name, option)
+                found.append(Objective(target.quantity, 1.0, "probability", target=target))
+            else:
+                found.append(Objective(quantity_of(name, option), sign, options.statistic, options.level))
+    if not 1 <= len(found) <= 2:
+        raise InputError(f"{len(found)} objectives; allowed: one or two, by maximise and minimise")
+    return tuple(found)
+
+
+def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -> str:
+    """Why no design will do, for the one that comes nearest."""
+    values = _named(searched.space, shares)
+    outside = broken(searched.limits(shares[None]))
+    if outside:
+        why = outside[0].sentence()
+    else:
+        swum = searched.swum(shares[None])
+        worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
+        kept = [words for words, excess in worst.items() if excess > 0]
+        why = f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion"
+    words = ", ".join(f"{path} = {_shown(value, _unit(searched.space, path))}" for path, value in values.items())
+    return (
+        f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or swum, "
+        f"{archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
+        "conditions"
+    )
+
+
+def _named(space: Space, shares: Samples) -> dict[str, float]:
+    values = space.values(shares[None])[0]
+    return {variable.path: float(value) for variable, value in zip(space.variables, values, strict=True)}
+
+
+def _unit(space: Space, path: str) -> str:
+    return next(variable.unit for variable in space.variables if variable.path == path)
+
+
+def _shown(value: float, unit: str) -> str:
+    shown = display_unit(value, unit)
+    return in_unit(value, unit, shown) + ("" if shown == "1" else f" {shown}")
+
+
+def _answer(
+    given: Robot,
+    unknowns: Unknowns,
+    searched: Evaluation,
+    stated: Evaluation,
+    best: Samples,
+    archive: Archive,
+    front: Samples | None,
+) -> Design:
+    space, objective = searched.space, searched.objectives[0]
+    swum = stated.swum(best[None])
+    own = stated.quantity(swum, objective.quantity.name)
+    quantities, low, high = {}, {}, {}
+    ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL]
+    for item in STEADY:
+        column = stated.quantity(swum, item.name)[0]
+        quantities[item.name] = float(np.mean(column))
+        if not unknowns.known and np.all(np.isfinite(column)):
+            low[item.name], high[item.name] = (float(end) for end in np.quantile(column, ends))
+    uncertainty = None
+    if not unknowns.known:
+        uncertainty = Uncertainty(
+            stated.drawn.number, low, high, _met(objective, own[0]), _deciding(stated.drawn.values, own[0])
+        )
+    alternatives = [_alternative("today", None, stated, own[0], unknowns)]
+    second = _runner_up(searched, archive, best)
+    if second is not None:
+        alternatives.append(_alternative("runner_up", second, stated, own[0], unknowns))
+    value = float(objective.of(own)[0])
+    profiles = tuple(_profile(searched, best, number) for number in range(space.size))
+    bound_by = _bound_by(stated, best, profiles)
+    return Design(
+        robot=_built(given, space, best),
+        today=given,
+        model=searched.model.name,
+        objectives=searched.objectives,
+        conditions=tuple(item.words for item in searched.conditions),
+        values=_named(space, best),
+        units={variable.path: variable.unit for variable in space.variables},
+        objective=value,
+        quantities=quantities,
+        uncertainty=uncertainty,
+        alternatives=tuple(alternatives),
+        profiles=profiles,
+        front=None if front is None else _columns_of(searched, front),
+        searched=searched,
+        bound_by=bound_by,
+        swum=archive.count,
+        refused=archive.refused,
+        breaking=archive.breaking,
+        warnings=_warnings(given, stated, best, bound_by),
+    )
+
+
+def _met(objective: Objective, values: Samples) -> tuple[float, float, float] | None:
+    """Probability that the target is met, with its interval (Clopper and Pearson 1934)."""
+    if objective.target is None:
+        return None
+    return _share(objective.target.excess(values) <= 0)
+
+
+def _share(flags: Flags) -> tuple[float, float, float]:
+    from scipy.stats import binomtest
+
+    found = binomtest(int(np.count_nonzero(flags)), flags.size).proportion_ci(LEVEL, method="exact")
+    return float(np.mean(flags)), float(found.low), float(found.high)
+
+
+def _deciding(unknowns: Mapping[str, Samples], values: Samples) -> dict[str, float]:
+    """Squared rank correlation (Spearman 1904) of every unknown with the objective's quantity."""
+    from scipy.stats import rankdata
+
+    def centred(column: Samples) -> Samples:
+        ranks = rankdata(column)
+        return np.asarray(ranks - ranks.mean())
+
+    found = {}
+    own = centred(values)
+    for name, column in unknowns.items():
+        one = centred(column)
+        size = float(np.sqrt(np.sum(one**2) * np.sum(own**2)))
+        found[name] = float(np.sum(one * own) / size) ** 2 if size > 0 else 0.0
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _runner_up(searched: Evaluation, archive: Archive, best: Samples) -> Samples | None:
+    """The best design that differs by a tenth of a range; None if there is none."""
+    shares, values = archive.all()
+    objective = searched.objectives[0]
+    worth = values[0] * (1.0 if objective.target is not None else objective.sign)
+    apart = np.max(np.abs(searched.space.settled(shares) - searched.space.settled(best[None])), axis=1) >= _NEAR
+    worth = np.where(apart & np.isfinite(worth), worth, -np.inf)
+    first = int(np.argmax(worth))
+    return shares[first] if np.isfinite(worth[first]) else None
+
+
+def _alternative(
+    name: str, shares: Samples | None, stated: Evaluation, best: Samples, unknowns: Unknowns
+) -> Alternative:
+    """Compare a design, or the robot as it is, with the best one draw by draw."""
+    objective, space = stated.objectives[0], stated.space
+    swum = stated.swum(None if shares is None else shares[None])
+    values = stated.quantity(swum, objective.quantity.name)[0]
+    if objective.target is None:
+        better = objective.sign * (best - values) > 0
+    else:
+        better = (objective.target.excess(best) <= 0) & ~(objective.target.excess(values) <= 0)
+    share = _share(better) if not unknowns.known else (float(np.mean(better)),) * 3
+    buildable = all_hold(stated.limits(None if shares is None else shares[None]))
+    return Alternative(
+        name,
+        _named(space, shares) if shares is not None else space.today,
+        float(objective.of(values[None])[0]),
+        *share,
+        keeps=bool(np.all(buildable)) and float(stated.broken(swum)[0]) <= 0,
+    )
+
+
+def _profile(searched: Evaluation, best: Samples, number: int) -> Profile:
+    """The objective along one variable through the best design."""
+    space, objective = searched.space, searched.objectives[0]
+    variable = space.variables[number]
+    if variable.whole:
+        along = np.array([variable.share(value) for value in np.arange(variable.low, variable.high + 1.0)])
+    else:
+        along = np.union1d(np.linspace(0.0, 1.0, _PROFILE_POINTS), best[number])
+    values = variable.at(along)
+    shares = np.tile(best, (len(along), 1))
+    shares[:, number] = along
+    found = searched.scores(shares).values[0]
+    own = int(np.argmin(np.abs(values - variable.at(best[None, number])[0])))
+    sign = 1.0 if objective.target is not None else objective.sign
+    near = np.where(np.isfinite(found), sign * (found[own] - found), np.inf) <= _FLAT * abs(found[own])
+    first, last = own, own
+    while first > 0 and near[first - 1]:
+        first -= 1
+    while last < len(near) - 1 and near[last + 1]:
+        last += 1
+    return Profile(
+        variable.path,
+        variable.unit,
+        values,
+        found,
+        float(values[first]),
+        float(values[last]),
+        _binds(searched, shares, found, own),
+    )
+
+
+def _binds(searched: Evaluation, shares: Samples, found: Samples, own: int) -> str:
+    """What refuses the designs next to the best one along a variable; empty where none is refused."""
+    words = []
+    for side in (own - 1, own + 1):
+        if 0 <= side < len(found) and not np.isfinite(found[side]):
+            outside = broken(searched.limits(shares[side][None]))
+            if outside:
+                words.append(outside[0].why)
+                continue
+            swum = searched.swum(shares[side][None])
+            words += [item.words for item in searched.conditions if searched.excess(item, swum)[0] > 0]
+    return "; ".join(dict.fromkeys(words))
+
+
+def _bound_by(stated: Evaluation, best: Samples, profiles: Sequence[Profile]) -> tuple[str, ...]:
+    """What the best design touches: ends of ranges, and what refuses its neighbours."""
+    found = []
+    for variable, share in zip(stated.space.variables, best, strict=True):
+        value = float(variable.at(np.array([share]))[0])
+        for end, where in ((variable.low, "low"), (variable.high, "high")):
+            if abs(value - end) <= _TOUCHES * (variable.high - variable.low):
+                found.append(f"{variable.path} at the {where} end of its range")
+    return (*found, *dict.fromkeys(item.binds for item in profiles if item.binds))
+
+
+def _columns_of(searched: Evaluation, shares: Samples) -> dict[str, Samples]:
+    """Fields and both objectives of designs."""
+    values = searched.scores(shares).values
+    found = dict(zip((item.path for item in searched.space.variables), searched.space.values(shares).T, strict=True))
+    return found | {item.name: values[n] for n, item in enumerate(searched.objectives)}
+
+
+def _built(given: Robot, space: Space, best: Samples) -> Robot:
+    """The robot with the best values of its fields."""
+    found = with_numbers(given, {path: float(column[0]) for path, column in space.columns(best[None]).items()})
+    return found.model_copy(update={"name": f"{given.name}-design"})
+
+
+def _warnings(given: Robot, stated: Evaluation, best: Samples, bound_by: Sequence[str]) -> tuple[str, ...]:
+    found = list(given.warnings)
+    batch = stated.space.batch(best[None])
+    found += [limit.sentence() for limit in broken(stated.model.cautions(batch))]
+    if bound_by and any("end of its range" in words for words in bound_by):
+        found.append("the best design lies at the end of a range: a wider one may hold a better design")
+    return tuple(dict.fromkeys(found))

@@ -1,0 +1,186 @@
+"""Designs swum under all draws at once: objectives, conditions, and what refuses a design."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Flags, PerRobot, Samples
+from spirillum.designs.bench import Bench
+from spirillum.designs.reading import Condition
+from spirillum.designs.space import Space
+from spirillum.designs.unknowns import Drawn
+from spirillum.fluid.model import SwimmerModel
+from spirillum.quantities import Quantity
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.steady import requirements, swim
+
+__all__ = ["BROKEN", "REFUSED", "Evaluation", "Objective", "Scores"]
+
+REFUSED = 1e6
+"""Score of a design that cannot be built, to which what it breaks is added: worse than any condition that is broken."""
+BROKEN = 1e3
+"""Score of a design that breaks a condition, to which the excess is added: worse than any that keeps all."""
+_MOST = 1e2
+_TIE = 1e-6
+"""Weight of the mean excess beside a probability, which does not change between neighbouring designs."""
+
+Statistic = Literal["mean", "quantile", "probability"]
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What is best: a quantity, largest or least, by a statistic of its draws."""
+
+    quantity: Quantity
+    sign: float
+    """+1 where more is better, -1 where less is."""
+    statistic: Statistic = "mean"
+    level: float = 0.1
+    """Of the statistic `quantile`: the share of the draws that are worse."""
+    target: Condition | None = None
+    """Of the statistic `probability`: what is to be kept."""
+
+    def of(self, values: Samples) -> Samples:
+        """The statistic, (designs,), of a quantity's values, (designs, draws); NaN where a draw has none."""
+        if self.target is not None:
+            values = np.where(np.isnan(values), np.nan, self.target.excess(values) <= 0)
+        elif self.statistic == "quantile":
+            return np.asarray(np.quantile(values, self.level if self.sign > 0 else 1.0 - self.level, axis=-1))
+        mean: Samples = np.mean(values, axis=-1)
+        return mean
+
+    def cost(self, values: Samples) -> Samples:
+        """What is minimised, (designs,)."""
+        found = self.of(values)
+        if self.target is None:
+            return -self.sign * found
+        excess = np.clip(self.target.excess(values), -1.0, 1.0)
+        cost: Samples = -found + _TIE * np.mean(excess, axis=-1)
+        return cost
+
+    @property
+    def name(self) -> str:
+        """Name of its values in tables: the quantity's, or `probability`."""
+        return self.quantity.name if self.target is None else "probability"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its values."""
+        return self.quantity.unit if self.target is None else "1"
+
+    @property
+    def words(self) -> str:
+        """The objective in words."""
+        if self.target is not None:
+            return f"probability that {self.target.words}"
+        name = self.quantity.name.replace("_", " ")
+        kind = {"mean": "", "quantile": f"{self.level:g} quantile (worse end) of "}.get(self.statistic, "")
+        return f"{'largest' if self.sign > 0 else 'least'} {kind}{name}"
+
+
+class Scores(NamedTuple):
+    """What some designs are worth."""
+
+    cost: Samples
+    """To be minimised by one objective, what is broken added, (objectives, designs)."""
+    values: Samples
+    """Statistic of every objective; NaN for a design that is refused or breaks a condition, (objectives, designs)."""
+    refused: Flags
+    """Whether a design cannot be built or has no answer, (designs,)."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Designs of a space under some draws."""
+
+    space: Space
+    model: SwimmerModel
+    objectives: tuple[Objective, ...]
+    conditions: tuple[Condition, ...]
+    bench: Bench
+    drawn: Drawn
+    confidence: float
+    """Share of the draws in which a condition has to hold."""
+    tail_rate: float | None = None
+    """Prescribed rate of the tail, rad/s; None: the robot's own drive."""
+
+    def swum(self, shares: Samples | None) -> Swimming:
+        """Every design under every draw, the draws of one design one after the other; None: the robot as it is."""
+        if shares is None:
+            return self._swim(self.drawn.batch)
+        designs, draws = len(shares), self.drawn.number
+        batch = self.drawn.batch.taken(np.tile(np.arange(self.drawn.batch.size), designs))
+        columns = {path: np.repeat(column, draws) for path, column in self.space.columns(shares).items()}
+        return self._swim(batch.with_values(columns))
+
+    def _swim(self, batch: RobotBatch) -> Swimming:
+        return swim(batch, self.model, tail_rate=None if self.tail_rate is None else np.full(1, self.tail_rate))
+
+    def quantity(self, swum: Swimming, name: str) -> Samples:
+        """A quantity of what `swum` gives, (designs, draws)."""
+        found: Samples = np.asarray(getattr(swum, name)).reshape(-1, self.drawn.number)
+        return found
+
+    def scores(self, shares: Samples) -> Scores:
+        """What designs are worth; those that cannot be built are not swum.
+
+        Args:
+            shares: of the ranges, (designs, variables).
+        """
+        count = len(shares)
+        excess = self.unbuildable(shares)
+        cost = np.tile(REFUSED + excess, (len(self.objectives), 1))
+        values = np.full((len(self.objectives), count), np.nan)
+        able = np.flatnonzero(excess <= 0)
+        refused = excess > 0
+        if able.size == 0:
+            return Scores(cost, values, refused)
+        swum = self.swum(shares[able])
+        answered = np.all(np.isfinite(self.quantity(swum, "forward_velocity")), axis=-1)
+        broken = self.broken(swum)
+        for row, objective in enumerate(self.objectives):
+            drawn = self.quantity(swum, objective.quantity.name)
+            known = answered & np.all(np.isfinite(drawn), axis=-1)
+            good = known & (broken <= 0)
+            own = np.where(good, np.nan_to_num(objective.cost(drawn)), BROKEN + np.nan_to_num(broken))
+            cost[row, able] = np.where(known, own, REFUSED)
+            values[row, able] = np.where(good, objective.of(drawn), np.nan)
+        refused[able] = ~answered
+        return Scores(cost, values, refused)
+
+    def unbuildable(self, shares: Samples) -> Samples:
+        """By how much designs break what bench, tube and model ask for, summed, (designs,); 0 where they do not."""
+        found = np.zeros(len(shares))
+        for limit in self.limits(shares):
+            found = found + np.broadcast_to(np.where(limit.holds, 0.0, _excess(limit)), found.shape)
+        return found
+
+    def limits(self, shares: Samples | None) -> list[Limit]:
+        """What bench, tube and model ask of designs; None: of the robot as it is."""
+        batch = RobotBatch.of(self.space.robot) if shares is None else self.space.batch(shares)
+        return [*requirements(batch, self.model), *self.bench.limits(batch)]
+
+    def excess(self, condition: Condition, swum: Swimming) -> Samples:
+        """By how much designs break a condition in the draws that have to keep it, (designs,)."""
+        values = condition.excess(self.quantity(swum, condition.quantity.name))
+        found = np.quantile(values, self.confidence, axis=-1, method="higher")
+        return np.clip(np.where(np.isnan(found), _MOST, found), -_MOST, _MOST)
+
+    def broken(self, swum: Swimming) -> Samples:
+        """Largest excess over all conditions, (designs,); 0 or less where all are kept."""
+        found = np.full(swum.valid.size // self.drawn.number, -_MOST)
+        for condition in self.conditions:
+            found = np.maximum(found, self.excess(condition, swum))
+        return found
+
+
+def _excess(limit: Limit) -> PerRobot:
+    """By how much a limit is broken, relative to its bound, 0 to 100; 100 where that is no number."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.abs(limit.value - limit.bound) / np.abs(limit.bound)
+    return np.clip(np.where(np.isfinite(share), np.maximum(share, 1e-9), _MOST), 0.0, _MOST)

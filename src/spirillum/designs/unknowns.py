@@ -1,0 +1,103 @@
+"""What is not known of a robot: draws from stated ranges or from a posterior, the same for all designs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.designs.space import Variable, variable_of
+from spirillum.errors import InputError
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.robot.batch import RobotBatch, batches
+from spirillum.robot.robot import Robot
+
+__all__ = ["Drawn", "Unknowns", "unknowns_of"]
+
+
+class Drawn(NamedTuple):
+    """Robots that differ in what is not known."""
+
+    batch: RobotBatch
+    """A robot for each draw, or one robot where everything is known."""
+    values: Mapping[str, Samples]
+    """Unknown to its values, (draws,)."""
+    number: int
+    """Number of draws."""
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Ranges, or a posterior, of what is not known of a robot."""
+
+    robot: Robot
+    """With the middle of the posterior in place of its own values."""
+    ranges: tuple[Variable, ...] = ()
+    """Fields with the ranges over which they are uniform and independent."""
+    posterior: PosteriorFile | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether there is nothing unknown."""
+        return not self.ranges and self.posterior is None
+
+    def draws(self, count: int, seed: int) -> Drawn:
+        """Robots that may be.
+
+        Args:
+            count: number of draws; ranges are filled evenly (scrambled Sobol' points).
+            seed: of the draws.
+
+        Raises:
+            InputError: for a posterior whose draws are not robots of one batch.
+        """
+        if self.known:
+            return Drawn(RobotBatch.of(self.robot), {}, 1)
+        if self.posterior is not None:
+            return _of_posterior(self.robot, self.posterior, count, seed)
+        from scipy.stats import qmc
+
+        points = qmc.Sobol(len(self.ranges), rng=np.random.default_rng(seed)).random(count)
+        values = {item.path: item.low + points[:, n] * (item.high - item.low) for n, item in enumerate(self.ranges)}
+        return Drawn(RobotBatch.of(self.robot).with_values(values), values, count)
+
+
+def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int) -> Drawn:
+    rng = np.random.default_rng(seed)
+    values = posterior.of(robot, rng)
+    size = next(iter(values.values())).size
+    rows = rng.permutation(size)[:count]
+    robots = posterior.drawn(robot, size, np.random.default_rng(seed))
+    groups = batches([robots[row] for row in rows])
+    if len(groups) != 1:
+        raise InputError(
+            f"{posterior.source} holds draws of force coefficients, which are no column of a batch; allowed: a "
+            "posterior without normal_factor and tangential_factor, or ranges"
+        )
+    return Drawn(groups[0][1], {name: column[rows] for name, column in values.items()}, len(rows))
+
+
+def unknowns_of(
+    robot: Robot, unknown: Mapping[str, str | Sequence[object]] | None, posterior: str | Path | None, model: str
+) -> Unknowns:
+    """What is not known of a robot.
+
+    Args:
+        robot: the robot.
+        unknown: dotted field to its range.
+        posterior: file of a calibration's posterior.
+        model: the model that will be asked.
+
+    Raises:
+        InputError: for both at once, a field that is no number of the robot, or a posterior of another model.
+    """
+    if posterior is not None:
+        if unknown:
+            raise InputError("unknown together with a posterior; allowed: one of them")
+        found = read_posterior(posterior, model)
+        return Unknowns(found.central(robot), posterior=found)
+    return Unknowns(robot, tuple(variable_of(robot, path, given, "unknown") for path, given in (unknown or {}).items()))

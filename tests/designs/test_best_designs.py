@@ -1,0 +1,273 @@
+"""Designs against closed forms, other optimisers, and what they say of themselves."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.optimize import direct, minimize_scalar
+
+import spirillum as sp
+from spirillum.designs.bench import Bench
+from spirillum.designs.evaluation import Evaluation, Objective
+from spirillum.designs.reading import condition_of, quantity_of
+from spirillum.designs.search import Archive, best_design
+from spirillum.designs.space import space_of
+from spirillum.designs.unknowns import Unknowns
+from spirillum.errors import InputError
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+
+PLAIN = {
+    "body": {"shape": "sphere", "diameter": "4 mm", "length": "4 mm"},
+    "coupling": {"diameter": "1 mm", "length": "1 mm", "clearance": "0.1 mm"},
+    "tail": {
+        "wavelength": "12 mm",
+        "amplitude": "2 mm",
+        "length": "40 mm",
+        "wire_diameter": "0.2 mm",
+        "handedness": "right",
+        "taper": "none",
+    },
+    "fluid": {"viscosity": "1 Pa s", "density": "970 kg/m^3"},
+    "drive": {"kind": "rate", "joint": "fixed", "rate": "1 Hz"},
+}
+TWO = {"tail.wavelength": "5 mm:40 mm", "tail.amplitude": "1 mm:6 mm"}
+FRICTION = {"friction.effective": "1e-6 N m s/rad:2e-5 N m s/rad"}
+
+
+class ConstantCoefficients(SwimmerModel):
+    """A helix of given arc length whose force coefficients are constant: c_n = g c_t; body drag a0 c_t L."""
+
+    name = "constant"  # type: ignore[misc]
+    parts = ()
+    closed_form = True
+    g, a0, arc = 2.0, 0.6, 0.05
+
+    def domain(self, batch):
+        return []
+
+    def part_matrix(self, batch, part, phase):
+        raise NotImplementedError
+
+    def resistance(self, batch, phase):
+        raise NotImplementedError
+
+    def axial(self, batch: RobotBatch) -> np.ndarray:
+        tangent = 2 * np.pi * batch.amplitude / batch.wavelength
+        cos2 = 1 / (1 + tangent**2)
+        sin2, both = 1 - cos2, tangent * cos2
+        found = np.zeros((batch.wavelength.size, 4, 4))
+        found[:, 0, 0] = self.a0 * self.arc
+        found[:, 1, 1] = 1e-12
+        found[:, 2, 2] = self.arc * (cos2 + self.g * sin2)
+        found[:, 2, 3] = found[:, 3, 2] = -self.arc * (self.g - 1) * both * batch.amplitude
+        found[:, 3, 3] = self.arc * batch.amplitude**2 * (self.g * cos2 + sin2)
+        return found
+
+
+def best_angle(model: ConstantCoefficients, quantity: str) -> tuple[float, float, float]:
+    """Angle, advance per radian over the amplitude, and the objective, of the best wavelength."""
+    robot = sp.load(PLAIN)
+    space = space_of(robot, {"tail.wavelength": "3 mm:60 mm"})
+    objective = Objective(quantity_of(quantity, "maximise"), 1.0)
+    drawn = Unknowns(robot).draws(1, 1)
+    evaluation = Evaluation(space, model, (objective,), (), Bench(mandrel=0.0), drawn, 0.95)
+    found = best_design(evaluation, Archive(), seed=1)
+    wavelength = float(space.values(found.shares[None])[0, 0])
+    swum = evaluation.swum(found.shares[None])
+    angle = np.arctan(2 * np.pi * robot.tail.amplitude / wavelength)
+    return float(angle), float(swum.advance_per_radian[0] / robot.tail.amplitude), float(getattr(swum, quantity)[0])
+
+
+@pytest.mark.parametrize(("g", "a0"), [(2.0, 0.6), (1.6, 0.0), (1.9, 3.0)])
+def test_fastest_helix_of_constant_coefficients(g: float, a0: float) -> None:
+    """tan(theta) = sqrt((1 + a0)/(g + a0)), U/(R omega) = (g - 1)/(2 sqrt((1 + a0)(g + a0)))."""
+    model = ConstantCoefficients()
+    model.g, model.a0 = g, a0
+    angle, advance, _ = best_angle(model, "forward_velocity")
+    assert angle == pytest.approx(np.arctan(np.sqrt((1 + a0) / (g + a0))), abs=1e-4)
+    assert advance == pytest.approx((g - 1) / (2 * np.sqrt((1 + a0) * (g + a0))), rel=1e-7)
+
+
+def test_best_wavelength_of_resistive_force_theory_is_that_of_its_printed_force_balance() -> None:
+    """An untapered helix: U (D + L (c_t cos^2 + c_n sin^2)) = omega B L (c_n - c_t) sin cos."""
+    robot = sp.load(PLAIN | {"model": {"rft": {"coefficients": "gray-hancock"}}})
+    found = sp.design(robot, {"tail.wavelength": "3 mm:40 mm"}, maximise="forward_velocity", model="rft")
+
+    def speed(wavelength: float) -> float:
+        tail = robot.tail
+        log = np.log(4 * wavelength / tail.wire_diameter)
+        tangential, normal = 2 * np.pi / (log - 0.5), 4 * np.pi / (log + 0.5)
+        angle = np.arctan(2 * np.pi * tail.amplitude / wavelength)
+        arc = tail.length / np.cos(angle)
+        drag = 6 * np.pi * 0.5 * robot.body.diameter
+        cos, sin = np.cos(angle), np.sin(angle)
+        thrust = arc * (normal - tangential) * sin * cos * tail.amplitude * 2 * np.pi
+        return -thrust / (drag + arc * (tangential * cos**2 + normal * sin**2))
+
+    best = minimize_scalar(speed, bounds=(3e-3, 40e-3), method="bounded", options={"xatol": 1e-12})
+    assert found.values["tail.wavelength"] == pytest.approx(best.x, rel=1e-3)
+    assert found.objective == pytest.approx(-best.fun, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def unsure() -> sp.Design:
+    return sp.design(
+        "biorob2012-wide",
+        TWO,
+        maximise="forward_velocity",
+        subject_to=["tail_rotation_rate >= 0.8 Hz"],
+        unknown=FRICTION,
+        judged={"draws": 64},
+    )
+
+
+def test_best_design_is_that_of_another_optimiser(unsure: sp.Design) -> None:
+    searched = unsure.searched
+    found = direct(lambda x: float(searched.scores(x[None]).cost[0, 0]), [(0, 1), (0, 1)], maxfun=300, eps=1e-3)
+    best = searched.scores(np.array([_shares(unsure)])).cost[0, 0]
+    assert best <= found.fun + 1e-4 * abs(found.fun)
+    assert best == pytest.approx(found.fun, rel=0.02)
+
+
+def _shares(design: sp.Design) -> list[float]:
+    return [item.share(design.values[item.path]) for item in design.searched.space.variables]
+
+
+def test_designs_under_draws_swim_as_single_robots_do(unsure: sp.Design) -> None:
+    searched = unsure.searched
+    shares = np.array([[0.3, 0.2], [0.8, 0.25]])
+    together = searched.quantity(searched.swum(shares), "forward_velocity")
+    wavelength, amplitude = searched.space.values(shares)[1].tolist()
+    friction = float(searched.drawn.values["friction.effective"][5])
+    robot = sp.load(
+        "biorob2012-wide",
+        **{
+            "tail.wavelength": f"{wavelength!r} m",
+            "tail.amplitude": f"{amplitude!r} m",
+            "friction.effective": f"{friction!r} N m s/rad",
+        },
+    )
+    assert together[1, 5] == pytest.approx(sp.predict(robot, model="sbt").forward_velocity, rel=1e-12)
+
+
+def test_what_a_design_says_of_itself_holds(unsure: sp.Design) -> None:
+    assert unsure.uncertainty is not None
+    assert unsure.uncertainty.draws == 256
+    low, high = (getattr(unsure.uncertainty, end)["forward_velocity"] for end in ("low", "high"))
+    assert low < unsure.objective < high
+    assert unsure.uncertainty.low["tail_rotation_rate"] < 0.83 * 2 * np.pi  # the condition binds
+    assert unsure.bound_by == ("tail_rotation_rate >= 0.8 Hz",)
+    assert unsure.uncertainty.deciding["friction.effective"] == pytest.approx(1.0)
+    today = unsure.alternatives[0]
+    assert (today.name, today.keeps) == ("today", True)
+    assert today.objective < unsure.objective
+    assert today.beaten_low < today.beaten < today.beaten_high
+    assert sp.predict(unsure.robot).forward_velocity > 0
+
+
+def test_whole_turns_and_windings() -> None:
+    found = sp.design("biorob2012-wide", {"tail.turns": (1, 6)}, maximise="forward_velocity", model="rft")
+    assert found.values["tail.turns"] == round(found.values["tail.turns"])
+    tail = found.robot.tail
+    assert tail.length == pytest.approx(found.values["tail.turns"] * tail.wavelength)
+    profile = found.profiles[0]
+    assert profile.values.tolist() == [1, 2, 3, 4, 5, 6]
+    assert found.objective == pytest.approx(np.max(profile.objective))
+    wire = tail.length / tail.wavelength * np.hypot(tail.wavelength, 2 * np.pi * tail.amplitude)
+    assert found.winding["wire_length"] == pytest.approx(wire)
+
+
+def test_front_holds_no_design_that_another_beats() -> None:
+    found = sp.design(
+        "biorob2012-wide",
+        {"tail.wavelength": "8 mm:40 mm"},
+        maximise="forward_velocity",
+        minimise="shaft_power",
+        model="sbt",
+        judged={"draws": 8},
+    )
+    assert found.front is not None
+    speed, power = found.front["forward_velocity"], found.front["shaft_power"]
+    assert len(speed) > 4
+    assert np.all(np.diff(speed) < 0)
+    assert np.all(np.diff(power) < 0)
+    assert speed[0] == pytest.approx(found.objective, rel=1e-6)
+
+
+def target_of(share: float, seed: int) -> tuple[float, float, float]:
+    """Probability that a robot driven by a torque is fast enough, mu uniform in 1 to 3 Pa s: U is as 1/mu."""
+    table = PLAIN | {"drive": {"kind": "torque", "joint": "fixed", "torque": "1e-5 N m"}}
+    slowest = sp.predict(sp.load(table, **{"fluid.viscosity": "3 Pa s"}), model="rft").forward_velocity
+    fast_enough = slowest * 3.0 / (1.0 + 2.0 * share)
+    found = sp.design(
+        table,
+        {"tail.wavelength": ("12 mm", "12.0001 mm")},
+        maximise=f"forward_velocity >= {1e3 * fast_enough!r} mm/s",
+        unknown={"fluid.viscosity": "1 Pa s:3 Pa s"},
+        judged={"draws": 64, "seed": seed},
+        model="rft",
+    )
+    assert found.uncertainty is not None
+    assert found.uncertainty.probability is not None
+    return found.uncertainty.probability
+
+
+def test_probability_of_a_target_is_the_known_one() -> None:
+    share, low, high = target_of(0.7, 3)
+    assert low < 0.7 < high
+    assert share == pytest.approx(0.7, abs=0.05)
+
+
+@pytest.mark.slow
+def test_intervals_of_the_probability_hold_it() -> None:
+    rng = np.random.default_rng(0)
+    truths = rng.uniform(0.05, 0.95, 200)
+    held = [low <= truth <= high for n, truth in enumerate(truths) for _, low, high in [target_of(truth, n)]]
+    assert np.mean(held) >= 0.9
+
+
+def test_conditions_have_the_units_of_their_quantity() -> None:
+    condition = condition_of("motor_current <= 400 mA")
+    assert (condition.relation, condition.bound) == ("<=", 0.4)
+    assert condition_of("tail_rotation_rate>=1Hz").bound == pytest.approx(2 * np.pi)
+    assert condition_of("hydrodynamic_efficiency >= 0.01").bound == 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"vary": {}}, "vary holds no field"),
+        ({"vary": {"tail.wavelenth": "5 mm:9 mm"}}, "did you mean tail.wavelength"),
+        ({"vary": {"tail.wavelength": "9 mm:5 mm"}}, "the range ends before it begins"),
+        ({"vary": {"tail.wavelength": "5:9"}}, "has no unit"),
+        ({"vary": {"tail.wavelength": "5 s:9 s"}}, "is not a unit of"),
+        ({"vary": {"tail.wavelength": "5 mm"}}, "allowed: LOW:HIGH"),
+        ({"vary": {"tail.turns": "2:6", "tail.length": "1 mm:2 mm"}}, "allowed: one of them"),
+        ({"vary": {"tail.turns": "1.5:6"}}, "whole numbers"),
+        ({"maximise": ()}, "0 objectives"),
+        ({"maximise": "forward_speed"}, "did you mean forward_velocity"),
+        ({"subject_to": ["motor_current < 0.4 A"]}, "NAME <= VALUE UNIT"),
+        ({"subject_to": ["motor_current <= 0.4 V"]}, "is not a unit of"),
+        ({"subject_to": ["motor_current <= nan A"]}, "not finite"),
+        ({"subject_to": ["__import__('os') <= 1 A"]}, "NAME <= VALUE UNIT"),
+        ({"subject_to": ["forward_velocity >= 1 m/s"]}, "no design keeps all conditions"),
+        ({"model": "tube"}, "one tail at a time"),
+        ({"unknown": {"tail.wavelength": "5 mm:9 mm"}}, "varied and unknown"),
+        ({"judged": {"draws": 1}}, "draws"),
+        ({"bench": {"mandrel": -1.0}}, "bench.mandrel"),
+    ],
+)
+def test_what_is_wrong_is_said(change: dict, words: str) -> None:
+    given = {"vary": {"tail.wavelength": "10 mm:30 mm"}, "maximise": "forward_velocity", "judged": {"draws": 8}}
+    with pytest.raises(InputError, match=re.escape(words)):
+        sp.design("biorob2012-wide", **(given | change))
+
+
+def test_bench_refuses_what_cannot_be_wound() -> None:
+    batch = RobotBatch.of(sp.load("biorob2012-wide")).with_values({"tail.wavelength": [2e-3, 25e-3]})
+    assert [bool(limit.holds.all()) for limit in Bench().limits(batch)] == [True, True]
+    tight = Bench(mandrel=100.0).limits(batch)[1]
+    assert not tight.holds.any()
+    assert find_swimmer_model("sbt").closed_form
