@@ -102,7 +102,8 @@ REFERENCES: dict[str, str] = {
     ),
     "haimes1971": (
         "Y. Y. Haimes, L. S. Lasdon and D. A. Wismer. On a bicriterion formulation of the problems of integrated "
-        "system identification and system optimization. IEEE Transactions on Systems, Man, and Cybernetics 1:296-297, 1971."
+        "system identification and system optimization. "
+        "IEEE Transactions on Systems, Man, and Cybernetics 1:296-297, 1971."
     ),
     "iec60851": "IEC 60851-3. Winding wires, test methods, part 3: mechanical properties (mandrel winding test).",
     "nelder1965": (

@@ -113,10 +113,10 @@ def _landscape(axes: Axes, design: Design) -> None:
     if x[0] <= today[0] <= x[-1] and y[0] <= today[1] <= y[-1]:
         axes.plot(*today, marker="o", color="white", markeredgecolor="black", linestyle="none", label="today")
     if not np.all(np.isfinite(values)):
-        axes.fill_between([], [], color=_REFUSED, label="refused, or breaks a condition")
+        axes.plot([], [], color=_REFUSED, linewidth=7, label="refused, or breaks a condition")
     axes.set_xlabel(_label(one.path, x_unit))
     axes.set_ylabel(_label(two.path, y_unit))
-    axes.legend(fontsize=7, framealpha=0.9)
+    axes.legend(fontsize=7, framealpha=0.9, facecolor="white", frameon=True)
 
 
 def _front(axes: Axes, design: Design) -> None:
