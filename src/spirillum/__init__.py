@@ -112,6 +112,11 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'spirillum' has no attribute {name!r}")
     value = getattr(import_module(_HOME[name]), name)
+    if not isinstance(value, type):
+        from spirillum.argument_kinds import checked
+
+        value = checked(value)
+        value.__module__ = __name__  # where it is found again, as processes that share work ask for
     globals()[name] = value
     return value
 

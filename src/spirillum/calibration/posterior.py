@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spirillum.argument_kinds import check_kind
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.least_squares import LeastSquares
@@ -45,6 +46,8 @@ class Sampling:
     doublings: int = _DOUBLINGS
 
     def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            check_kind(name, value, "int")
         if self.seed < 0:
             raise InputError(f"seed = {self.seed}; allowed: a whole number from 0")
 

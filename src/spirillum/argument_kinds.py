@@ -1,0 +1,163 @@
+"""Arguments of public functions against their annotations: a wrong kind is named in one sentence before any work.
+
+An annotation is read as it stands in the source, so that nothing has to be imported for it: ``str | Path | None``,
+``Sequence[str]``, ``Robot``. What it does not tell, such as the range of a number, the function itself looks at.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import os
+import types
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import cache, wraps
+from numbers import Integral, Real
+from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
+
+from spirillum.errors import InputError, clipped, did_you_mean
+
+__all__ = ["check_kind", "checked"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class _Kind(NamedTuple):
+    """One kind of values."""
+
+    words: str
+    """For the sentence of an error."""
+    holds: Callable[[Any], bool]
+    """Whether a value is of it; of a list, whether it is a list at all."""
+    items: tuple[_Kind, ...] = ()
+    """Kinds of the items of a list; empty: any."""
+
+
+def _is_true_or_false(value: Any) -> bool:
+    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
+
+
+def _is_list(value: Any) -> bool:
+    """Several values whose number is known, but no text and no mapping."""
+    return isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping))
+
+
+_BASIC = {
+    "str": _Kind("text", lambda value: isinstance(value, str)),
+    "Path": _Kind("a path", lambda value: isinstance(value, os.PathLike)),
+    "int": _Kind("a whole number", lambda value: isinstance(value, Integral) and not _is_true_or_false(value)),
+    "float": _Kind("a number", lambda value: isinstance(value, Real) and not _is_true_or_false(value)),
+    "bool": _Kind("True or False", _is_true_or_false),
+    "None": _Kind("None", lambda value: value is None),
+    "Mapping": _Kind("a mapping", lambda value: isinstance(value, Mapping)),
+    "Callable": _Kind("a function", callable),
+    "Samples": _Kind("an array", lambda value: hasattr(value, "ndim")),
+    "PerRobot": _Kind("an array", lambda value: hasattr(value, "ndim")),
+}
+_ANY = _Kind("anything", lambda _value: True)
+_LISTS = ("Sequence", "tuple", "list")
+
+
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """A function that looks at the kinds of its arguments first.
+
+    Args:
+        function: a function whose annotations are text (`from __future__ import annotations`).
+
+    Returns:
+        The function; it raises `InputError` for an argument of a wrong kind, or one that it does not have.
+    """
+    signature = inspect.signature(function)
+    names = [name for name, item in signature.parameters.items() if item.kind is not item.VAR_KEYWORD]
+    open_ended = len(names) < len(signature.parameters)
+
+    @cache
+    def kinds_of(name: str) -> tuple[_Kind, ...]:
+        annotation = signature.parameters[name].annotation
+        if not isinstance(annotation, str):
+            return (_ANY,)
+        return _kinds(ast.parse(annotation, mode="eval").body, function.__globals__)
+
+    @wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        for name in kwargs:
+            if name not in names and not open_ended:
+                raise InputError(
+                    f"{name} is no argument of {function.__name__}(){did_you_mean(name, names)}; allowed: "
+                    f"{', '.join(names)}"
+                )
+        for name, value in {**dict(zip(names, args, strict=False)), **kwargs}.items():
+            if name in names:
+                _check(name, value, kinds_of(name))
+        return function(*args, **kwargs)
+
+    return call
+
+
+def check_kind(name: str, value: Any, annotation: str) -> None:
+    """Refuse a value of a wrong kind.
+
+    Args:
+        name: what it is called.
+        value: the value.
+        annotation: kinds that are allowed, such as ``int | None``.
+
+    Raises:
+        InputError: if it is of none of them.
+    """
+    _check(name, value, _kinds(ast.parse(annotation, mode="eval").body, {}))
+
+
+def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:
+    """Refuse a value of none of these kinds.
+
+    Raises:
+        InputError: if it is of none.
+    """
+    fitting = [kind for kind in kinds if kind.holds(value)]
+    if not fitting:
+        allowed = list(dict.fromkeys(kind.words for kind in kinds))
+        words = allowed[0] if len(allowed) == 1 else f"{', '.join(allowed[:-1])} or {allowed[-1]}"
+        raise InputError(f"{name} = {clipped(value)}; allowed: {words}")
+    if all(kind.items for kind in fitting):
+        for number, item in enumerate(value):
+            _check(f"{name}[{number}]", item, fitting[0].items)
+
+
+def _kinds(node: ast.expr, known: Mapping[str, Any]) -> tuple[_Kind, ...]:
+    """The kinds that an annotation allows; `known` has the names of its module."""
+    match node:
+        case ast.BinOp():
+            return *_kinds(node.left, known), *_kinds(node.right, known)
+        case ast.Constant(value=None):
+            return (_BASIC["None"],)
+        case ast.Subscript(value=ast.Name(id=name)) if name in _LISTS:
+            first = node.slice.elts[0] if isinstance(node.slice, ast.Tuple) else node.slice
+            return (_Kind("a list", _is_list, _kinds(first, known)),)
+        case ast.Subscript():
+            return _kinds(node.value, known)
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return _meant(name, known.get(name))
+        case _:
+            return (_ANY,)
+
+
+def _meant(name: str, found: Any) -> tuple[_Kind, ...]:
+    """The kinds behind a name: those of an alias, else a class, which may not have been imported."""
+    if name in ("Any", "object"):
+        return (_ANY,)
+    if name in _BASIC:
+        return (_BASIC[name],)
+    if found is None or (isinstance(found, type) and get_origin(found) is None):
+        return (_named(name),)
+    if isinstance(found, types.UnionType):
+        return tuple(kind for part in get_args(found) for kind in _meant(getattr(part, "__name__", ""), part))
+    origin = get_origin(found)
+    return (_BASIC.get(getattr(origin, "__name__", ""), _ANY),)
+
+
+def _named(name: str) -> _Kind:
+    """A class by its name, or that of one that it derives from."""
+    article = "an" if name[0] in "AEIOU" else "a"
+    return _Kind(f"{article} {name}", lambda value: any(one.__name__ == name for one in type(value).__mro__))

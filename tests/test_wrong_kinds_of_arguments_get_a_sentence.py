@@ -1,0 +1,115 @@
+"""Every argument of every public function, given a value of each kind that it does not take, is named in a sentence."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.argument_kinds import checked
+from spirillum.calibration.posterior import Sampling
+from spirillum.dynamics.timing import Timing
+from spirillum.dynamics.tube_options import InTube
+from spirillum.robot.arguments import Options
+from spirillum.robot.options import Resolution
+from spirillum.robot.placement import Placement
+from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
+
+FUNCTIONS = [name for name in sp.__all__ if inspect.isfunction(getattr(sp, name)) and name != "citation"]
+OF_A_KIND: dict[str, Any] = {
+    "str": "text",
+    "Path": Path("file"),
+    "int": 3,
+    "float": 2.5,
+    "bool": True,
+    "None": None,
+    "Mapping": {"field": 1},
+    "Sequence": ["text"],
+    "object": object(),
+}
+ALSO = {
+    "float": ("int",),
+    "RobotSource": ("str", "Path", "Mapping"),
+    "Source": ("str", "Path", "Mapping"),
+    "Any": ("Mapping",),
+    "tuple": ("Sequence",),
+}
+
+
+def taken(annotation: str) -> set[str]:
+    """Kinds of `OF_A_KIND` that an annotation lets in, read from its words alone."""
+    outer = annotation
+    while "[" in outer:  # what stands in brackets is of items
+        start = outer.rindex("[")
+        outer = outer[:start] + outer[outer.index("]", start) + 1 :]
+    words = {word.strip() for word in outer.split("|")}
+    return words.union(*(ALSO.get(word, ()) for word in words))
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_each_argument_of_a_wrong_kind_is_named(name: str) -> None:
+    function = getattr(sp, name)
+    parameters = [item for item in inspect.signature(function).parameters.values() if item.kind is not item.VAR_KEYWORD]
+    tried = 0
+    for item in parameters:
+        given = {first.name: None for first in parameters if first.default is first.empty and first is not item}
+        for kind in OF_A_KIND.keys() - taken(item.annotation):
+            with pytest.raises(sp.InputError) as refused:
+                function(**{item.name: OF_A_KIND[kind]}, **given)
+            sentence = str(refused.value)
+            assert sentence.startswith((f"{item.name} = ", f"{item.name}[")), (item.name, kind, sentence)
+            assert "; allowed: " in sentence
+            tried += 1
+    assert tried >= 4 * len(parameters)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [Placement, Timing, InTube, Resolution, Degradation, MotionOptions, TrialOptions, CameraOptions, SetupErrors],
+)
+def test_each_option_of_a_wrong_kind_is_named(options: type[Options]) -> None:
+    for name in options.model_fields:
+        for wrong in (object(), [object()], {"a": 1}, 1 + 2j, np.zeros((2, 2))):
+            with pytest.raises(sp.InputError) as refused:
+                options.of({name: wrong})
+            assert name.replace("_", "-") in str(refused.value).replace("_", "-"), (name, wrong, str(refused.value))
+
+
+def test_sampler_wants_whole_numbers() -> None:
+    for name in vars(Sampling()):
+        with pytest.raises(sp.InputError, match=f"{name} = 'x'; allowed: a whole number"):
+            Sampling(**{name: "x"})  # type: ignore[arg-type]
+
+
+def test_sentence_says_what_is_allowed() -> None:
+    for wrong, words in (
+        ({"calibration": 3}, "calibration = 3; allowed: text, a path or None"),
+        ({"placement": 1.0}, "placement = 1.0; allowed: a Placement, a mapping or None"),
+        ({"calibrated": "no"}, "calibrated = 'no'; allowed: True or False"),
+        ({"durations": 3}, "durations is no argument of simulate()"),
+    ):
+        with pytest.raises(sp.InputError) as refused:
+            sp.simulate("biorob2012-wide", **wrong)  # type: ignore[arg-type]
+        assert str(refused.value).startswith(words)
+    with pytest.raises(sp.InputError, match=r"models\[1\] = 3; allowed: text"):
+        sp.compare_models("biorob2012-wide", models=["sbt", 3])  # type: ignore[list-item]
+
+
+def test_numbers_and_lists_of_numpy_are_numbers_and_lists() -> None:
+    def function(number: float, whole: int, names: Sequence[str], flag: bool) -> tuple[Any, ...]:  # type: ignore[name-defined]  # noqa: F821
+        return number, whole, names, flag
+
+    names = np.array(["a", "b"])
+    assert checked(function)(np.float32(2.0), np.int64(3), names, np.True_)[:2] == (2.0, 3)
+    with pytest.raises(sp.InputError, match="whole = True; allowed: a whole number"):
+        checked(function)(2.0, True, names, False)
+
+
+def test_public_functions_can_be_sent_to_another_process() -> None:
+    assert pickle.loads(pickle.dumps(sp.predict)) is sp.predict

@@ -1,0 +1,37 @@
+"""From walls to a film and back: a run in the tube, seen by the virtual camera, is measured as what it was."""
+
+from pathlib import Path
+
+import numpy as np
+
+import spirillum as sp
+
+RADIUS, START, LENGTH = 0.009, 4.0, 9.8
+"""Of the body, m; begin and length of the film in the run, s."""
+
+
+def test_run_in_the_tube_is_measured_within_the_stated_intervals(tmp_path: Path) -> None:
+    """From above one sees the top of the body, which a nose that rises moves back by the radius (known limit L50)."""
+    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})
+    late = run.sel(time=slice(START, None))
+    film = tmp_path / "film.mp4"
+    sp.render("biorob2012-wide", film, run=late, trial={"duration": LENGTH}, camera={"size": "320x240", "fps": 10.0})
+    found = sp.measure(film, film.with_suffix(".setup.toml"), annotated=False, figures=False).trials[0].quantities
+
+    ends = float(late["time"][0]) + np.array([0.0, LENGTH])
+
+    def rate(values: object) -> float:
+        return float(np.diff(np.interp(ends, late["time"], values))[0]) / LENGTH
+
+    seen = late["position"][:, 0] - RADIUS * np.sin(late["pitch"])
+    truth = {
+        "forward_velocity": rate(seen),
+        "body_rotation_rate": rate(late["body_angle"]),
+        "tail_rotation_rate": rate(late["tail_angle"]),
+    }
+    for name, value in truth.items():
+        assert found[name].low < value < found[name].high, name
+        width = found[name].high - found[name].low
+        assert width < (0.2 if name == "body_rotation_rate" else 0.02) * abs(value), name
+    assert rate(late["azimuth"]) < 0.0  # a film carries it the way in which its body turns
+    assert truth["body_rotation_rate"] < 0.0
