@@ -10,7 +10,7 @@ from spirillum.quantities import QUANTITIES
 from spirillum.swimming.answer import Swimming
 from spirillum.units import _registry, shown_in
 
-PARTS = ("mean_", "held_", "largest_", "least_")
+PARTS = ("mean_", "held_", "largest_", "least_", "modelled_")
 ENDINGS = ("_low", "_high", "_at_place")
 
 

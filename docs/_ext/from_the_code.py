@@ -121,6 +121,8 @@ def _allowed_number_or_text(info: FieldInfo) -> str:
         return "`true`, `false`"
     if dict in (typing.get_origin(part) for part in parts):
         return "a table"
+    if tuple in (typing.get_origin(part) for part in parts) and float in parts:
+        return "two numbers"
     return "a list of texts" if {list, tuple} & {typing.get_origin(part) for part in parts} else "text"
 
 
@@ -130,9 +132,10 @@ def _default(info: FieldInfo, kind: Kind | None) -> str:
     value = info.get_default(call_default_factory=True)
     if value is None:
         return "unset"
-    if kind is not None and isinstance(value, float):
+    ends = value if isinstance(value, tuple) else (value,)
+    if kind is not None and ends and all(isinstance(end, float) for end in ends):
         unit = for_people(kind.unit)
-        return show(value, unit) if unit != kind.unit else f"{value:g} {kind.unit}"
+        return " to ".join(show(end, unit) if unit != kind.unit else f"{end:g} {kind.unit}" for end in ends)
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     if isinstance(value, (tuple, list)):

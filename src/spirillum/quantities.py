@@ -201,6 +201,11 @@ _IN_THE_TUBE = (
 )
 
 _STUDIES = (
+    Quantity("contact_share", "", "1", "share of the time in which asperities carry load", _TUBE),
+    Quantity("body_drag_factor", "", "1", "factor on the isolated body's drag that an observed speed asks for", "(15)"),
+    Quantity("roughness", "s", "m", "height of the asperities", "assumed"),
+    Quantity("wait", "", "s", "time from laying down until the motor is switched on", "assumed"),
+    Quantity("friction_coefficient", r"\mu_c", "1", "coefficient of dry friction", "assumed"),
     Quantity("channel_diameter", "D_{ch}", "m", "channel diameter D_ch", "Table I"),
     Quantity("wavelength", r"\lambda", "m", "tail wavelength lambda", "Table I"),
     Quantity("amplitude", "B_o", "m", "tail amplitude B_o", "Table I"),

@@ -260,6 +260,16 @@ def study(
             show_default=False,
         ),
     ] = None,
+    predicted: Annotated[
+        bool | None,
+        typer.Option(
+            "--predicted/--no-predicted",
+            help="Lay the robots down in their tubes and let them go too, with nothing fitted (minutes), or not; else "
+            "as the study says.",
+            show_default=False,
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for --predicted.")] = 2,
     calibration: Calibration = None,
     posterior: Posterior = None,
     settings: Settings = None,
@@ -282,6 +292,8 @@ def study(
             overrides=overrides_from(settings),
             models=model,
             band=band,
+            predicted=predicted,
+            workers=workers,
             calibration=calibration,
             posterior=posterior,
             progress=progress,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from spirillum.papers.biorob2012.claims import evaluated
+from spirillum.papers.biorob2012.claims import evaluated, foretold
 from spirillum.papers.biorob2012.evidence import Claim
 from spirillum.papers.biorob2012.figures import PAPER_FIGURES, more_figures
 from spirillum.view.figures.picture import Picture
@@ -19,7 +19,7 @@ from spirillum.view.figures.study_view import PaperFigure
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["claims_of", "figures_of"]
+__all__ = ["claims_of", "figures_of", "predictions_of"]
 
 
 class Paper(NamedTuple):
@@ -27,13 +27,15 @@ class Paper(NamedTuple):
 
     claims: Callable[[xr.Dataset], list[Claim]]
     """Its statements, each with its verdict."""
+    predictions: Callable[[xr.Dataset], list[Claim]]
+    """Its statements with verdicts from robots that were laid down and let go."""
     layout: Mapping[str, PaperFigure]
     """Figures of its channels."""
     figures: Callable[[xr.Dataset], dict[str, Picture]]
     """Figures that only this paper asks for."""
 
 
-_PAPERS = {"biorob2012": Paper(evaluated, PAPER_FIGURES, more_figures)}
+_PAPERS = {"biorob2012": Paper(evaluated, foretold, PAPER_FIGURES, more_figures)}
 
 
 def _paper_of(dataset: xr.Dataset) -> Paper | None:
@@ -44,6 +46,12 @@ def claims_of(dataset: xr.Dataset) -> list[Claim]:
     """Statements of the paper that a study names, each with its verdict; empty for a study that names none."""
     paper = _paper_of(dataset)
     return paper.claims(dataset) if paper else []
+
+
+def predictions_of(dataset: xr.Dataset) -> list[Claim]:
+    """The same statements with verdicts from robots that were laid down and let go; empty where none were."""
+    paper = _paper_of(dataset)
+    return paper.predictions(dataset) if paper else []
 
 
 def figures_of(dataset: xr.Dataset) -> dict[str, Picture]:

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.answer import envelope
 from spirillum.files import output_folder, protected, results_folder, write_dataset
 from spirillum.papers.biorob2012.study import paper_study
-from spirillum.papers.registry import claims_of
+from spirillum.papers.registry import claims_of, predictions_of
 from spirillum.results.study_report import write_report
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
@@ -36,6 +36,8 @@ def study(
     overrides: Mapping[str, Any] | None = None,
     models: Sequence[str] | None = None,
     band: bool | None = None,
+    predicted: bool | None = None,
+    workers: int = 1,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     progress: Progress | None = None,
@@ -51,6 +53,9 @@ def study(
         models: hydrodynamic models instead of the study's; None: the study's.
         band: compute models that compute the channel's walls over the places that the placement leaves open too
             (many minutes), or not, instead of what the study says; None: what it says.
+        predicted: lay the robots down in their tubes and let them go too, over a design of gap, pitch, waiting time,
+            roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
+        workers: number of processes in which they are let go.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
             model have 95 % intervals.
@@ -63,12 +68,20 @@ def study(
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
     question = paper_study() if source is None else source
-    loaded = load_study(question, overrides, models=models, band=band, calibration=calibration, posterior=posterior)
+    loaded = load_study(
+        question,
+        overrides,
+        models=models,
+        band=band,
+        predicted=predicted,
+        calibration=calibration,
+        posterior=posterior,
+    )
     observed = observed_arrays(observations, loaded) if observations is not None else None
     fingerprint = study_fingerprint(loaded, observed)
     tell = progress or (lambda _what, _done, _total: None)
     if output is None:
-        return computed_study(loaded, observed, fingerprint, None, tell)
+        return computed_study(loaded, observed, fingerprint, None, tell, workers)
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
@@ -76,7 +89,7 @@ def study(
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
-            dataset = computed_study(loaded, observed, fingerprint, parts, tell)
+            dataset = computed_study(loaded, observed, fingerprint, parts, tell, workers)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
         write_report(dataset, folder, tell)
@@ -94,6 +107,11 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
     verdicts = {
         verdict: sum(c.verdict == verdict for c in claims) for verdict in ("agrees", "disagrees", "undecidable")
     }
+    foretold = predictions_of(dataset)
+    third = {
+        verdict: sum(c.verdict == verdict for c in foretold)
+        for verdict in ("predicted-agrees", "predicted-disagrees", "depends")
+    }
     content = {
         "title": dataset.attrs["title"],
         "folder": str(output),
@@ -101,6 +119,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),
         "claims": verdicts,
+        **({"predictions": third} if foretold else {}),
         "observations": dataset.attrs["observations"],
     }
     return envelope("study", content, [line for line in dataset.attrs["warnings"].split("\n") if line])

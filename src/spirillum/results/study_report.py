@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.files import write_text
-from spirillum.papers.registry import claims_of, figures_of
+from spirillum.papers.registry import claims_of, figures_of, predictions_of
 from spirillum.results.page import draw_pictures, page
 from spirillum.results.study_content import content
 from spirillum.results.study_robot import robot_picture
@@ -40,11 +40,11 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
         pictures, folder, lambda name, done: tell(f"figure {name}", done, steps), largest_svg=_LARGEST_SVG
     )
     tell("report", len(pictures), steps)
-    claims = [claim.to_dict() for claim in claims_of(dataset)]
-    write_text(
-        folder / "claims.json", json.dumps(claims, indent=2, allow_nan=False, ensure_ascii=False) + "\n", replace="any"
-    )
-    write_text(folder / "report.html", page("report.html.jinja", pictures=embedded, claims=claims, **content(dataset)))
+    claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
+    text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
+    write_text(folder / "claims.json", text + "\n", replace="any")
+    names = {"pictures": embedded, "claims": claims, "predictions": predictions, **content(dataset)}
+    write_text(folder / "report.html", page("report.html.jinja", **names))
     tell("report", steps, steps)
 
 

@@ -16,6 +16,8 @@ from spirillum.files import loaded_netcdf
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.band import BandTask, placed_at, with_band
+from spirillum.studies.laid_down import LaidDownTask
+from spirillum.studies.laid_down_dataset import laid_down_coordinates, laid_down_variables
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import REASONS, Part, Task
@@ -44,11 +46,12 @@ def assembled(
     loaded: LoadedStudy,
     answers: Iterable[tuple[Task, Part]],
     band: Sequence[tuple[BandTask, Part]],
+    laid_down: Sequence[tuple[LaidDownTask, Part]],
     observed: ObservedArrays | None,
     fingerprint: str,
     warnings: Sequence[str],
 ) -> xr.Dataset:
-    """Lay all answers into one Dataset, those at the reference place and those at the places of a band."""
+    """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots laid down."""
     import xarray as xr
 
     study = loaded.study
@@ -69,7 +72,11 @@ def assembled(
     data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes_of("outside"))
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
-    dataset = xr.Dataset(data, coords=_coordinates(loaded))
+    coordinates = _coordinates(loaded)
+    if laid_down:
+        data |= laid_down_variables(laid_down, robots, shape)
+        coordinates |= laid_down_coordinates(study.laid_down)
+    dataset = xr.Dataset(data, coords=coordinates)
     references = [key for name in study.models for key in find_swimmer_model(name).references]
     dataset.attrs = {
         "title": study.title,

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
+from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_table
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
@@ -34,7 +39,12 @@ def study_fingerprint(loaded: LoadedStudy, observed: ObservedArrays | None) -> s
 
 
 def computed_study(
-    loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, parts: Path | None, tell: Progress
+    loaded: LoadedStudy,
+    observed: ObservedArrays | None,
+    fingerprint: str,
+    parts: Path | None,
+    tell: Progress,
+    workers: int = 1,
 ) -> xr.Dataset:
     """The dataset of a study.
 
@@ -44,9 +54,12 @@ def computed_study(
         fingerprint: see `study_fingerprint`.
         parts: folder where finished parts are kept and found again; None: nowhere.
         tell: called with what is being done, steps done and steps in all.
+        workers: number of processes in which robots are laid down and let go.
     """
     todo: list[Task | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
+    runs = list(laid_down_tasks(loaded, len(todo)))
+    steps = len(todo) + len(runs)
     answers: list[tuple[Task, Part]] = []
     band: list[tuple[BandTask, Part]] = []
     found: list[Caution] = []
@@ -67,8 +80,8 @@ def computed_study(
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     warnings += uneven_models(loaded.robots, models, factors)
     for done, task in enumerate(todo):
-        tell(task.words, done, len(todo))
-        part = kept(task, parts, len(loaded.study.friction))
+        tell(task.words, done, steps)
+        part = kept(task, parts, (task.size, len(loaded.study.friction)))
         if part is None:
             part = _answered(task, loaded, observed)
             keep(task, part, parts)
@@ -77,16 +90,55 @@ def computed_study(
         else:
             answers.append((task, part))
             found += cautions(task, part)
-    tell("dataset", len(todo), len(todo))
+    laid_down = _laid_down(runs, parts, lambda what, done: tell(what, len(todo) + done, steps), workers)
+    tell("dataset", steps, steps)
     warnings += summed(found, loaded.count)
     warnings += left_out(band)
+    warnings += without_table(loaded, runs)
     for robot in loaded.robots:
         for name in loaded.study.models:
             warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]
-    return assembled(loaded, answers, band, observed, fingerprint, list(dict.fromkeys(warnings)))
+    return assembled(loaded, answers, band, laid_down, observed, fingerprint, list(dict.fromkeys(warnings)))
 
 
 def _answered(task: Task | BandTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
     if isinstance(task, BandTask):
         return task.answer(loaded.study.friction)
     return answer(task, loaded, observed)
+
+
+def _laid_down(
+    runs: Sequence[LaidDownTask], parts: Path | None, tell: Callable[[str, int], None], workers: int
+) -> list[tuple[LaidDownTask, Part]]:
+    """The answers of robots that are laid down, in their order; each is kept as soon as it is done."""
+    found = {task.number: kept(task, parts, (1,)) for task in runs}
+    todo = [task for task in runs if found[task.number] is None]
+    done = len(runs) - len(todo)
+    if todo:
+        tell(todo[0].words, done)
+    for task, made in _let_go(todo, workers):
+        found[task.number] = made
+        keep(task, made, parts)
+        done += 1
+        tell(task.words, done)
+    return [(task, part) for task in runs if (part := found[task.number]) is not None]
+
+
+def _let_go(todo: Sequence[LaidDownTask], workers: int) -> Iterator[tuple[LaidDownTask, Part]]:
+    """Answers of tasks as they come, in this process or in several."""
+    if workers == 1 or len(todo) < 2:
+        for task in todo:
+            yield task, task.answer()
+        return
+    pool = ProcessPoolExecutor(min(workers, len(todo)), mp_context=get_context("spawn"))
+    try:
+        waiting = {pool.submit(task.answer): task for task in todo}
+        for future in as_completed(waiting):
+            yield waiting[future], future.result()
+    except BrokenProcessPool as error:
+        raise InputError(
+            f"a process of {workers} that run robots was ended from outside, as for want of memory; allowed: workers = "
+            "1, or more memory; what was done is kept where the study has a folder"
+        ) from error
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)

@@ -24,7 +24,7 @@ from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.robot.actuation import FrictionReading
-from spirillum.robot.fields import Length, Rate, Section, Text
+from spirillum.robot.fields import Length, Rate, Section, Text, Time
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in
@@ -32,7 +32,7 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.band import left_open
 from spirillum.units import Hz
 
-__all__ = ["Grid", "LoadedStudy", "Study", "load_study"]
+__all__ = ["Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
@@ -52,6 +52,42 @@ class Grid(Section):
     """Wavelengths of the tails."""
     amplitudes: Annotated[list[Length], Field(min_length=1)]
     """Amplitudes of the tails."""
+
+
+_Share = Annotated[float, Field(ge=0.0, le=1.0)]
+_Coefficient = Annotated[float, Field(ge=0.0, le=10.0)]
+
+
+class LaidDown(Section):
+    """Between what robots are laid down and let go, each factor from its low to its high level; all of it assumed."""
+
+    gap: tuple[Length, Length] = (1e-4, 1e-3)
+    """Smallest distance of body and glass where it is laid down, low and high."""
+    pitch: tuple[_Share, _Share] = (0.0, 0.5)
+    """Nose up, over the steepest pitch that gap and tail allow, at which the tail is at the glass."""
+    wait: tuple[Time, Time] = (0.0, 60.0)
+    """Time for which it lies there before its motor is switched on."""
+    roughness: tuple[Length, Length] = (1e-6, 3e-5)
+    """Height of the asperities: of a smooth hull, and of glued and printed stripes."""
+    friction_coefficient: tuple[_Coefficient, _Coefficient] = (0.0, 0.3)
+    """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
+    duration: Time = 12.0
+    """Length of each run with the motor on."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for name in ("gap", "pitch", "wait", "roughness", "friction_coefficient"):
+            low, high = getattr(self, name)
+            if low >= high:
+                words = f"{name} goes from {low:g} to {high:g}; allowed: a low level below the high one"
+                raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
+        if self.roughness[1] >= 2.0 * self.gap[0]:
+            words = (
+                f"roughness of up to {self.roughness[1]:g} m with a gap of {self.gap[0]:g} m: asperities would carry "
+                "more than the weight; allowed: a roughness below twice the gap"
+            )
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
+        return self
 
 
 class Study(Section):
@@ -77,6 +113,10 @@ class Study(Section):
     """Where in their channels the robots lie, for models that compute the walls."""
     band: Annotated[bool, Field(strict=True)] = False
     """Compute such models over the places that `placement` leaves open too, which takes many minutes."""
+    predicted: Annotated[bool, Field(strict=True)] = False
+    """Lay the robots down in their tubes and let them go too, with nothing fitted: minutes."""
+    laid_down: LaidDown = LaidDown()
+    """Between what they are laid down."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -188,6 +228,7 @@ def load_study(
     *,
     models: Sequence[str] | None = None,
     band: bool | None = None,
+    predicted: bool | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
 ) -> LoadedStudy:
@@ -198,6 +239,7 @@ def load_study(
         overrides: dotted robot fields, applied to every robot.
         models: hydrodynamic models instead of the study's; None: the study's.
         band: whether to compute bands, instead of what the study says; None: what it says.
+        predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot.
 
@@ -209,7 +251,7 @@ def load_study(
         table, name = dict(source), "the study"
     else:
         table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
-    instead = {"models": None if models is None else list(models), "band": band}
+    instead = {"models": None if models is None else list(models), "band": band, "predicted": predicted}
     table |= {field: value for field, value in instead.items() if value is not None}
     study = problems_in(Study, table)
     if isinstance(study, list):
@@ -222,6 +264,11 @@ def load_study(
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    if study.predicted and not (calibration is None and posterior is None):
+        raise InputError(
+            f"{name}: predicted together with a calibration or posterior; allowed: one of them, for what is predicted "
+            "is predicted with nothing fitted"
+        )
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
     known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))

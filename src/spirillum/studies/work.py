@@ -306,8 +306,14 @@ class Keepable(Protocol):
         """Names of the arrays that an answer may have."""
 
 
-def kept(task: Keepable, folder: Path | None, readings: int) -> Part | None:
-    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task."""
+def kept(task: Keepable, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
+    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task.
+
+    Args:
+        task: what was asked.
+        folder: where answers are kept; None: nowhere.
+        leading: sizes of the first axes of all its arrays.
+    """
     if folder is None or not (folder / task.file_name).is_file():
         return None
     try:
@@ -319,7 +325,7 @@ def kept(task: Keepable, folder: Path | None, readings: int) -> Part | None:
     except Exception:  # a damaged file raises whatever the libraries meet first
         return None
     whole = task.needed <= set(part) <= task.allowed
-    fits = all(array.dtype == np.float64 and array.shape[:2] == (task.size, readings) for array in part.values())
+    fits = all(array.dtype == np.float64 and array.shape[: len(leading)] == leading for array in part.values())
     return part if whole and fits else None
 
 

@@ -35,7 +35,7 @@ from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.steady import requirements
 from spirillum.units import show
 
-__all__ = ["PLACES_PER_FIELD", "TOLERANCE", "Band", "band_of", "band_places", "joined", "left_open"]
+__all__ = ["PLACES_PER_FIELD", "TOLERANCE", "Band", "band_of", "band_places", "joined", "left_open", "steepest_pitch"]
 
 PLACES_PER_FIELD = 3
 """Gaps, and pitches at each of them."""
@@ -161,6 +161,18 @@ def _steepest(g: RobotGeometry, radius: float, gap: float, drop: float, yaw: flo
         yaw=yaw,
     )
     return 0.0 if np.isnan(found) else found
+
+
+def steepest_pitch(batch: RobotBatch, gap: float) -> float:
+    """Steepest pitch, nose up, that a gap and the tail allow, rad; 0 where even a level robot has no room.
+
+    Args:
+        batch: one robot in a tube.
+        gap: of its body, m.
+    """
+    g, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])
+    known = batch.placement
+    return _steepest(g._replace(wavelength=1.0, hand=1.0), radius, gap, known.tail_drop, known.yaw)
 
 
 def at_place(batch: RobotBatch, place: Placement) -> RobotBatch:

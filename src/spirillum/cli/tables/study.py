@@ -19,5 +19,8 @@ def table(answer: Answer, console: Console) -> None:
     if any(answer["claims"].values()):
         claims = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
         console.print(f"statements of the paper: {claims}", highlight=False)
+    if answer.get("predictions"):
+        counts = ", ".join(f"{count} {verdict.replace('-', ': ')}" for verdict, count in answer["predictions"].items())
+        console.print(f"laid down and let go, nothing fitted: {counts}", highlight=False)
     console.print(f"observations: {escape(answer['observations'])}", highlight=False)
     console.print(f"open {escape(answer['folder'])}/report.html", highlight=False, soft_wrap=True)

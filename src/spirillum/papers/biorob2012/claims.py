@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from spirillum.papers.biorob2012 import claims_geometry, claims_swimming
+from spirillum.papers.biorob2012 import claims_geometry, claims_predicted, claims_swimming
 from spirillum.papers.biorob2012.evidence import Claim, Evidence
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["evaluated"]
+__all__ = ["evaluated", "foretold"]
 
 
 def evaluated(dataset: xr.Dataset) -> list[Claim]:
     """Hold a study that names this paper against its statements; empty for one of other channels."""
-    if "channel" not in dataset.dims:
-        return []
-    if not {"wide", "narrow"} <= {str(name) for name in dataset["channel"].values}:
+    if not _of_this_paper(dataset):
         return []
     evidence = Evidence(dataset)
     sources: tuple[Callable[[Evidence], Iterator[Claim]], ...] = (
@@ -35,3 +33,15 @@ def evaluated(dataset: xr.Dataset) -> list[Claim]:
         claims_geometry.method,
     )
     return [claim for source in sources for claim in source(evidence)]
+
+
+def foretold(dataset: xr.Dataset) -> list[Claim]:
+    """What robots that were laid down say of the statements, verdicts of a third kind; empty where none were."""
+    return claims_predicted.predicted(Evidence(dataset)) if _of_this_paper(dataset) else []
+
+
+def _of_this_paper(dataset: xr.Dataset) -> bool:
+    """Whether a study has the paper's channels."""
+    if "channel" not in dataset.dims:
+        return False
+    return {"wide", "narrow"} <= {str(name) for name in dataset["channel"].values}

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 __all__ = [
+    "BODY_DRAG_FACTORS",
     "BODY_ROTATION_ERROR",
     "FRAME_RATE",
     "GLOBAL_DROP",
@@ -58,6 +59,9 @@ LOW_REYNOLDS = 0.1
 
 BODY_ROTATION_ERROR = 0.5
 """Largest relative error of the predicted body rotation rates; text on Figs 5 and 6."""
+
+BODY_DRAG_FACTORS = {"wide": 1.95, "narrow": 3.6}
+"""Factors on the isolated body's drag along the axis; Table III."""
 
 ROBOT_LENGTH = 0.1
 """Lower bound of the prototype's length, m; text."""

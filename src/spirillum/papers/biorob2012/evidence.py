@@ -23,9 +23,12 @@ from spirillum.units import Hz
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NO_RATES", "Claim", "Evidence", "Verdict", "fraction_between", "in_hertz"]
+__all__ = ["NO_RATES", "Claim", "Evidence", "PredictedVerdict", "Verdict", "fraction_between", "in_hertz"]
 
 Verdict = Literal["agrees", "disagrees", "undecidable"]
+
+PredictedVerdict = Literal["predicted-agrees", "predicted-disagrees", "depends"]
+"""Of a third kind: what robots that are laid down and let go would do, with nothing fitted or observed."""
 
 NO_RATES = "the observed rates are lost; give an observations file to decide"
 
@@ -37,7 +40,7 @@ class Claim:
     claim: str
     paper: str
     computed: str
-    verdict: Verdict
+    verdict: Verdict | PredictedVerdict
     reason: str
 
     def to_dict(self) -> dict[str, str]:

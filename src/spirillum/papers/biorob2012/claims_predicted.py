@@ -1,0 +1,246 @@
+"""The paper's statements beside what its robots would do, laid down and let go with nothing fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Values
+from spirillum.papers.biorob2012.constants import (
+    BODY_DRAG_FACTORS,
+    BODY_ROTATION_ERROR,
+    GLOBAL_DROP,
+    LARGEST_REYNOLDS,
+    VELOCITY_DROPS,
+)
+from spirillum.papers.biorob2012.evidence import Claim, Evidence, PredictedVerdict
+from spirillum.papers.biorob2012.readings import Judgement, Readings
+from spirillum.studies.laid_down import INFERRED_BY
+from spirillum.units import Hz
+from spirillum.view.figures.style import label_of_model as label
+
+__all__ = ["predicted"]
+
+_EQUAL = 0.05
+"""Relative difference within which motor rates count as identical, as for observations."""
+
+
+def predicted(evidence: Evidence) -> list[Claim]:
+    """The verdicts of a study whose robots were laid down; empty for one without."""
+    if "forward_velocity_at_run" not in evidence.dataset:
+        return []
+    readings = Readings(evidence)
+    sources: tuple[Callable[[Readings], Iterator[Claim]], ...] = (
+        _reynolds_numbers,
+        _velocity_drops,
+        _global_drop,
+        _speeds,
+        _body_rotation,
+        _motor_rates,
+        _effective_friction,
+        _models,
+        _contact,
+    )
+    return [claim for source in sources for claim in source(readings)]
+
+
+def _range(values: Values, unit: str, scale: float = 1.0) -> str:
+    """Least and largest in words."""
+    known = scale * values[np.isfinite(values)]
+    if not known.size:
+        return "not computed"
+    return f"{known.min():.3g} to {known.max():.3g}{unit}"
+
+
+def _of_tails(average: Callable[..., Any], values: Values) -> Values:
+    """An average over the robots that a reading knows, (readings,); NaN where it knows none."""
+    found: Values = np.ma.filled(average(np.ma.masked_invalid(values), axis=0), np.nan)
+    return found
+
+
+def _reynolds_numbers(readings: Readings) -> Iterator[Claim]:
+    speeds = readings.of("forward_velocity")
+    for number, (channel, stated) in enumerate(LARGEST_REYNOLDS.items()):
+        tail = readings.evidence.tail(stated.wavelength_mm, stated.amplitude_mm)
+        if tail is None:
+            continue
+        seen, wanted = speeds[number][tail], readings.evidence.speed_of(stated.value)
+        found = readings.against(seen, wanted, "mm/s", 1e3)
+        yield readings.claim(
+            f"Largest Reynolds number, {channel} channel, at lambda = {stated.wavelength_mm:g} mm, "
+            f"B_o = {stated.amplitude_mm:g} mm",
+            f"{stated.value:g} (length scale not stated): {1e3 * wanted:.2f} mm/s on the body's diameter",
+            _range(seen, " mm/s", 1e3),
+            found._replace(reason=f"{found.reason}; a longer length in Re means a lower speed"),
+        )
+
+
+def _velocity_drops(readings: Readings) -> Iterator[Claim]:
+    speeds = readings.of("forward_velocity")
+    for which, (drop, wavelength, amplitude) in VELOCITY_DROPS.items():
+        tail = readings.evidence.tail(wavelength, amplitude)
+        if tail is None:
+            continue
+        drops = speeds[0][tail] - speeds[1][tail]
+        yield readings.claim(
+            f"The {which} velocity decrease, wide to narrow, at lambda = {wavelength:g} mm, B_o = {amplitude:g} mm",
+            f"{drop:g} mm/s",
+            _range(drops, " mm/s", 1e3),
+            readings.against(drops, 1e-3 * drop, "mm/s", 1e3),
+        )
+
+
+def _global_drop(readings: Readings) -> Iterator[Claim]:
+    wide, narrow = readings.of("forward_velocity")[:, readings.both]
+    if not wide.size:
+        return
+    loss = 1.0 - narrow.sum(axis=0) / wide.sum(axis=0)
+    found = readings.against(loss, GLOBAL_DROP, "%", 100.0)
+    if readings.missing:
+        found = Judgement("depends", f"no table: {readings.missing}, and it speaks of the mean of all")
+    yield readings.claim(
+        "Decrease of the global average velocity of all body-tail assemblies, wide to narrow",
+        f"{100 * GLOBAL_DROP:.1f} %",
+        f"{_range(loss, ' %', 100.0)} over {len(wide)} of {readings.both.size} tails",
+        found,
+    )
+    yield readings.claim(
+        "Robots travel slower in the narrow channel",
+        "all tails",
+        f"the narrow channel takes {_range(1.0 - narrow / wide, ' %', 100.0)} of the speed",
+        readings.judged(readings.holds(wide - narrow)),
+    )
+
+
+def _speeds(readings: Readings) -> Iterator[Claim]:
+    speeds = readings.of("forward_velocity")
+    rising, falling = np.diff(speeds, axis=1), -np.diff(speeds[:, :-1], axis=2)
+    for statement, steps in (
+        ("Forward velocity increases with wavelength", rising),
+        ("Forward velocity decreases with amplitude, except at lambda = 25 mm", falling),
+    ):
+        yield readings.claim(statement, "trend", _steps(steps), readings.judged(readings.holds(steps)))
+
+
+def _steps(steps: Values) -> str:
+    known = steps[np.isfinite(steps)]
+    if not known.size:
+        return "not computed"
+    return f"in {np.count_nonzero(known > 0)} of {known.size} steps of the grid and the readings"
+
+
+def _body_rotation(readings: Readings) -> Iterator[Claim]:
+    rates = np.abs(readings.of("body_rotation_rate"))
+    inside = np.minimum(rates - 10**-2.5 * Hz, 10**-0.5 * Hz - rates)
+    yield readings.claim(
+        "Body rotation rates are of the order of 1e-2 to 1e-1",
+        "1e-2 to 1e-1 (unit not stated)",
+        _range(rates, " Hz", 1.0 / Hz),
+        readings.judged(readings.holds(inside)),
+    )
+    errors = {
+        name: np.abs(readings.of("modelled_body_rotation_rate", name) / readings.of("body_rotation_rate") - 1.0)
+        for name in INFERRED_BY
+    }
+    within = np.minimum(*(BODY_ROTATION_ERROR - error for error in errors.values()))
+    yield readings.claim(
+        "SBT and RFT predict body rotation rates within 1 to 50 %, RFT with the large errors",
+        "1 to 50 %",
+        ", ".join(f"{label(name)} misses by {_range(error, ' %', 100.0)}" for name, error in errors.items()),
+        readings.judged(readings.holds(within)),
+    )
+
+
+def _motor_rates(readings: Readings) -> Iterator[Claim]:
+    rates = np.abs(readings.of("motor_rotation_rate"))
+    apart = np.abs(rates[1] / rates[0] - 1.0)
+    yield readings.claim(
+        "Motor rates are identical in wide and narrow channel",
+        "identical",
+        f"{_range(rates, ' Hz', 1.0 / Hz)}; they differ by {_range(apart, ' %', 100.0)}",
+        readings.judged(readings.holds(_EQUAL - apart)),
+    )
+    rising = np.diff(rates, axis=1)
+    for statement, steps in (
+        ("The motor's rate decreases with amplitude", -np.diff(rates, axis=2)),
+        ("The motor's rate increases with wavelength", rising),
+        ("The motor's rate saturates as the wavelength increases", -np.diff(rising, axis=1)),
+    ):
+        yield readings.claim(statement, "trend", _steps(steps), readings.judged(readings.holds(steps)))
+
+
+def _effective_friction(readings: Readings) -> Iterator[Claim]:
+    found = readings.of("effective_friction", "rft")
+    motor = readings.evidence.robot.motor
+    if readings.known.all():
+        by_wavelength = np.std(found.mean(axis=2), axis=1).mean(axis=0)
+        by_amplitude = np.std(found.mean(axis=1), axis=1).mean(axis=0)
+        spreads = f"over amplitudes {_range(by_amplitude, '')}, over wavelengths {_range(by_wavelength, '')}"
+        computed = f"spread {spreads} N m s/rad (RFT)"
+        judgement = readings.judged(readings.holds((by_amplitude - by_wavelength)[None]))
+    else:
+        computed, judgement = "not computed", Judgement("depends", f"no table: {readings.missing}")
+    statement = "B_eff depends mostly on the amplitude instead of the wavelength"
+    yield readings.claim(statement, "trend", computed, judgement)
+    if motor is None:
+        return
+    rotor = motor.joint_rotor_friction
+    yield readings.claim(
+        "Friction is not the rotor's alone",
+        "B_eff well above B_m",
+        f"B_eff {_range(found, ' N m s/rad')} by (18), {_range(found / rotor, ' times B_m')}",
+        readings.judged(readings.holds(found - 3.0 * rotor)),
+    )
+    with np.errstate(invalid="ignore"):
+        spread = np.fmax.reduce(found, axis=-1) / np.fmin.reduce(found, axis=-1) - 1.0
+    known = spread[np.isfinite(spread)]
+    if known.size:
+        moves = known > 0.5
+        verdict: PredictedVerdict = "depends"
+        if moves.all() or not moves.any():
+            verdict = "predicted-agrees" if moves.all() else "predicted-disagrees"
+        yield readings.claim(
+            "B_eff is dominated by the body-channel interaction",
+            "dominated",
+            f"over all gaps, films and contacts of a robot its B_eff changes by {_range(spread, ' %', 100.0)}",
+            Judgement(
+                verdict,
+                "(18) balances the rotor, film and contact act on the body: B_eff is the load of coupling and tail in "
+                "the tube that RFT's tail in unbounded fluid does not have",
+            ),
+        )
+
+
+def _models(readings: Readings) -> Iterator[Claim]:
+    seen = readings.of("forward_velocity")
+    missed = {name: (readings.of("modelled_forward_velocity", name) - seen)[readings.known] for name in INFERRED_BY}
+    errors = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
+    yield readings.claim(
+        "SBT predicts forward velocities better than RFT",
+        "SBT in better agreement",
+        ", ".join(f"{label(name)} {_range(error, ' mm/s', 1e3)}" for name, error in errors.items())
+        + " root mean square",
+        readings.judged(readings.holds((errors["rft"] - errors["sbt"])[None])),
+    )
+    factors = readings.of("body_drag_factor", "sbt")
+    for number, (channel, stated) in enumerate(BODY_DRAG_FACTORS.items()):
+        of_tails = factors[number][readings.known[number]]
+        if of_tails.size:
+            yield readings.claim(
+                f"Body drag factor that stands for the walls of the {channel} channel (Table III)",
+                f"{stated:g} D_x",
+                f"{_range(of_tails, '')} by inverting (15) with SBT's tail at the speeds and rates of the readings",
+                readings.against(_of_tails(np.ma.median, of_tails), stated, "", 1.0),
+            )
+
+
+def _contact(readings: Readings) -> Iterator[Claim]:
+    share = readings.of("contact_share")
+    yield readings.claim(
+        "The robot is in intermittent contact with the channel's surface",
+        "intermittent",
+        f"asperities touch for {_range(share, ' %', 100.0)} of the time",
+        readings.judged(readings.holds(np.minimum(share, 1.0 - share))),
+    )
