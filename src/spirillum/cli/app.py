@@ -256,7 +256,7 @@ def study(
         bool | None,
         typer.Option(
             "--band/--no-band",
-            help="Model tube: the band over gap and pitch too (many minutes), or not; else as the study says.",
+            help="Model tube: the band over gap and pitch too, or not; else as the study says.",
             show_default=False,
         ),
     ] = None,

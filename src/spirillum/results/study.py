@@ -52,7 +52,7 @@ def study(
         overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
         models: hydrodynamic models instead of the study's; None: the study's.
         band: compute models that compute the channel's walls over the places that the placement leaves open too
-            (many minutes), or not, instead of what the study says; None: what it says.
+            (seconds with tables, else many minutes), or not; None: what the study says.
         predicted: lay the robots down in their tubes and let them go too, over a design of gap, pitch, waiting time,
             roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
         workers: number of processes in which they are let go.

@@ -279,11 +279,13 @@ def _offset(outline: Outline, radius: float, gap: float, pitch: float, yaw: floa
     def spare(e: float) -> float:
         return Seat(radius, e, pitch, yaw=yaw).clearance(outline) - gap
 
-    centred = _centred(outline, radius, pitch, yaw)
-    if spare(centred) < 0:
+    # Between the two offsets with that gap there is more of it. Mostly the tube's axis lies between them, which saves
+    # the search for the middle.
+    between = 0.0 if spare(0.0) >= 0 else _centred(outline, radius, pitch, yaw)
+    if spare(between) < 0:
         return np.nan
     floor = radius + max(abs(float(x)) for p in outline.pieces for x in p.points(np.linspace(0.0, 1.0, 3))[0])
-    return float(brentq(spare, centred, floor, xtol=1e-13 * radius, rtol=1e-14))
+    return float(brentq(spare, between, floor, xtol=1e-13 * radius, rtol=1e-14))
 
 
 def _centred(outline: Outline, radius: float, pitch: float, yaw: float) -> float:

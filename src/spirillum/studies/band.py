@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.seat import GAP_SHARE
@@ -85,7 +85,9 @@ class BandTask:
 
     def answer(self, readings: Iterable[str]) -> Part:
         """Steady swimming at this place, (robots, friction readings); NaN where there is none."""
-        found = [joined([swim(robot, self.model, friction=reading) for robot in self.robots]) for reading in readings]
+        model = find_swimmer_model(self.model)
+        there = [_quickly(robot, model) for robot in self.robots]
+        found = [joined([swim(*pair, friction=reading) for pair in there]) for reading in readings]
         return {name: np.stack([getattr(one, name) for one in found], axis=-1) for name in AT_PLACES}
 
 
@@ -104,6 +106,12 @@ def band_tasks(loaded: LoadedStudy, first: int) -> Iterator[BandTask]:
                 number += 1
 
 
+def _quickly(robot: RobotBatch, model: SwimmerModel) -> tuple[RobotBatch, SwimmerModel]:
+    """A robot with the form of a model that answers first: from its table, or solved with the resolution of a band."""
+    quick = quickest(model, robot)
+    return (at_place(robot, robot.placement), model) if quick is model else (robot, quick)
+
+
 def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tuple[int, dict[int, RobotBatch]]]:
     """Number of a place of the band, and those of the robots that share it, by their number, at that place."""
     bands = {}
@@ -115,7 +123,7 @@ def _shared_places(robots: list[RobotBatch], model: SwimmerModel) -> Iterator[tu
         sharing: dict[tuple[float | None, float | None], dict[int, RobotBatch]] = {}
         for index, band in bands.items():
             key = (band[place].gap, band[place].pitch)
-            sharing.setdefault(key, {})[index] = at_place(robots[index], band[place])
+            sharing.setdefault(key, {})[index] = robots[index].placed(band[place])
         for there in sharing.values():
             yield place, there
 

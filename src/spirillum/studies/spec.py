@@ -112,7 +112,7 @@ class Study(Section):
     placement: Placement = Placement()
     """Where in their channels the robots lie, for models that compute the walls."""
     band: Annotated[bool, Field(strict=True)] = False
-    """Compute such models over the places that `placement` leaves open too, which takes many minutes."""
+    """Compute such models over the places that `placement` leaves open too: seconds with tables, else many minutes."""
     predicted: Annotated[bool, Field(strict=True)] = False
     """Lay the robots down in their tubes and let them go too, with nothing fitted: minutes."""
     laid_down: LaidDown = LaidDown()

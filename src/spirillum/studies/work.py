@@ -15,15 +15,16 @@ from spirillum.files import opened, whole_file
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.band import joined
 from spirillum.swimming.intervals import intervals_of
 from spirillum.swimming.prediction import accuracy_limits
-from spirillum.swimming.steady import requirements, speed_difference, swim
+from spirillum.swimming.steady import requirements, swim
 
 __all__ = [
     "AT_RATES",
@@ -94,6 +95,9 @@ _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work be
 _PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+
+QuickParts = Sequence[tuple[slice, RobotBatch, SwimmerModel]]
+"""Parts of a batch, their places in it, and the model that answers for each."""
 
 Part = dict[str, Values]
 """Arrays of one task: (robots, friction readings) or (robots, friction readings, rates)."""
@@ -182,13 +186,12 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
     """Compute one task."""
     study = loaded.study
     readings = study.friction
-    free = [swim(task.batch, task.model, friction=reading) for reading in readings]
+    quick = quick_parts(task.batch, task.model)
+    free = [_swum(quick, reading) for reading in readings]
     part: Part = {item.name: _stacked(free, item.name) for item in STEADY}
-    check = find_swimmer_model(task.model).checked_by(task.batch.options)
-    if check is not None:
-        checked = [swim(task.batch, check, friction=reading) for reading in readings]
-        pairs = zip(checked, free, strict=True)
-        part["error_estimate"] = np.stack([speed_difference(*pair) for pair in pairs], axis=-1)
+    errors = [_speed_errors(quick, reading, found) for reading, found in zip(readings, free, strict=True)]
+    if not np.isnan(errors).all():
+        part["error_estimate"] = np.stack(errors, axis=-1)
     valid = np.stack([result.valid for result in free], axis=-1)
     reason = _reasons(task.batch, task.model)[:, None]
     part["outside"] = np.where(valid, 0.0, np.where(reason == 0, REASONS.index("other"), reason))
@@ -196,11 +199,52 @@ def answer(task: Task, loaded: LoadedStudy, observed: ObservedArrays | None) -> 
         part |= _intervals(task, loaded, loaded.posterior)
     if observed is not None:
         tail, motor = observed.tail_rate[task.indices], observed.motor_rate[task.indices]
-        found = [swim(task.batch, task.model, tail_rate=tail, motor_rate=motor, friction=r) for r in readings]
+        found = [_swum(quick, r, tail, motor) for r in readings]
         part |= {f"{name}_at_observed_rate": _stacked(found, name) for name in AT_RATES}
     if study.assumed_motor_rates and task.batch.electrics is not None:
-        part |= _at_assumed_rates(task, study.assumed_motor_rates, readings)
+        part |= _at_assumed_rates(task, quick, study.assumed_motor_rates, readings)
     return part
+
+
+def quick_parts(batch: RobotBatch, name: str) -> QuickParts:
+    """A batch with the form of a model that answers first, robot by robot where some have a table and some have not."""
+    model = find_swimmer_model(name)
+    whole = quickest(model, batch)
+    if model.placed and whole is model:
+        parts = [(cut, block, quickest(model, block)) for cut, block in batch.blocks(1)]
+        if any(quick is not model for _, _, quick in parts):
+            return parts
+    return [(slice(0, batch.size), batch, whole)]
+
+
+def _swum(
+    quick: QuickParts, reading: str, tail_rate: PerRobot | None = None, motor_rate: PerRobot | None = None
+) -> Swimming:
+    """Steady swimming of all parts of a batch."""
+
+    def cut_of(rates: PerRobot | None, cut: slice) -> PerRobot | None:
+        return None if rates is None else rates[cut]
+
+    return joined(
+        [
+            swim(batch, model, tail_rate=cut_of(tail_rate, cut), motor_rate=cut_of(motor_rate, cut), friction=reading)
+            for cut, batch, model in quick
+        ]
+    )
+
+
+def _speed_errors(quick: QuickParts, reading: str, found: Swimming) -> PerRobot:
+    """Relative error of the forward velocities: against another resolution, or that of a table; NaN where unknown."""
+    errors = np.full(found.forward_velocity.size, np.nan)
+    for cut, batch, model in quick:
+        check = model.checked_by(batch.options)
+        if check is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                checked = swim(batch, check, friction=reading).forward_velocity
+                errors[cut] = np.abs(checked / found.forward_velocity[cut] - 1.0)
+        elif not model.closed_form:
+            errors[cut] = [model.stated_speed_error(block) for _, block in batch.blocks(1)]
+    return errors
 
 
 def _intervals(task: Task, loaded: LoadedStudy, posterior: PosteriorFile) -> Part:
@@ -228,15 +272,12 @@ def _stacked(results: Sequence[Swimming], name: str) -> Values:
     return np.stack([getattr(result, name) for result in results], axis=-1)
 
 
-def _at_assumed_rates(task: Task, rates: Sequence[float], readings: Sequence[str]) -> Part:
+def _at_assumed_rates(task: Task, quick: QuickParts, rates: Sequence[float], readings: Sequence[str]) -> Part:
     """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
     electrics = task.batch.electrics
     assert electrics is not None  # noqa: S101 - the caller has asked
     polarity = np.broadcast_to(electrics.polarity, (task.batch.size,))
-    curves = [
-        [swim(task.batch, task.model, motor_rate=rate * polarity, friction=reading) for rate in rates]
-        for reading in readings
-    ]
+    curves = [[_swum(quick, reading, motor_rate=rate * polarity) for rate in rates] for reading in readings]
     return {
         f"{name}_at_assumed_rate": np.stack([_stacked(curve, name) for curve in curves], axis=1) for name in AT_RATES
     }

@@ -216,7 +216,7 @@ def _effective_friction(readings: Readings) -> Iterator[Claim]:
 def _models(readings: Readings) -> Iterator[Claim]:
     seen = readings.of("forward_velocity")
     missed = {name: (readings.of("modelled_forward_velocity", name) - seen)[readings.known] for name in INFERRED_BY}
-    errors = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
+    errors: dict[str, Values] = {name: np.sqrt(_of_tails(np.ma.mean, miss**2)) for name, miss in missed.items()}
     yield readings.claim(
         "SBT predicts forward velocities better than RFT",
         "SBT in better agreement",

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Values
+from spirillum.arrays import Flags, Values
 from spirillum.papers.biorob2012.evidence import Claim, Evidence, PredictedVerdict
 from spirillum.studies.design import main_effects
 from spirillum.studies.laid_down import READ, WINDOWS, levels_of_readings
@@ -43,9 +43,9 @@ class Readings:
         self._dataset = evidence.dataset
         self._levels = levels_of_readings()
         speeds = self.of("forward_velocity")
-        self.known = np.isfinite(speeds).any(axis=-1)
+        self.known: Flags = np.asarray(np.isfinite(speeds).any(axis=-1))
         """Whether a robot was laid down, (channel, wavelength, amplitude)."""
-        self.both = self.known.all(axis=0)
+        self.both: Flags = np.asarray(self.known.all(axis=0))
         """Whether a tail was laid down in both channels, (wavelength, amplitude)."""
 
     def of(self, name: str, inferred_by: str | None = None) -> Values:
