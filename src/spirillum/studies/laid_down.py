@@ -25,7 +25,7 @@ from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
-from spirillum.studies.design import Levels, half_fraction
+from spirillum.studies.factorial import Levels, half_fraction
 from spirillum.studies.spec import LaidDown, LoadedStudy
 from spirillum.studies.work import Indices, Part
 from spirillum.swimming.band import steepest_pitch

@@ -9,7 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Values
 from spirillum.quantities import QUANTITIES, attributes
-from spirillum.studies.design import main_effects
+from spirillum.studies.factorial import main_effects
 from spirillum.studies.laid_down import (
     AT_RUNS,
     FACTORS,

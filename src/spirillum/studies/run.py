@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.processes import as_they_come
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
 from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_table
@@ -116,29 +113,9 @@ def _laid_down(
     done = len(runs) - len(todo)
     if todo:
         tell(todo[0].words, done)
-    for task, made in _let_go(todo, workers):
+    for task, made in as_they_come(LaidDownTask.answer, todo, workers):
         found[task.number] = made
         keep(task, made, parts)
         done += 1
         tell(task.words, done)
     return [(task, part) for task in runs if (part := found[task.number]) is not None]
-
-
-def _let_go(todo: Sequence[LaidDownTask], workers: int) -> Iterator[tuple[LaidDownTask, Part]]:
-    """Answers of tasks as they come, in this process or in several."""
-    if workers == 1 or len(todo) < 2:
-        for task in todo:
-            yield task, task.answer()
-        return
-    pool = ProcessPoolExecutor(min(workers, len(todo)), mp_context=get_context("spawn"))
-    try:
-        waiting = {pool.submit(task.answer): task for task in todo}
-        for future in as_completed(waiting):
-            yield waiting[future], future.result()
-    except BrokenProcessPool as error:
-        raise InputError(
-            f"a process of {workers} that run robots was ended from outside, as for want of memory; allowed: workers = "
-            "1, or more memory; what was done is kept where the study has a folder"
-        ) from error
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)

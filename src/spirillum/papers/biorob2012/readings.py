@@ -13,7 +13,7 @@ import numpy as np
 
 from spirillum.arrays import Flags, Values
 from spirillum.papers.biorob2012.evidence import Claim, Evidence, PredictedVerdict
-from spirillum.studies.design import main_effects
+from spirillum.studies.factorial import main_effects
 from spirillum.studies.laid_down import READ, WINDOWS, levels_of_readings
 from spirillum.units import show
 
