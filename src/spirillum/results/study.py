@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer import envelope
+from spirillum.errors import InputError
 from spirillum.files import output_folder, protected, results_folder, write_dataset
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.papers.registry import claims_of, predictions_of
@@ -67,6 +68,8 @@ def study(
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
+    if workers < 1:
+        raise InputError(f"workers = {workers}; allowed: a whole number of at least 1")
     question = paper_study() if source is None else source
     loaded = load_study(
         question,
