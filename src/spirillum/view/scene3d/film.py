@@ -19,6 +19,7 @@ from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.robot import Robot
 from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.view.scene3d.encode import FILMS, film_writer
+from spirillum.view.scene3d.inset import CrossSection
 from spirillum.view.scene3d.show import checked_size, glass_around, shown_points
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ __all__ = ["CAMERAS", "Film", "film"]
 
 CAMERAS = ("auto", "fixed", "follow")
 """Motion of the camera; `auto`: it follows a robot that swims further than half of its length."""
+_ALONG = ("front", "rear")
+"""Views that show the cross-section themselves."""
 _MOST_FRAMES = 20_000
 _SLOWEST, _FASTEST = 1e-6, 1e4
 _LARGEST_TURN = 0.25
@@ -88,7 +91,7 @@ def film(
     camera: str = "auto",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Film:
-    """Film a run.
+    """Film a run; one in a tube with the cross-section in a corner.
 
     Args:
         dataset: what `spirillum.simulate` returns, or the file with it.
@@ -125,7 +128,10 @@ def film(
     turn, warnings = _aliasing(poses, times, speed)
     model = str(dataset.attrs.get("model", ""))[:60]
     words = {"title": robot.name, "comment": f"computed motion and geometry, {MARK}"}
-    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset))
+    inset = None
+    if "azimuth" in dataset and robot.channel is not None and view not in _ALONG:
+        inset = CrossSection(pixels, robot, poses)
+    shots = _Shots(solids, poses, seen_from, pixels, follows=follows, middle=_channel_middle(dataset), inset=inset)
     tell = progress or (lambda _what, _done, _total: None)
     with whole_file(target) as temporary, film_writer(temporary, pixels, fps, words) as writer:
         with closing(shots.images(times, f"model {model}" if model else "", speed)) as images:
@@ -148,8 +154,10 @@ class _Shots:
         *,
         follows: bool,
         middle: float | None,
+        inset: CrossSection | None,
     ) -> None:
         self._solids, self._poses, self._view, self._size, self._follows = solids, poses, view, size, follows
+        self._inset = inset
         in_glass = solids.robot.channel is not None
         self._free = np.array([1.0, 0.0, 0.0]) if in_glass else np.ones(3)
         """Directions in which the camera follows: in a channel along its axis."""
@@ -192,6 +200,8 @@ class _Shots:
                 scene.look(self._camera_at(pose, first))
                 image = words(scene.image())
                 stamp.write(image, float(time))
+                if self._inset is not None:
+                    self._inset.write(image, float(time), pose)
                 yield image
 
     def _camera_at(self, pose: Pose, first: Pose) -> Camera:
