@@ -33,6 +33,15 @@ def test_no_robot_is_one_sentence(run) -> None:  # type: ignore[no-untyped-def]
     assert "no robot; allowed: a preset's name" in outcome.err
 
 
+def test_of_several_robots_the_one_that_has_no_table_is_named() -> None:
+    bath = sp.load("biorob2012-narrow", channel="none", name="bath")
+    with pytest.raises(sp.InputError, match=r"^bath.*channel"):
+        sp.prepare_all(["biorob2012-wide", bath])
+    wide = sp.load("biorob2012-wide", name="wide tail", **{"tail.amplitude": "15 mm", "tail.wavelength": "40 mm"})
+    with pytest.raises(sp.InputError, match=r"^wide tail.*tail.amplitude = 15 mm"):
+        sp.prepare_all(["biorob2012-wide", wide])
+
+
 def test_a_table_that_is_not_kept_says_so() -> None:
     found = sp.prepare("biorob2012-wide")
     assert not [sentence for sentence in found.warnings if "SPIRILLUM_CACHE" in sentence]

@@ -13,11 +13,13 @@ from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
+from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.responses import RESPONSES
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import range_of
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import prepared
 
@@ -132,15 +134,28 @@ def prepare_all(
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
-    # A table holds for all places: the robot is checked on the axis, where a tail wider than its body is off the glass.
-    ready = [prepared(robot, "tube", placement={"eccentricity": 0.0}) for robot in robots]
-    asked = [_asked(batch) for _, _, batch in ready]
+    loaded = [load(robot) for robot in robots]
+    asked = [_checked(robot, several=len(loaded) > 1) for robot in loaded]
     new = {key_of(*robot) for robot in asked if find_table(*robot) is None}
     tables = prepared_tables(asked, workers=workers, progress=progress)
     return tuple(
         Prepared(robot, table, kept=tables_are_kept() or table.key not in new)
-        for (robot, _, _), table in zip(ready, tables, strict=True)
+        for robot, table in zip(loaded, tables, strict=True)
     )
+
+
+def _checked(robot: Robot, *, several: bool) -> tuple[RobotGeometry, float]:
+    """What decides the table of a robot that has one; named in the sentence of an error where there are several."""
+    # A table holds for all places: a robot is checked on the axis, where a tail wider than its body is off the glass.
+    _, _, batch = prepared(robot, "tube", placement={"eccentricity": 0.0})
+    try:
+        asked = _asked(batch)
+        _ = Places(*asked).gaps
+    except InputError as error:
+        if not several:
+            raise
+        raise InputError(f"{robot.name}: {error}") from error
+    return asked
 
 
 _MOST_WORKERS = 64
