@@ -8,11 +8,12 @@ import pytest
 
 import spirillum as sp
 from spirillum.calibration.experiment import read_experiment
-from spirillum.calibration.forward import Forward, tabulated
+from spirillum.calibration.forward import Forward
 from spirillum.calibration.problem import posed
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
+from spirillum.swimming.drawn_resistance import AxialTable, chebyshev_points
 
 VISCOSITY = np.array([3.5])
 PRESETS = ["biorob2012-wide", "biorob2012-narrow"]
@@ -47,7 +48,9 @@ def test_coefficients_of_resistive_force_theory_are_factors(made: Callable[..., 
     problem = posed(experiment, "rft", ("normal_factor", "tangential_factor"))
     z = problem.coordinate_of({"normal_factor": np.array(1.4), "tangential_factor": np.array(0.8)})
     options = {"model.rft.normal_factor": 1.4, "model.rft.tangential_factor": 0.8}
-    changed = tabulated([RobotBatch.of([_with_tail(r, options) for r in experiment.robots])], find_swimmer_model("rft"))
+    changed = AxialTable.of(
+        RobotBatch.of([_with_tail(r, options) for r in experiment.robots]), find_swimmer_model("rft")
+    )
     truth = Forward(changed, None, VISCOSITY).predict({})
     found = problem.predicted(z[None])
     assert found["advance"][0] == pytest.approx(truth.advance[0], rel=1e-12)
@@ -60,18 +63,14 @@ def _with_tail(robot, options):
 
 
 def test_interpolation_converges_as_fast_as_its_points_say(made: Callable[..., Path]) -> None:
-    from spirillum.calibration.forward import axis_points
-
     experiment = read_experiment(made(), [load(name) for name in PRESETS])
     batch, model = RobotBatch.of(experiment.robots), find_swimmer_model("sbt")
     at = {"wire_diameter": np.full((1, 1), 1.13e-3)}
-    exact = Forward(tabulated([batch.with_values({"tail.wire_diameter": 1.13e-3})], model), None, VISCOSITY)
+    exact = Forward(AxialTable.of(batch.with_values({"tail.wire_diameter": 1.13e-3}), model), None, VISCOSITY)
     errors = []
     for count in (3, 5, 7):
-        points, values = axis_points("wire_diameter", count, 0.7e-3, 1.4e-3)
-        batches = [batch.with_values({"tail.wire_diameter": value}) for value in values]
-        table = Forward(tabulated(batches, model, ["wire_diameter"], [points]), None, VISCOSITY)
-        errors.append(table.interpolation_error(exact, at))
+        table = AxialTable.of(batch, model, wires=chebyshev_points(count, 0.7e-3, 1.4e-3))
+        errors.append(Forward(table, None, VISCOSITY).largest_difference(exact, at))
     assert errors[1] < 0.05 * errors[0]
     assert errors[2] < 0.05 * errors[1]
     assert posed(experiment, "sbt", ("body_drag", "wire_diameter")).interpolation_error < 1e-6

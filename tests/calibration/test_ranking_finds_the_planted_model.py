@@ -93,7 +93,7 @@ def test_failures_say_on_which_scale_they_are(ranking: Any, capsys: pytest.Captu
 
 def test_models_without_common_free_numbers_are_refused(made: Callable[..., Path]) -> None:
     with pytest.raises(InputError, match="'tube' has no body_drag to fit, and models are ranked with the same free"):
-        sp.rank_models(made(), models=["tube", "sbt"])
+        sp.rank_models(made(), models=["tube", "sbt"], free="body_drag")
 
 
 def test_a_single_model_is_no_ranking(made: Callable[..., Path]) -> None:

@@ -62,6 +62,7 @@ def fit_model(
     friction: str = "rotor",
     assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
+    prepare: bool = False,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Fit parameters of a model to observed speeds and rates.
@@ -77,6 +78,7 @@ def fit_model(
             `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
             taken as exact.
         sampling: how the posterior is sampled.
+        prepare: for `tube`, make the robots' tables that are not there, some minutes each.
         progress: told what is being done.
 
     Raises:
@@ -95,7 +97,7 @@ def fit_model(
     experiment = read_experiment(observations, given_robots(robots))
     if free is None and not _has_motor(experiment):
         names = tuple(name for name in names if name != "friction")
-    problem = posed(experiment, model, names, progress, assumed)
+    problem = posed(experiment, model, names, progress, assumed, prepare=prepare)
     if method == "paper":
         return _by_paper(problem, friction)
     fit = least_squares_fit(problem)

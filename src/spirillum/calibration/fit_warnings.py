@@ -240,11 +240,9 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]
                 "and not in rad/s (6.3 times larger)?"
             )
     if problem.interpolation_error > 0:
-        error = problem.table_error
-        parts = f" (interpolation {percent(error.interpolation)}, coarse resolution of the table "
-        parts += f"{percent(error.resolution)})"
+        where = "at places that were not used for them" if problem.model.placed else "at one wire between their points"
         found.append(
-            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction"
-            f"{parts if error.resolution > 0 else ''}, checked at one place between the points of the table"
+            f"resistances are interpolated: {percent(problem.interpolation_error)} largest error of a prediction, "
+            f"checked {where}"
         )
     return found

@@ -1,37 +1,33 @@
 """From parameters to what is observed: the force balance for many draws and many robots at once.
 
-The resistance of every robot is computed once. What is left for a draw of the parameters is a 3x3 balance for each
-robot, in closed form. Over parameters that change the geometry (wire, gap, pitch) resistances are interpolated by
-polynomials through Chebyshev points, whose error is measured at points in between.
+The resistance of every robot is computed once, or looked up at each draw's place in the tube
+(`spirillum.swimming.drawn_resistance`). What is left for a draw of the parameters is a 3x3 balance for each robot, in
+closed form.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from spirillum.arrays import Samples
+from spirillum.arrays import PerRobot, Samples, Values
 from spirillum.errors import InputError
-from spirillum.fluid.closed.perrin import body_axial
-from spirillum.fluid.model import SwimmerModel
-from spirillum.robot.batch import Electrics, RobotBatch
+from spirillum.robot.batch import Electrics
 from spirillum.swimming.balance import (
     TorqueBalance,
     body_per_tail,
     force_free,
     friction_torques,
-    joined,
     rates_per_torque,
     with_body_factors,
 )
+from spirillum.swimming.drawn_resistance import DrawnResistance, Draws
+from spirillum.swimming.dry_friction import with_dry_friction
 from spirillum.swimming.motor import steady_current
 
-__all__ = ["Draws", "Forward", "Predicted", "Table", "TableError", "axis_points", "kinematics", "tabulated"]
-
-Draws = Mapping[str, Samples]
-"""Parameter to values, (draws, robots) or (draws, 1)."""
+__all__ = ["DryContact", "Forward", "Predicted", "kinematics"]
 
 
 @dataclass(frozen=True)
@@ -51,161 +47,45 @@ class Predicted:
 
 
 @dataclass(frozen=True)
-class Table:
-    """Balance matrices over tabulated parameters; with none of them a single point.
+class DryContact:
+    """What dry friction under the robots depends on, beside its coefficient."""
 
-    `parts` are summands: the first with factor one, the others with those of RFT's coefficients.
-    """
-
-    names: tuple[str, ...]
-    """Tabulated parameters."""
-    nodes: tuple[Samples, ...]
-    """The points of each axis, as `axis_points` gives them."""
-    parts: tuple[Samples, ...]
-    """(points..., robots, 3, 3): rows force on the whole, torque on body, on rotor; columns U, Omega, omega."""
-    drag: Samples
-    """D_x of each robot, N s/m."""
-    rotation: Samples
-    """E_x of each robot, N m s."""
-
-
-@dataclass(frozen=True)
-class TableError:
-    """Largest relative errors of what a table predicts, at a place between its points; zeros without a table."""
-
-    interpolation: float = 0.0
-    """Against the model solved there as finely as at the points."""
-    resolution: float = 0.0
-    """Of the model solved as finely as at the points, against its own resolution."""
-    total: float = 0.0
-    """Of the table, against the model at its own resolution."""
-
-    @property
-    def largest(self) -> float:
-        """What no prediction is taken to be better than; the parts may happen to cancel at one place."""
-        return max(self.interpolation, self.resolution, self.total)
-
-
-def _parts(batch: RobotBatch, model: SwimmerModel, *, coefficients: bool) -> tuple[Samples, ...]:
-    """Summands of the balance matrix; RFT is linear in both of its coefficients."""
-    whole = np.broadcast_to(joined(model.axial(batch)), (batch.size, 3, 3))
-    if not coefficients:
-        return (whole,)
-    own = batch.options.rft
-    found = []
-    for name in ("normal_factor", "tangential_factor"):
-        value = getattr(own, name)
-        doubled = own.model_copy(update={name: 2.0 * value})
-        other = replace(batch, options=batch.options.model_copy(update={"rft": doubled}))
-        found.append((joined(model.axial(other)) - whole) / value)
-    rest = whole - own.normal_factor * found[0] - own.tangential_factor * found[1]
-    return rest, found[0], found[1]
-
-
-def axis_points(name: str, count: int, low: float, high: float) -> tuple[Samples, Samples]:
-    """Chebyshev points of the first kind along a parameter: along its logarithm for lengths, and its values there."""
-    ends = _along(name, np.array([low, high]))
-    angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
-    points = 0.5 * (ends[0] + ends[1]) - 0.5 * (ends[1] - ends[0]) * np.cos(angle)
-    return points, points if name in _LINEAR else np.exp(points)
-
-
-_LINEAR = ("pitch",)
-"""Tabulated parameters that may be zero."""
-
-
-def _along(name: str, values: Samples) -> Samples:
-    return values if name in _LINEAR else np.log(values)
-
-
-def tabulated(
-    batches: Iterable[RobotBatch],
-    model: SwimmerModel,
-    names: Sequence[str] = (),
-    nodes: Sequence[Samples] = (),
-    *,
-    coefficients: bool = False,
-) -> Table:
-    """Compute the resistances at every point of the table.
-
-    Args:
-        batches: the robots at each point, the last axis fastest; one batch where nothing is tabulated.
-        model: the hydrodynamic model.
-        names: tabulated parameters.
-        nodes: points of each axis.
-        coefficients: whether RFT's coefficients are free.
-    """
-    shape = tuple(axis.size for axis in nodes)
-    found, first = [], None
-    for batch in batches:
-        first = first or batch
-        found.append(_parts(batch, model, coefficients=coefficients))
-    assert first is not None  # noqa: S101 - a table has a point
-    size = first.size
-    drag, rotation = body_axial(first)
-    return Table(
-        names=tuple(names),
-        nodes=tuple(nodes),
-        parts=tuple(np.stack(part).reshape(*shape, size, 3, 3) for part in zip(*found, strict=True)),
-        drag=np.broadcast_to(drag, (size,)),
-        rotation=np.broadcast_to(rotation, (size,)),
-    )
-
-
-def _weights(nodes: Samples, at: Samples) -> Samples:
-    """Weights of the points for polynomial interpolation (barycentric form), with one more axis at the end."""
-    count = nodes.size
-    angle = (2.0 * np.arange(count) + 1.0) * np.pi / (2.0 * count)
-    signs = (-1.0) ** np.arange(count) * np.sin(angle)
-    distance = at[..., None] - nodes
-    hit = np.abs(distance) < 1e-14 * np.ptp(nodes)
-    raw = signs / np.where(hit, 1.0, distance)
-    raw = np.where(np.any(hit, axis=-1, keepdims=True), hit, raw)
-    found: Samples = raw / raw.sum(axis=-1, keepdims=True)
-    return found
+    weight: PerRobot
+    """Weight in the fluid, N."""
+    radius: PerRobot
+    """Of the body, m."""
+    tail_rate: PerRobot
+    """Observed rate of the tail, rad/s."""
 
 
 @dataclass(frozen=True)
 class Forward:
     """The robots of an experiment, ready to be asked."""
 
-    table: Table
+    resistance: DrawnResistance
     electrics: Electrics | None
     """Motor and battery of the robots."""
     viscosity: Samples
-    """The robots' own, to which the table belongs, Pa s."""
+    """The robots' own, Pa s."""
+    isolated: tuple[Values, Values] = (np.zeros(1), np.zeros(1))
+    """D_x, N s/m, and E_x, N m s, of each robot's body alone at its own viscosity, on which the factors act."""
     factors: Mapping[str, Samples] = field(default_factory=dict)
     """The robots' own factors, where they are not free; 1 where they have none."""
+    contact: DryContact | None = None
+    """Where dry friction under the robots may be drawn."""
 
     def matrices(self, draws: Draws) -> Samples:
-        """Balance matrices, (draws, robots, 3, 3), with all factors in them."""
-        table = self.table
-        parts = [self._at(part, draws) for part in table.parts]
-        m = parts[0]
-        for part, name in zip(parts[1:], ("normal_factor", "tangential_factor"), strict=False):
-            m = m + np.asarray(draws.get(name, self.factors.get(name, 1.0)))[..., None, None] * part
-        drag, rotation = (
-            np.asarray(draws.get(name, self.factors.get(name, 1.0))) for name in ("body_drag", "body_rotation")
+        """Balance matrices, (draws, robots, 3, 3), with all factors and dry friction in them."""
+        scale = np.asarray(draws["viscosity"]) / self.viscosity if "viscosity" in draws else 1.0
+        factors = [np.asarray(draws.get(name, self.factors.get(name, 1.0))) for name in ("body_drag", "body_rotation")]
+        drag, rotation = self.isolated
+        full = with_body_factors(
+            self.resistance.whole(draws), (factors[0], factors[1]), (scale * drag, scale * rotation)
         )
-        full = with_body_factors(m, (drag, rotation), (table.drag, table.rotation))
-        if "viscosity" in draws:
-            full = full * (np.asarray(draws["viscosity"]) / self.viscosity)[..., None, None]
-        return full
-
-    def _at(self, part: Samples, draws: Draws) -> Samples:
-        """Interpolate a part at the draws, (draws, robots, 3, 3)."""
-        if not self.table.names:
-            return part[None]
-        robots = part.shape[-3]
-        weights = [
-            _weights(nodes, _along(name, np.broadcast_to(draws[name], (draws[name].shape[0], robots))))
-            for name, nodes in zip(self.table.names, self.table.nodes, strict=True)
-        ]
-        if len(weights) == 1:
-            along: Samples = np.einsum("wja,ajkl->wjkl", weights[0], part)
-            return along
-        both: Samples = np.einsum("wja,wjb,abjkl->wjkl", weights[0], weights[1], part, optimize=True)
-        return both
+        if self.contact is None or "friction_coefficient" not in draws:
+            return full
+        force = np.asarray(draws["friction_coefficient"]) * self.contact.weight
+        return with_dry_friction(full, force, self.contact.radius, self.contact.tail_rate)
 
     def balance(self, draws: Draws) -> TorqueBalance:
         """Force-free torque balances, (draws, robots)."""
@@ -276,9 +156,9 @@ class Forward:
         }
         return replace(self.electrics, **changed)
 
-    def interpolation_error(self, other: Forward, draws: Draws) -> float:
-        """Largest relative difference of advance and turning from resistances that were computed at the draws."""
-        ours, theirs = self.predict(draws), other.predict({k: v for k, v in draws.items() if k not in self.table.names})
+    def largest_difference(self, other: Forward, draws: Draws) -> float:
+        """Largest relative difference of what both predict at draws."""
+        ours, theirs = self.predict(draws), other.predict(draws)
         pairs = ((ours.advance, theirs.advance), (ours.turning, theirs.turning), (ours.load, theirs.load))
         return max(float(np.max(np.abs(a / b - 1.0))) for a, b in pairs)
 

@@ -85,14 +85,14 @@ def paper_fit(problem: Problem) -> PaperFit:
 
 def _inverted(problem: Problem) -> tuple[dict[str, Samples], dict[str, Samples]]:
     """Factors of each robot by itself, and their weights."""
-    experiment, table = problem.experiment, problem.forward.table
+    experiment, isolated = problem.experiment, problem.forward.isolated
     one = np.ones((1, 1))
     m = problem.forward.matrices({"body_drag": one, "body_rotation": one})[0]
     force, torque = m[:, 0, :], m[:, 1, :] + m[:, 2, :]
     u, seen = experiment.advance.mean, experiment.turning.mean
     turning = np.where(np.isnan(seen), problem.forward.predict({}).turning[0], seen)
     rates = np.stack([u, turning, np.ones_like(u)], axis=-1)
-    drag, rotation = table.drag * u, table.rotation * seen
+    drag, rotation = isolated[0] * u, isolated[1] * seen
     by_robot = {
         "body_drag": 1.0 - np.sum(force * rates, axis=-1) / drag,
         "body_rotation": 1.0 - np.sum(torque * rates, axis=-1) / rotation,

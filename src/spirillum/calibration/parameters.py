@@ -131,8 +131,6 @@ class Parameter:
     """Why its prior is as it is."""
     needs_motor: bool = False
     """Whether it acts on the motor's rate, so that the motor has to be predicted."""
-    tabulated: bool = False
-    """Whether resistances are interpolated over it."""
 
 
 _ALL = ("sbt", "rft", "slender", "tube")
@@ -194,7 +192,6 @@ _LISTED = (
         "all",
         ("sbt", "rft", "slender"),
         "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
-        tabulated=True,
     ),
     Parameter(
         "viscosity",
@@ -230,7 +227,6 @@ _LISTED = (
         "channel",
         ("tube",),
         "anywhere in the band of `predict`, from a ninetieth to a ninth of the body's radius",
-        tabulated=True,
     ),
     Parameter(
         "pitch",
@@ -239,7 +235,23 @@ _LISTED = (
         "channel",
         ("tube",),
         "anywhere from level to the steepest that every tail of the channel allows",
-        tabulated=True,
+    ),
+    Parameter(
+        "roughness",
+        "height of the asperities on which the robot lies: its gap, one for all channels",
+        "m",
+        "all",
+        ("tube",),
+        "from polished surfaces to burrs and seams, 1e-4 to 1e-2 of the body's radius",
+    ),
+    Parameter(
+        "friction_coefficient",
+        "coefficient of dry friction where the asperities carry the robot's weight",
+        "",
+        "all",
+        ("tube",),
+        "around 0.1, 95 % from 0.02 to 0.5: between asperities with a lubricant 0.05 to 0.15, dry more (Bowden and "
+        "Tabor, The Friction and Lubrication of Solids, 1950)",
     ),
 )
 PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _LISTED}
@@ -300,6 +312,16 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
             )
     if "friction" in names and "shared_friction" in names:
         raise InputError("free = 'friction' together with 'shared_friction'; allowed: one of them")
+    if "gap" in names and "roughness" in names:
+        raise InputError(
+            "free = 'gap' together with 'roughness': a robot that lies on its asperities has their height for its gap; "
+            "allowed: one of them"
+        )
+    if "friction_coefficient" in names and "roughness" not in names:
+        raise InputError(
+            "free = 'friction_coefficient' without 'roughness': dry friction acts where the robot lies on its "
+            "asperities, whose height is then its gap; allowed: roughness too"
+        )
     bound = [name for name in names if PARAMETERS[name].needs_motor] if "friction" in names else []
     if bound:
         fields = {name: field for field, name in ASSUMABLE.items()}

@@ -100,6 +100,7 @@ def _tails(found: Calibrated) -> list[dict[str, Any]]:
                 "channel_diameter": robot.channel.diameter if robot.channel else None,
                 "wavelength": robot.tail.wavelength,
                 "amplitude": robot.tail.amplitude,
+                "tail_rate": float(experiment.tail_rate[place]) if np.isfinite(experiment.tail_rate[place]) else None,
                 "seen": seen,
                 "by_motor": bool(experiment.by_motor[place]),
                 "correlation": experiment.correlation,

@@ -10,7 +10,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.calibration.experiment import Experiment, Quantity, Ratio
-from spirillum.calibration.forward import Draws, Forward, TableError, axis_points, kinematics, tabulated
+from spirillum.calibration.forward import Forward, kinematics
+from spirillum.calibration.in_tube import Ranges, place_ranges, tube_forward
 from spirillum.calibration.parameters import (
     ASSUMABLE,
     PARAMETERS,
@@ -21,10 +22,12 @@ from spirillum.calibration.parameters import (
     Uniform,
 )
 from spirillum.errors import InputError
+from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
+from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 
 __all__ = ["Problem", "Progress", "posed", "stated_spread"]
@@ -35,6 +38,8 @@ _FACTOR_SPREADS = {"body_drag": (2.0, 1.0), "body_rotation": (1.0, 1.0)}
 _COEFFICIENT_SPREAD = 0.5
 _TOLERANCE_SPREAD = 0.1
 _FRICTION_SPREAD = 1.5
+_LOG_NORMAL = {**_FACTOR_SPREADS, "friction_coefficient": (0.1, 0.8)}
+"""Medians of log-normal priors that are the same for all robots, and standard deviations of the logarithm."""
 _WIRE_POINTS = 9
 _WIRE_RANGE = 5.0  # standard deviations that the table reaches to either side
 
@@ -50,18 +55,13 @@ class Problem:
     coordinates: tuple[Coordinate, ...]
     """Free numbers; friction tail by tail is none, for it follows from the others."""
     forward: Forward
-    table_error: TableError
-    """Largest relative errors of tabulated resistances in what they predict."""
+    interpolation_error: float
+    """Relative error of interpolated resistances, that no prediction is taken to be better than; 0 without any."""
     fixed_friction: Samples
     """B_eff of each robot where it is not free, N m s/rad; the rotor's own where unset."""
     assumed: Mapping[str, float] = field(default_factory=dict)
     """Parameter to its stated uncertainty, half of a relative 95 % interval: a prior where it is free, else a share of
     the interval of B_eff alone."""
-
-    @property
-    def interpolation_error(self) -> float:
-        """Relative error that no prediction is taken to be better than; 0 without a table."""
-        return self.table_error.largest
 
     @cached_property
     def by_motor_rate(self) -> bool:
@@ -90,7 +90,10 @@ class Problem:
             Parameter to (draws, robots), or (draws, 1) where all robots share it.
         """
         values = self._all_values(z)
-        return {name: values[:, places] for name, places in self._places.items()}
+        found = {name: values[:, places] for name, places in self._places.items()}
+        if "roughness" in found:  # a robot that lies on its asperities
+            found["gap"] = found["roughness"]
+        return found
 
     @cached_property
     def _places(self) -> dict[str, np.ndarray]:
@@ -193,6 +196,8 @@ def posed(
     free: Sequence[str],
     progress: Progress | None = None,
     assumed: Mapping[str, float] | None = None,
+    *,
+    prepare: bool = False,
 ) -> Problem:
     """Set a fit up: check that the model holds for every robot, compute resistances, lay out the free numbers.
 
@@ -203,9 +208,10 @@ def posed(
         progress: told what is being computed.
         assumed: parameter to its stated uncertainty, half of a relative 95 % interval. Where the motor's rate is
             compared, such a parameter is free too, with that for its prior.
+        prepare: for `tube`, make the robots' tables that are not there.
 
     Raises:
-        InputError: if a robot is outside the model's domain, or has not what a parameter needs.
+        InputError: if a robot has no table, is outside the model's domain, or has not what a parameter needs.
     """
     stated = dict(assumed or {})
     free = _with_assumed(free, stated)
@@ -214,7 +220,13 @@ def posed(
     _check_domain(experiment, chosen, batch)
     _check_motor(experiment, free, batch)
     parameters = [PARAMETERS[name] for name in free if PARAMETERS[name].scope != "tail"]
-    forward, ranges, error = _forward(experiment, chosen, batch, parameters, progress or (lambda _w, _d, _t: None))
+    tell = progress or (lambda _what, _done, _total: None)
+    ranges: Ranges = {}
+    if chosen.placed:
+        ranges = place_ranges(batch, chosen, [name for name in free if name in ("gap", "pitch", "roughness")])
+        forward, error = tube_forward(experiment, batch, free, tell, prepare=prepare)
+    else:
+        forward, error = _forward(experiment, chosen, batch, parameters, tell)
     rotor = batch.electrics.joint_rotor_friction if batch.electrics else np.zeros(1)
     friction = np.where(np.isnan(batch.effective_friction), rotor, batch.effective_friction)
     problem = Problem(
@@ -223,7 +235,7 @@ def posed(
         free=tuple(free),
         coordinates=(),
         forward=forward,
-        table_error=error,
+        interpolation_error=error,
         fixed_friction=np.broadcast_to(friction, (experiment.size,)),
         assumed=stated,
     )
@@ -280,51 +292,33 @@ def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch)
 
 
 def _forward(
-    experiment: Experiment,
-    model: SwimmerModel,
-    batch: RobotBatch,
-    parameters: Sequence[Parameter],
-    tell: Progress,
-) -> tuple[Forward, dict[str, tuple[float, float]], TableError]:
-    """Resistances, over a table where the geometry is free; the table's ranges, and its errors."""
+    experiment: Experiment, model: SwimmerModel, batch: RobotBatch, parameters: Sequence[Parameter], tell: Progress
+) -> tuple[Forward, float]:
+    """Resistances, over a table where the wire is free, and the largest error of its interpolation."""
     coefficients = any(item.name in ("normal_factor", "tangential_factor") for item in parameters)
-    names = [item.name for item in parameters if item.tabulated]
-    viscosity = batch.viscosity
     own_factors = batch.calibration.get(model.name)
     factors = {name: getattr(own_factors, name) for name in _FACTOR_SPREADS} if own_factors else {}
-    factors |= {name: np.full(1, getattr(batch.options.rft, name)) for name in ("normal_factor", "tangential_factor")}
-    if not model.closed_form:
-        tell(f"{model.name}, {experiment.size} robots", 0, 1)
-    if not names and not model.placed:
-        table = tabulated([batch], model, coefficients=coefficients)
-        return Forward(table, batch.electrics, viscosity, factors), {}, TableError()
-    if model.placed:
-        from spirillum.calibration.tube_table import tube_forward
 
-        return tube_forward(model, batch, names, tell)
+    def over(there: RobotBatch, wires: Samples | None = None) -> Forward:
+        def told(done: int, total: int) -> None:
+            words = "" if wires is None else f", wire of {wires[done] * 1e3:.3g} mm"
+            tell(f"{model.name}, {experiment.size} robots{words}", done, total)
+
+        silent = wires is None and model.closed_form
+        table = AxialTable.of(there, model, wires=wires, coefficients=coefficients, tell=None if silent else told)
+        return Forward(table, batch.electrics, batch.viscosity, body_axial(there), factors)
+
+    if not any(item.name == "wire_diameter" for item in parameters):
+        return over(batch), 0.0
     own = float(batch.wire_diameter[0])
     reach = np.exp(_WIRE_RANGE * _TOLERANCE_SPREAD)
-    points, values = axis_points("wire_diameter", _WIRE_POINTS, own / reach, own * reach)
-
-    def at(diameter: float) -> RobotBatch:
-        return batch.with_values({"tail.wire_diameter": diameter})
-
-    batches = []
-    for done, value in enumerate(values.tolist()):
-        tell(f"{model.name}, wire of {value * 1e3:.3g} mm", done, values.size + 1)
-        batches.append(at(value))
-    table = tabulated(batches, model, names, [points], coefficients=coefficients)
-    forward = Forward(table, batch.electrics, viscosity, factors)
+    forward = over(batch, chebyshev_points(_WIRE_POINTS, own / reach, own * reach))
     between = own * float(np.exp(0.31 * np.log(reach)))
-    alone = tabulated([at(between)], model, coefficients=coefficients)
-    exact = Forward(alone, batch.electrics, viscosity, factors)
-    error = forward.interpolation_error(exact, {"wire_diameter": np.full((1, 1), between)})
-    return forward, {"wire_diameter": (own / reach, own * reach)}, TableError(error, 0.0, error)
+    exact = over(batch.with_values({"tail.wire_diameter": between}))
+    return forward, forward.largest_difference(exact, {"wire_diameter": np.full((1, 1), between)})
 
 
-def _coordinates(
-    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: dict[str, tuple[float, float]]
-) -> list[Coordinate]:
+def _coordinates(problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: Ranges) -> list[Coordinate]:
     prior = _prior(problem, parameter, batch, ranges)
     if parameter.scope == "all":
         return [Coordinate(parameter, None, parameter.name, prior)]
@@ -334,14 +328,14 @@ def _coordinates(
 
 
 def _prior(
-    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: dict[str, tuple[float, float]]
+    problem: Problem, parameter: Parameter, batch: RobotBatch, ranges: Ranges
 ) -> LogNormal | LogUniform | Uniform:
     name = parameter.name
-    if name in _FACTOR_SPREADS:
-        return LogNormal(*_FACTOR_SPREADS[name])
+    if name in _LOG_NORMAL:
+        return LogNormal(*_LOG_NORMAL[name])
     if name in ("normal_factor", "tangential_factor"):
         return LogNormal(float(getattr(batch.options.rft, name)), _COEFFICIENT_SPREAD)
-    if name == "gap":
+    if name in ("gap", "roughness"):
         return LogUniform(*ranges[name])
     if name == "pitch":
         return Uniform(*ranges[name])

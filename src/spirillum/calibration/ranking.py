@@ -39,6 +39,9 @@ _FEWEST_ROBOTS = 4
 """Below that number a standard error over the robots is chance, and no model is named the better."""
 _WORST = 3
 _MODELS = ("sbt", "rft")
+_FREE = "body_drag,body_rotation"
+_FREE_IN_TUBE = "gap,pitch"
+"""Two numbers for each channel in every model: else one would be praised for its freedom in what another was denied."""
 
 
 def _size(row: dict[str, Any]) -> float:
@@ -158,6 +161,7 @@ def rank_models(
     models: Sequence[str] | None = None,
     free: str | Sequence[str] | None = None,
     sampling: Sampling | None = None,
+    prepare: bool = False,
     progress: Progress | None = None,
 ) -> Ranking:
     """Fit several models to the same observations and rank them by leave-one-out accuracy.
@@ -166,8 +170,10 @@ def rank_models(
         observations: observations file.
         robots: a robot for each channel; without them the paper's.
         models: hydrodynamic models; None: `sbt` and `rft`, the paper's own question.
-        free: free parameters of every model; None: body drag and rotation, the same for all.
+        free: free parameters of every model; None: two for each channel, body drag and rotation, or gap and pitch for
+            `tube`.
         sampling: how the posteriors are sampled.
+        prepare: for `tube`, make the robots' tables that are not there, some minutes each.
         progress: told what is being done.
 
     Raises:
@@ -176,13 +182,19 @@ def rank_models(
     names = list(dict.fromkeys(models or _MODELS))
     if len(names) < 2:
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
-    # Every model with the same free factors: else one would be praised for its freedom in what another was denied.
-    chosen = free or "body_drag,body_rotation"
-    _check_common(names, chosen)
+    if free:
+        _check_common(names, free)
     fits = {}
     for name in names:
         fits[name] = fit_model(
-            observations, robots, model=name, free=chosen, method="posterior", sampling=sampling, progress=progress
+            observations,
+            robots,
+            model=name,
+            free=free or (_FREE_IN_TUBE if name == "tube" else _FREE),
+            method="posterior",
+            sampling=sampling,
+            prepare=prepare,
+            progress=progress,
         )
     return ranked_fits(fits)
 

@@ -29,10 +29,12 @@ from spirillum.calibration.fit_warnings import synthetic_warning
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.formats.tables import check_present, read_table
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.intervals import drawn_kinematics
 from spirillum.swimming.prediction import calibration_warnings
@@ -45,6 +47,8 @@ _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
 _DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
 _DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
 _MOST = 2000
+_SAID = 5
+"""Candidates that are left out by name."""
 
 
 @dataclass(frozen=True)
@@ -122,18 +126,20 @@ def suggest(
     found, left_out = [], []
     numbers, names = _numbers(known)
     for robot in listed:
-        outside = broken(requirements(RobotBatch.of(robot), find_swimmer_model(known.model)))
+        outside = _outside(known, robot)
         if outside:
-            left_out.append(f"{tail_words(robot)} is left out: {outside[0].sentence()}")
+            left_out.append(f"{tail_words(robot)} is left out: {outside}")
             continue
         found.append(_candidate(known, robot, trials, numbers, names))
     if not found:
-        raise InputError(f"no candidate can be built: {left_out[0]}")
+        raise InputError(f"no candidate can be built and answered: {left_out[0]}")
+    if len(left_out) > _SAID:
+        left_out[_SAID:] = [f"{len(left_out) - _SAID} more candidates are left out"]
     return Suggestion(
         known,
         trials,
         tuple(sorted(found, key=lambda item: -item.gain)),
-        (*_cautions(known, loaded), *left_out[:5]),
+        (*_cautions(known, loaded), *left_out),
     )
 
 
@@ -155,6 +161,18 @@ def _papers_robots(known: PosteriorFile) -> list[Robot]:
             "paper's; allowed: ROBOT, one for each channel that might be used"
         )
     return robots
+
+
+def _outside(known: PosteriorFile, robot: Robot) -> str:
+    """Why the posterior's model has no answer for a robot; empty where it has."""
+    model = find_swimmer_model(known.model)
+    batch = RobotBatch.of(robot, known.placed(robot, Placement()) if model.placed else None)
+    if model.placed:
+        model = tabled(batch) or model
+        if not isinstance(model, TabledTube):
+            return "it has no table of its tube that holds where robots lie; `spirillum prepare` makes one"
+    outside = broken(requirements(batch, model))
+    return outside[0].sentence() if outside else ""
 
 
 def _check_channel(robot: Robot) -> None:

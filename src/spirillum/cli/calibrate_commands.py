@@ -48,6 +48,9 @@ def calibrate(
             "relative 95 % interval, such as fluid.viscosity=5%; repeatable. Else taken as exact.",
         ),
     ] = None,
+    prepare: Annotated[
+        bool, typer.Option("--prepare", help="With tube, make the tables that are not there, some minutes each.")
+    ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
     ] = "spirillum-calibration",
@@ -78,6 +81,7 @@ def calibrate(
             friction=friction,
             assume_uncertainty=_stated(assume_uncertainty or ()),
             sampling=Sampling(seed=seed),
+            prepare=prepare,
             figures=not no_figures,
             progress=progress,
         )
@@ -109,12 +113,19 @@ def rank_models(
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(autocompletion=complete_models, help="sbt, rft or slender; repeatable. Without it, sbt and rft."),
+        typer.Option(
+            autocompletion=complete_models, help="sbt, rft, slender or tube; repeatable. Without it, sbt and rft."
+        ),
     ] = None,
     free: Annotated[
         str | None,
-        typer.Option(metavar="NAME,...", help="Free parameters of every model; else body_drag,body_rotation."),
+        typer.Option(
+            metavar="NAME,...", help="Free parameters of all; else body_drag,body_rotation, for tube gap,pitch."
+        ),
     ] = None,
+    prepare: Annotated[
+        bool, typer.Option("--prepare", help="With tube, make the tables that are not there, some minutes each.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,
     json: Json = False,
@@ -136,6 +147,7 @@ def rank_models(
             models=model,
             free=free,
             sampling=Sampling(seed=seed),
+            prepare=prepare,
             progress=progress,
         )
     renderer.show(found.to_dict(), json=json)

@@ -93,7 +93,7 @@ def with_intervals(
     dataset: xr.Dataset,
     posterior: PosteriorFile,
     robot: Robot,
-    run: Callable[[Robot], xr.Dataset],
+    run: Callable[[Robot, int], xr.Dataset],
     draws: int,
     tell: Callable[[str, int, int], None],
 ) -> xr.Dataset:
@@ -103,19 +103,18 @@ def with_intervals(
         dataset: the run with the middle of the posterior.
         posterior: its draws.
         robot: the robot, as `PosteriorFile.central` gives it.
-        run: runs a robot for as long.
+        run: runs a robot for as long, given the number of its draw.
         draws: how many draws are run.
         tell: told how many are done, and of how many.
     """
     rng = np.random.default_rng(1)
     found: dict[str, list[float]] = {name + over: [] for name in _FACTORS for over in _OVER}
-    drawn = posterior.drawn(robot, draws, rng)
+    drawn, kept = posterior.drawn(robot, draws, rng), posterior.places(draws)
     for number, one in enumerate(drawn):
         tell("draws of the posterior", number, len(drawn))
-        answer = run(one)
+        answer = run(one, kept[number])
         for name, values in found.items():
             values.append(float(answer[name]))
-    kept = posterior.places(draws)
     thinned = replace(posterior, discrepancy={name: tau[kept] for name, tau in posterior.discrepancy.items()})
     off = drawn_discrepancy(thinned, {"advance": np.zeros(len(drawn))}, rng)
     if robot.drive is not None and robot.drive.joint == "fixed":

@@ -20,7 +20,7 @@ from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
-from spirillum.fitted.posterior_file import read_posterior
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
@@ -115,17 +115,15 @@ def simulate(
     held, asked = motion_of(motion) == "held", InTube.of(in_tube)
     walled = model == "tube" and not held
     if held:
-        _check_held(placed, roughness, weight=weight)
+        _check_held(placed, roughness, known, weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
-    if not walled and asked != InTube():
-        name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
-        raise InputError(
-            f"in_tube.{name} is given with model '{model}'; allowed: only with model 'tube', motion 'free'"
-        )
+    _check_in_tube(asked, model, walled=walled)
 
-    def run(one: Robot, timing: Timing, tell: Progress | None = None) -> xr.Dataset:
-        table = _table(one, placed, asked, height, tell) if walled else None
+    def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
+        drawn = known if model == "tube" else None
+        there, rough, touching = _fitted_place(one, drawn, draw, placed, height, asked)
+        table = _table(one, there, touching, rough, tell) if walled else None
         steady = predict(
             one,
             model=model,
@@ -133,12 +131,12 @@ def simulate(
             calibrated=calibrated,
             calibration=calibration,
             resolution=resolution,
-            placement=placed if walled else None,
+            placement=there if walled or drawn is not None else None,
             band=not walled,
             progress=tell,
         )
         if table is not None:
-            return run_in_tube(steady, table, timing, placed, asked, height, weight, tell)
+            return run_in_tube(steady, table, timing, there, touching, rough, weight, tell)
         return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, weight, tell)
 
     own = load(robot)
@@ -149,9 +147,28 @@ def simulate(
         said += fitted_of(None, known).run_warnings(central, find_swimmer_model(model), reading)
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
-        dataset = with_intervals(dataset, known, central, lambda one: run(one, same_length), draws, tell)
+        dataset = with_intervals(
+            dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), draws, tell
+        )
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     return dataset.assign_attrs(warnings="\n".join([*said, *warnings]))
+
+
+def _fitted_place(
+    robot: Robot,
+    known: PosteriorFile | None,
+    draw: int | None,
+    placed: Placement,
+    roughness: float | None,
+    asked: InTube,
+) -> tuple[Placement, float | None, InTube]:
+    """Where a run begins, on which asperities, and its settings, with what a posterior says of what is not given."""
+    if known is None:
+        return placed, roughness, asked
+    contact = known.contact(draw)
+    if asked.friction_coefficient is None:
+        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    return known.placed(robot, placed, draw), contact.roughness if roughness is None else roughness, asked
 
 
 def _table(
@@ -229,12 +246,32 @@ def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
     )
 
 
-def _check_held(placement: Placement, roughness: str | float | None, *, weight: bool) -> None:
+def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
+    """Refuse settings of a free run in a tube for any other.
+
+    Raises:
+        InputError: if one is given.
+    """
+    if not walled and asked != InTube():
+        name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
+        raise InputError(
+            f"in_tube.{name} is given with model '{model}'; allowed: only with model 'tube', motion 'free'"
+        )
+
+
+def _check_held(
+    placement: Placement, roughness: str | float | None, known: PosteriorFile | None, *, weight: bool
+) -> None:
     """Refuse what only a free run knows.
 
     Raises:
         InputError: if there is something.
     """
+    if known is not None and known.contact().friction_coefficient:
+        raise InputError(
+            f"{known.source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
+            "'tube' with motion 'free'"
+        )
     given = [
         *(["a placement is given"] if placement.is_given else []),
         *([f"roughness = {roughness}"] if roughness is not None else []),

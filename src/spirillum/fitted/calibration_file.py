@@ -29,6 +29,7 @@ from spirillum.robot.robot import Robot
 
 __all__ = [
     "CalibrationFile",
+    "FittedContact",
     "FittedFriction",
     "FittedPlace",
     "FittedValues",
@@ -98,6 +99,15 @@ class FittedPlace(Section):
     """The fitted fields of the placement."""
 
 
+class FittedContact(Section):
+    """What lies between robot and channel, for a model that computes the walls."""
+
+    roughness: Length | None = None
+    """Height of the asperities on which the robot lies."""
+    friction_coefficient: Annotated[float | None, Field(strict=True, ge=0.0, le=10.0, allow_inf_nan=False)] = None
+    """Coefficient of dry friction where they carry its weight."""
+
+
 class Provenance(Section):
     """What the fitted values rest on."""
 
@@ -136,12 +146,15 @@ class CalibrationFile(Section):
     """B_eff, tail by tail."""
     placement: Annotated[tuple[FittedPlace, ...], Field(max_length=1000)] = ()
     """Where the robot lies, channel by channel."""
+    contact: FittedContact = FittedContact()
+    """Asperities and dry friction under the robot."""
     provenance: Provenance = Provenance()
     """What the values rest on."""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if not (self.calibration or self.friction or self.placement or self.fitted != FittedValues()):
+        values = self.fitted != FittedValues() or self.contact != FittedContact()
+        if not (self.calibration or self.friction or self.placement or values):
             sentence = "nothing is calibrated; allowed: at least one [calibration.<model>] table"
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
         self._each_once()

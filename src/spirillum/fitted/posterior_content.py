@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Json
 
-from spirillum.robot.options import known_model
+from spirillum.fluid.registry import SWIMMER_MODELS
 
 __all__ = ["Content"]
 
@@ -14,6 +14,12 @@ _Length = Annotated[float, Field(gt=1e-9, lt=1e3)]
 _Number = Annotated[float, Field(gt=-1e12, lt=1e12)]
 _Name = Annotated[str, Field(min_length=1, max_length=200)]
 _Names = Annotated[str, Field(max_length=10_000)]
+
+
+def _fitted_model(name: str) -> str:
+    if name not in SWIMMER_MODELS:
+        raise ValueError("a model that swims: " + ", ".join(SWIMMER_MODELS))
+    return name
 
 
 class _Table(BaseModel):
@@ -48,6 +54,7 @@ _Quantity = Literal["advance", "turning", "motor_rate"]
 
 
 class _Tail(_OfTail):
+    tail_rate: _Number | None = None
     seen: dict[_Quantity, _Seen]
     by_motor: bool
     correlation: Annotated[float, Field(gt=-1, lt=1)]
@@ -66,7 +73,7 @@ class _Robot(_Table):
 class Content(_Table):
     """Attributes of a posterior's file."""
 
-    model: Annotated[str, AfterValidator(known_model)]
+    model: Annotated[str, AfterValidator(_fitted_model)]
     observations: _Names
     synthetic: bool
     converged: bool

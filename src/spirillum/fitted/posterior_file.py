@@ -17,6 +17,7 @@ from spirillum.files.limits import LARGEST_NETCDF
 from spirillum.files.netcdf import group_of
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
+    FittedContact,
     FittedFriction,
     FittedValues,
     calibrated_robot,
@@ -25,6 +26,7 @@ from spirillum.fitted.calibration_file import (
 )
 from spirillum.fitted.posterior_content import Content
 from spirillum.robot.options import Calibration, FittedTo
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ _SMALLEST, _GREATEST = 1e-15, 1e12
 """Of a draw, SI."""
 _LARGEST_DISCREPANCY = 100.0
 _MAY_BE_ZERO = ("pitch",)
+_PLACE = ("gap", "pitch")
 
 
 @dataclass(frozen=True)
@@ -68,8 +71,9 @@ class PosteriorFile:
     friction_reading: str = ""
     """Reading of the friction under which it was inferred."""
     tails: tuple[Mapping[str, Any], ...] = ()
-    """What was observed of every robot: channel and tail, `seen` (quantity to `mean`, `trials`, `scale`), `by_motor`,
-    `correlation` of the errors of advance and turning, `floor` of all relative errors; empty in older files."""
+    """What was observed of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`),
+    `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in older
+    files."""
 
     def measured(self, robot: Robot) -> Mapping[str, Any] | None:
         """What was observed of a robot; None if it was not."""
@@ -79,6 +83,51 @@ class PosteriorFile:
             if np.allclose(own, (*(tail[key] for key in _TAIL), *self.body), rtol=1e-6, atol=0.0):
                 return tail
         return None
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return int(next(iter(self.draws.values())).shape[0])
+
+    @property
+    def tail_rate(self) -> float | None:
+        """Median of the observed tail rates, rad/s, without sign; None where none is in the file."""
+        rates = [abs(rate) for tail in self.tails if (rate := tail.get("tail_rate")) is not None]
+        return float(np.median(rates)) if rates else None
+
+    def placed(self, robot: Robot, placement: Placement, draw: int | None = None) -> Placement:
+        """A placement with the fitted gap and pitch where it leaves them open; level if only the gap was fitted.
+
+        Args:
+            robot: the robot; a gap or pitch is that of its own channel, a roughness the gap in every channel.
+            placement: what is asked for.
+            draw: number of a draw; None: the middle.
+        """
+        if placement.eccentricity is not None:
+            return placement
+        middle = {name: float(value) for name, value in self._of_place(robot, self._at_draw(draw)).items()}
+        if middle and placement.gap is None and placement.pitch is None:
+            middle.setdefault("pitch", 0.0)
+        update = {name: value for name, value in middle.items() if getattr(placement, name) is None}
+        return placement.model_copy(update=update)
+
+    def contact(self, draw: int | None = None) -> FittedContact:
+        """Roughness and dry friction, of one draw or their middles."""
+        values = self._at_draw(draw)
+        known: dict[str, Any] = {name: float(values[name][0]) for name in FittedContact.model_fields if name in values}
+        return FittedContact.model_construct(**known)
+
+    def _at_draw(self, draw: int | None) -> Mapping[str, Samples]:
+        return self.middle if draw is None else {name: values[draw] for name, values in self.draws.items()}
+
+    def _of_place(self, robot: Robot, values: Mapping[str, Samples]) -> dict[str, Samples]:
+        """Gap and pitch of a robot among draws, whose last axis are channels."""
+        diameter = robot.channel.diameter if robot.channel else np.inf
+        own = [place for place, fitted in enumerate(self.channels) if np.isclose(diameter, fitted, rtol=1e-6, atol=0.0)]
+        found = {name: values[name][..., own[0]] for name in _PLACE if name in values and own}
+        if "roughness" in values and robot.channel is not None:  # on its asperities the robot has their height for gap
+            found["gap"] = values["roughness"][..., 0]
+        return found
 
     def central(self, robot: Robot) -> Robot:
         """The robot with the middle of the posterior in place of its own values."""
@@ -118,8 +167,7 @@ class PosteriorFile:
 
     def places(self, count: int) -> list[int]:
         """Places of some draws, evenly among them."""
-        size = next(iter(self.draws.values())).shape[0]
-        found: list[int] = np.linspace(0, size - 1, min(count, size)).round().astype(int).tolist()
+        found: list[int] = np.linspace(0, self.count - 1, min(count, self.count)).round().astype(int).tolist()
         return found
 
     def _at(self, values: Mapping[str, float], robot: Robot) -> Robot:
@@ -158,25 +206,24 @@ class PosteriorFile:
         return columns[..., min(channel, columns.shape[-1] - 1)]
 
     def of(self, robot: Robot, rng: np.random.Generator) -> dict[str, Samples]:
-        """Draws for one robot: those of the nearest channel, of which `central` takes the middle, and B_eff.
+        """Draws for one robot: those of the nearest channel, of which `central` takes the middle, its place, and B_eff.
 
         That of its own tail where it was fitted; else around the middle of the fitted tails of its channel,
         with the spread from tail to tail (Student's t, of logarithms: one more tail like these).
         """
         diameter = robot.channel.diameter if robot.channel else np.inf
         nearest = nearest_channel(robot, self.channels)
-        found = {name: self._column(name, nearest) for name in self.draws}
+        found = {name: self._column(name, nearest) for name in self.draws if name not in _PLACE}
+        found |= self._of_place(robot, self.draws)
         for item in self.friction:
             keys = (diameter, robot.tail.wavelength, robot.tail.amplitude)
             fitted = tuple(item[key] for key in _TAIL)
             if np.allclose(keys, fitted, rtol=1e-6, atol=0.0) and np.isfinite(item["high"] - item["low"]):
                 spread = (item["high"] - item["low"]) / (2.0 * 1.96)
-                size = next(iter(found.values())).size
-                found["friction"] = np.maximum(item["value"] + spread * rng.normal(size=size), 0.0)
+                found["friction"] = np.maximum(item["value"] + spread * rng.normal(size=self.count), 0.0)
         own, others = friction_of_tails(robot, self.frictions)
         if own is None and others:
-            size = next(iter(found.values())).size
-            found["friction"] = _of_another_tail(others, size, rng)
+            found["friction"] = _of_another_tail(others, self.count, rng)
         return found
 
 
@@ -250,11 +297,6 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
     if not content.converged:
         raise InputError(
             f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
-        )
-    if "gap" in found.draws or "pitch" in found.draws:
-        raise InputError(
-            f"{path} is of a model that computes the walls, which cannot solve a thousand places; allowed: its "
-            "calibration.toml as --calibration, or a posterior of sbt, rft or slender"
         )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)

@@ -10,6 +10,7 @@ import numpy as np
 
 from spirillum.fitted.calibration_file import (
     CalibrationFile,
+    FittedContact,
     FittedFriction,
     FittedValues,
     friction_of_tails,
@@ -45,6 +46,13 @@ class Fitted:
     name: str = ""
     """Its name."""
 
+    friction_coefficient: float | None = None
+    """Coefficient of dry friction under a robot that was fitted; None: none was."""
+
+    def dry_friction(self, model: SwimmerModel) -> float | None:
+        """Coefficient of dry friction under a robot with a model: only one that places it knows of any."""
+        return self.friction_coefficient if model.placed else None
+
     def serves(self, robot: Robot, model: SwimmerModel) -> bool:
         """Whether anything of it acts on a robot's answer with a model.
 
@@ -56,7 +64,7 @@ class Fitted:
             return True
         left_out = () if model.name == "rft" else _COEFFICIENTS
         values = [getattr(self.file.fitted, name) for name in FittedValues.model_fields if name not in left_out]
-        placed = model.placed and placement_in(self.file, robot) is not None
+        placed = model.placed and (placement_in(self.file, robot) is not None or self.file.contact != FittedContact())
         known = any(value is not None for value in values)
         return placed or known or friction_of_tails(robot, self.friction) != (None, ())
 
@@ -182,7 +190,15 @@ def fitted_of(
     """
     if posterior is not None:
         source = posterior.observations if posterior.synthetic else ""
-        return Fitted(posterior.frictions, posterior.friction_reading, source, posterior.model, drawn=True)
+        rubbing = posterior.middle.get("friction_coefficient")
+        return Fitted(
+            posterior.frictions,
+            posterior.friction_reading,
+            source,
+            posterior.model,
+            drawn=True,
+            friction_coefficient=None if rubbing is None else float(rubbing[0]),
+        )
     if calibration is None:
         return Fitted()
     file = calibration if isinstance(calibration, CalibrationFile) else read_calibration(calibration)
@@ -190,4 +206,5 @@ def fitted_of(
     synthetic = (provenance.observations or "the calibration") if provenance.synthetic else ""
     said = name or ("" if isinstance(calibration, CalibrationFile) else str(calibration))
     reading, model = provenance.friction_reading, provenance.model
-    return Fitted(file.friction, reading, synthetic, model, file=file, name=said)
+    dry = file.contact.friction_coefficient
+    return Fitted(file.friction, reading, synthetic, model, file=file, name=said, friction_coefficient=dry)

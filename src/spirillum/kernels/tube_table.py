@@ -34,6 +34,7 @@ __all__ = [
     "contact_offset",
     "cut_of_film",
     "film_start",
+    "mean_resistance_at",
     "mirror_image",
     "packed",
     "parts_of",
@@ -344,23 +345,57 @@ def resistance_at(table: Samples, e: float, pitch: float, yaw: float, phase: flo
     Returns:
         `INSIDE`, or which range was left; then the answer is that of the nearest place inside.
     """
-    phases = int(table[_PHASES])
-    coefficients = np.empty((phases, PARAMETERS))
+    coefficients = np.empty((int(table[_PHASES]), PARAMETERS))
     left, t = _coefficients(table, e, pitch, yaw, coefficients)
+    _set_film(table, e, pitch, yaw, cut_of_film(t), out)
+    _add_rest(coefficients, phase, 1.0, out)
+    return left
+
+
+@compiled
+def mean_resistance_at(table: Samples, e: float, pitch: float, yaw: float, count: int, out: Samples) -> int:
+    """Fill the 8x8 of a place, averaged over phases of the tail; arguments as `resistance_at`.
+
+    Args:
+        table: from `packed`.
+        e: offset of the body's mid-length from the tube's axis, m.
+        pitch: nose up, away from the near wall, rad.
+        yaw: nose to the side, rad.
+        count: number of phases, evenly spaced.
+        out: to be filled, (8, 8).
+    """
+    coefficients = np.empty((int(table[_PHASES]), PARAMETERS))
+    left, t = _coefficients(table, e, pitch, yaw, coefficients)
+    _set_film(table, e, pitch, yaw, cut_of_film(t), out)
+    for n in range(count):
+        _add_rest(coefficients, 2.0 * math.pi * n / count, 1.0 / count, out)
+    return left
+
+
+@compiled
+def _set_film(table: Samples, e: float, pitch: float, yaw: float, share: float, out: Samples) -> None:
+    """Fill the 8x8 with a share of the film's resistance."""
+    film = np.empty((6, 6))
+    film_at(table[film_start(table) :], e, pitch, yaw, film)
+    for i in range(MOTIONS):
+        for j in range(i + 1):
+            out[i, j] = out[j, i] = share * film[i, j] if i < 6 else 0.0
+
+
+@compiled
+def _add_rest(coefficients: Samples, phase: float, share: float, out: Samples) -> None:
+    """Add a share of what is left without the film at a phase, from the Fourier coefficients of its factor."""
     factor = np.empty(PARAMETERS)
     for k in range(PARAMETERS):
         factor[k] = coefficients[0, k]
-    for m in range(1, phases):
+    for m in range(1, coefficients.shape[0]):
         harmonic = (m + 1) // 2
         wave = math.cos(harmonic * phase) if m % 2 == 1 else math.sin(harmonic * phase)
         for k in range(PARAMETERS):
             factor[k] += wave * coefficients[m, k]
-    film = np.empty((6, 6))
-    film_at(table[film_start(table) :], e, pitch, yaw, film)
-    w = cut_of_film(t)
     for i in range(MOTIONS):
-        start = i * (i + 1) // 2
-        factor[start + i] = math.exp(factor[start + i])
+        diagonal = i * (i + 1) // 2 + i
+        factor[diagonal] = math.exp(factor[diagonal])
     for i in range(MOTIONS):
         of_i = i * (i + 1) // 2
         for j in range(i + 1):
@@ -368,7 +403,6 @@ def resistance_at(table: Samples, e: float, pitch: float, yaw: float, phase: flo
             total = 0.0
             for k in range(j + 1):
                 total += factor[of_i + k] * factor[of_j + k]
-            if i < 6:
-                total += w * film[i, j]
-            out[i, j] = out[j, i] = total
-    return left
+            out[i, j] += share * total
+            if j < i:
+                out[j, i] += share * total

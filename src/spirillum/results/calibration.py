@@ -69,6 +69,7 @@ def calibrate(
     friction: str = "rotor",
     assume_uncertainty: Mapping[str, str | float] | None = None,
     sampling: Sampling | None = None,
+    prepare: bool = False,
     figures: bool = True,
     progress: Progress | None = None,
 ) -> Calibrated:
@@ -87,6 +88,7 @@ def calibrate(
             `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
             taken as exact.
         sampling: how the posterior is sampled.
+        prepare: for `tube`, make the robots' tables that are not there, some minutes each.
         figures: draw figures too, which takes some seconds.
         progress: told what is being done.
 
@@ -111,6 +113,7 @@ def calibrate(
             friction=friction,
             assume_uncertainty=assume_uncertainty,
             sampling=sampling,
+            prepare=prepare,
             progress=progress,
         )
         return found if folder is None else write_calibration(found, folder, figures=figures, progress=progress)

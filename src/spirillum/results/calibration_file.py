@@ -46,6 +46,7 @@ def calibration_text(found: Calibrated) -> str:
     lines += _factor_tables(found)
     lines += _fitted_table(found)
     lines += _placement_tables(found)
+    lines += _contact_table(found)
     lines += _friction_tables(found)
     return "\n".join(lines) + "\n"
 
@@ -126,16 +127,29 @@ def _placement_tables(found: Calibrated) -> list[str]:
     lines = []
     for place, diameter in enumerate(found.experiment.channels):
         own = {
-            item.parameter: found.values[item.label].value
+            "gap" if item.parameter.name == "roughness" else item.parameter.name: found.values[item.label].value
             for item in found.problem.coordinates
-            if item.channel == place
+            if item.parameter.name in _PLACE and item.channel in (None, place)
         }
         if own:
             lines += ["", "[[placement]]", f'channel_diameter = "{_number(diameter)} m"', "", "[placement.placement]"]
-            lines += [f'{parameter.name} = "{_number(value)} {parameter.unit}"' for parameter, value in own.items()]
-            if all(parameter.name != "pitch" for parameter in own):
-                lines.append('pitch = "0 rad"')  # it was fitted level
+            if "gap" in own:
+                lines.append(f'gap = "{_number(own["gap"])} m"')
+            lines.append(f'pitch = "{_number(own.get("pitch", 0.0))} rad"')  # else it was fitted level
     return lines
+
+
+_PLACE = ("gap", "pitch", "roughness")
+
+
+def _contact_table(found: Calibrated) -> list[str]:
+    values = {item.parameter.name: found.values[item.label].value for item in found.problem.coordinates}
+    lines = []
+    if "roughness" in values:
+        lines.append(f'roughness = "{_number(values["roughness"])} m"')
+    if "friction_coefficient" in values:
+        lines.append(f"friction_coefficient = {_number(values['friction_coefficient'])}")
+    return ["", "[contact]", *lines] if lines else []
 
 
 def _friction_tables(found: Calibrated) -> list[str]:

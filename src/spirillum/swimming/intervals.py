@@ -16,23 +16,27 @@ from typing import Any
 
 import numpy as np
 
-from spirillum.arrays import Axial, PerRobot, Samples
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
+from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
+from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
-from spirillum.swimming.steady import friction_reading, swim
+from spirillum.swimming.steady import friction_reading
 
 __all__ = ["LEVEL", "Intervals", "drawn_kinematics", "intervals_of"]
 
 LEVEL = 0.95
 """Level of the intervals."""
 _ELECTRIC = ("torque_constant", "back_emf_constant")
-_COEFFICIENTS = ("normal_factor", "tangential_factor")
 _WIRE_POINTS = 7
 
 
@@ -60,6 +64,7 @@ def intervals_of(
     tail_rate: float | None,
     friction: str,
     posterior_for: PosteriorFor = "new",
+    placement: Placement | None = None,
 ) -> Intervals:
     """Swim every draw of a posterior and take the limits of 95 % intervals.
 
@@ -70,14 +75,18 @@ def intervals_of(
         tail_rate: prescribed tail rate, rad/s; None: the robot's own drive.
         friction: reading of the friction.
         posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
+        placement: where the robot lies, for a model that computes the walls; a gap or pitch that it says is not drawn.
+
+    Raises:
+        InputError: for draws of the place of a robot without a table.
     """
     rng = np.random.default_rng(1)
     draws = posterior.of(robot, rng)
-    size = next(iter(draws.values())).size
-    batch = _drawn_batch(robot, posterior.model, draws, size)
-    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
+    size = posterior.count
+    batch, drawn = _drawn(robot, model, posterior, draws, placement or Placement())
     rates = None if tail_rate is None else np.full(size, tail_rate)
-    swum = swim(batch, drawn, tail_rate=rates, friction=friction)
+    coefficient = draws.get("friction_coefficient") if model.placed else None
+    swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rates, friction=friction)
     predicted = {
         "advance": swum.advance_per_radian,
         "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
@@ -101,12 +110,16 @@ def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile
         robot: the robot, as `PosteriorFile.central` gives it.
         model: the hydrodynamic model of the posterior.
         posterior: its draws.
+
+    Raises:
+        InputError: as `intervals_of`.
     """
     draws = posterior.of(robot, np.random.default_rng(1))
-    size = next(iter(draws.values())).size
-    batch = _drawn_batch(robot, posterior.model, draws, size)
-    drawn = _Drawn(model, _drawn_axial(robot, model, draws, size))
-    swum = swim(batch, drawn, tail_rate=np.full(size, robot.hand), friction="none")
+    size = posterior.count
+    batch, drawn = _drawn(robot, model, posterior, draws, Placement())
+    coefficient = draws.get("friction_coefficient") if model.placed else None
+    rate = np.full(size, robot.hand * (posterior.tail_rate or 1.0))
+    swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rate, friction="none")
     return {"advance": swum.advance_per_radian, "turning": swum.body_rotation_rate / swum.tail_rotation_rate}
 
 
@@ -149,59 +162,43 @@ def _drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: i
     return batch
 
 
-def _drawn_axial(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples], size: int) -> Axial:
-    """Resistances of all draws, (draws, 4, 4), or (1, 4, 4) where they share it."""
-    batch = RobotBatch.of(robot)
-    if "wire_diameter" not in draws:
-        found = _with_coefficients(batch, model, draws)
-    elif model.closed_form:
-        found = _with_coefficients(batch.with_values({"tail.wire_diameter": draws["wire_diameter"]}), model, draws)
-    else:
-        wires = np.log(draws["wire_diameter"])
-        angle = (2.0 * np.arange(_WIRE_POINTS) + 1.0) * np.pi / (2.0 * _WIRE_POINTS)
-        nodes = 0.5 * (wires.min() + wires.max()) + 0.5 * (wires.max() - wires.min()) * np.cos(angle)
-        known = model.axial(batch.with_values({"tail.wire_diameter": np.exp(nodes)}))
-        fit = np.polynomial.chebyshev.chebfit(np.cos(angle), known.reshape(_WIRE_POINTS, 16), _WIRE_POINTS - 1)
-        at = (2.0 * wires - wires.min() - wires.max()) / (wires.max() - wires.min())
-        found = np.polynomial.chebyshev.chebval(at, fit).T.reshape(size, 4, 4)
-    if "viscosity" in draws:
-        found = found * (draws["viscosity"] / robot.fluid.viscosity)[:, None, None]
-    return found
+def _drawn(
+    robot: Robot, model: SwimmerModel, posterior: PosteriorFile, draws: Mapping[str, Samples], placement: Placement
+) -> tuple[RobotBatch, KnownResistance]:
+    """A robot for each draw, and the model with their resistances.
+
+    Raises:
+        InputError: for draws of the place of a robot without a table.
+    """
+    batch = _drawn_batch(robot, posterior.model, draws, posterior.count)
+    columns = {name: values[:, None] for name, values in draws.items()}
+    if not model.placed:
+        return batch, KnownResistance(model, _table(robot, model, draws).whole(columns)[:, 0])
+    place = posterior.placed(robot, placement)
+    own = RobotBatch.of(robot, place)
+    tables = model if isinstance(model, TabledTube) else tabled(own)
+    if tables is None:
+        raise InputError(
+            f"{robot.name} has no table of its tube that holds where it lies, which draws of {posterior.source} need; "
+            "allowed: after `spirillum prepare`, or its calibration.toml as --calibration"
+        )
+    if placement.gap is not None or placement.eccentricity is not None:
+        columns.pop("gap", None)
+    if placement.pitch is not None or placement.eccentricity is not None:
+        columns.pop("pitch", None)
+    known = TubeResistance.of(own, tables)
+    load = known.load(columns, place.flow)[:, 0] if place.flow else None
+    return replace(batch, placement=place), KnownResistance(tables, known.whole(columns)[:, 0], load)
 
 
-def _with_coefficients(batch: RobotBatch, model: SwimmerModel, draws: Mapping[str, Samples]) -> Axial:
-    """RFT is linear in both of its coefficients: what a factor adds is what doubling it adds, in proportion."""
-    found = model.axial(batch)
-    whole, own = found, batch.options.rft
-    for name in _COEFFICIENTS:
-        if name in draws:
-            value = getattr(own, name)
-            doubled = batch.options.model_copy(update={"rft": own.model_copy(update={name: 2.0 * value})})
-            more = model.axial(replace(batch, options=doubled)) - whole
-            found = found + (draws[name] / value - 1.0)[:, None, None] * more
-    return found
-
-
-class _Drawn(SwimmerModel):
-    """A model whose resistances are known beforehand, one for each draw."""
-
-    parts = ()
-
-    def __init__(self, model: SwimmerModel, axial: Axial) -> None:
-        self.name = model.name  # type: ignore[misc]
-        self._model, self._axial = model, axial
-
-    def domain(self, batch: RobotBatch) -> list[Any]:
-        return self._model.domain(batch)
-
-    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Any:
-        return self._model.part_matrix(batch, part, phase)
-
-    def axial(self, batch: RobotBatch) -> Axial:  # noqa: ARG002 - one interface for all models
-        return self._axial
-
-    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Any:
-        return self._model.resistance(batch, phase)
+def _table(robot: Robot, model: SwimmerModel, draws: Mapping[str, Samples]) -> AxialTable:
+    """Resistances over what the draws change, of a model that knows no place."""
+    wires = None
+    if "wire_diameter" in draws:
+        wires = chebyshev_points(_WIRE_POINTS, float(draws["wire_diameter"].min()), float(draws["wire_diameter"].max()))
+    return AxialTable.of(
+        RobotBatch.of(robot), model, wires=wires, coefficients="normal_factor" in draws or "tangential_factor" in draws
+    )
 
 
 def _with_discrepancy(

@@ -19,7 +19,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, broken
+from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
@@ -29,6 +29,7 @@ from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
+from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.intervals import Intervals, intervals_of
 from spirillum.swimming.steady import (
@@ -36,7 +37,6 @@ from spirillum.swimming.steady import (
     friction_reading,
     requirements,
     speed_difference,
-    swim,
 )
 from spirillum.units import KINDS, parse_option, show
 
@@ -189,7 +189,7 @@ def predict(
     Raises:
         InputError: for wrong input, or a robot outside the model's domain.
     """
-    drawn = None
+    drawn, given = None, Placement.of(placement)
     robot = load(robot)
     unset = robot.friction.effective is None
     if posterior is not None:
@@ -197,16 +197,25 @@ def predict(
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
         drawn = read_posterior(posterior, model)
         robot = drawn.central(robot)
+        placement = drawn.placed(robot, given)
     ready, chosen, batch = prepared(robot, model, calibration=calibration, resolution=resolution, placement=placement)
     reading = friction_reading(friction or ready.friction.reading)
+    fitted = fitted_of(calibration, drawn)
     rate = _rate(tail_rate, batch.placement)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
 
     def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
         rates = None if rate is None else np.array([rate])
-        return swim(there, of, tail_rate=rates, friction=reading, calibrated=calibrated, motion=motion)
+        asked = {"tail_rate": rates, "friction": reading, "calibrated": calibrated, "motion": motion}
+        return swim_on_floor(there, of, [ready], fitted.dry_friction(of), **asked)
 
+    whose = posterior_for_of(posterior_for, drawn, ready)
+    known = None
+    if drawn is not None:
+        known = intervals_of(
+            ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
+        )
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         tell(f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
@@ -227,14 +236,9 @@ def predict(
     )
     over = band_of(batch, chosen, result, answer, tell) if band else None
     left_out = () if over is None else over.left_out
-    whose = posterior_for_of(posterior_for, drawn, ready)
-    known = None
-    if drawn is not None:
-        known = intervals_of(ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose)
-        if whose == "measured":
-            middles = {name: np.array([middle]) for name, middle in known.middle.items() if np.isfinite(middle)}
-            result = replace(result, **middles)
-    fitted = fitted_of(calibration, drawn)
+    if known is not None and whose == "measured":
+        middles = {name: np.array([middle]) for name, middle in known.middle.items() if np.isfinite(middle)}
+        result = replace(result, **middles)
     warnings += fitted.idle_warnings([ready], [chosen])
     if rate is None:
         warnings += fitted.run_warnings(ready, chosen, reading)
@@ -295,8 +299,11 @@ def prepared(
             placement = calibrated_placement(ready, calibration)
     ready = with_resolution(ready, resolution, model)
     chosen = find_swimmer_model(model)
-    batch = checked_batch(ready, chosen, Placement.of(placement))
-    return ready, quickest(chosen, batch), batch
+    placed = Placement.of(placement)
+    known = RobotBatch.of(ready, placed)
+    if np.all(all_hold(assembly_limits(known))):  # a table reaches closer to the wall than a direct solution
+        chosen = quickest(chosen, known)
+    return ready, chosen, checked_batch(ready, chosen, placed)
 
 
 def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:

@@ -81,11 +81,17 @@ class _Films(NamedTuple):
     """Where the last tail comes closest."""
 
 
-def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
-    """Requirements on the seat in the tube for one of `PIECES`; robots that cannot be built are left out."""
-    films = _films(batch, part)
+def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GAP) -> list[Limit]:
+    """Requirements on the seat in the tube for one of `PIECES`; robots that cannot be built are left out.
+
+    Args:
+        batch: the robots.
+        part: one of `PIECES`.
+        thinnest_gap: least gap under the body, over its diameter.
+    """
+    films = _films(batch, part, thinnest_gap)
     open_ended = batch.placement.ends == "open"
-    thinnest = _THINNEST_GAP * batch.body_diameter
+    thinnest = thinnest_gap * batch.body_diameter
     return [
         Limit.of(
             "there is no [channel]: channel.diameter",
@@ -148,7 +154,7 @@ def seat_limits(batch: RobotBatch, part: str) -> list[Limit]:
     ]
 
 
-def _films(batch: RobotBatch, part: str) -> _Films:
+def _films(batch: RobotBatch, part: str, thinnest_gap: float) -> _Films:
     asked, largest, coupling, tail = (np.full(batch.size, np.inf) for _ in range(4))
     where = ""
     for index in within(batch):
@@ -158,7 +164,7 @@ def _films(batch: RobotBatch, part: str) -> _Films:
         outlines = g.outlines
         asked[index] = gap_of(batch.placement, g.body_diameter, radius)
         largest[index] = largest_gap(outlines["body"], radius, batch.placement.pitch or 0.0, batch.placement.yaw)
-        if not _THINNEST_GAP * g.body_diameter <= asked[index] <= largest[index]:
+        if not thinnest_gap * g.body_diameter <= asked[index] <= largest[index]:
             continue
         seat = seat_of(batch, index)
         if "coupling" in outlines and "coupling" in PIECES[part]:

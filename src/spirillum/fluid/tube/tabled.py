@@ -19,26 +19,54 @@ from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
-from spirillum.kernels.tube_table import INSIDE, MOTIONS
+from spirillum.kernels.tube_places import PHASES, mean_resistances
+from spirillum.kernels.tube_table import INSIDE, MOTIONS, mean_resistance_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.options import ModelOptions
-from spirillum.robot.seat import Seat
 
-__all__ = ["TabledTube", "along_the_tube", "tabled"]
+__all__ = ["TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
 
-_AVERAGED = 8
-"""Phases over which a table is averaged: more than its two harmonics need."""
+_THINNEST_GAP = 5e-5
+"""Thinnest gap over the body's diameter: the thinnest film that is tabulated."""
+_HELD = [0, 1, 3, 4]
+"""Places of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
 
 
-def along_the_tube(seat: Seat) -> Samples:
-    """Rates of a table, (8, 5), from U along the tube and rate about the axis of body and rotor, and mean flow."""
-    c, s, c_yaw, s_yaw = np.cos(seat.pitch), np.sin(seat.pitch), np.cos(seat.yaw), np.sin(seat.yaw)
-    found = np.zeros((MOTIONS, 5))
-    found[:3, 0] = c * c_yaw, -s_yaw, -s * c_yaw
-    found[3, 1], found[6, 1] = 1.0, -1.0  # the body turns, the rotor does not
-    found[6, 3] = found[7, 4] = 1.0
+def along_the_tube(pitch: Samples, yaw: Samples) -> Samples:
+    """Rates of a table per U along the tube, rates about the motor axis of body and rotor, and mean flow, (..., 8, 4).
+
+    Args:
+        pitch: nose up, rad, (...).
+        yaw: nose to the left, rad, (...).
+    """
+    found = np.zeros((*np.shape(pitch), MOTIONS, len(_HELD)))
+    found[..., 0, 0] = np.cos(pitch) * np.cos(yaw)
+    found[..., 1, 0] = -np.sin(yaw)
+    found[..., 2, 0] = -np.sin(pitch) * np.cos(yaw)
+    found[..., 3, 1], found[..., 6, 1] = 1.0, -1.0  # the body turns, the rotor does not
+    found[..., 6, 2] = found[..., 7, 3] = 1.0
     return found
+
+
+def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: Samples) -> Samples:
+    """Resistance along the tube at places, averaged over the tail's phase, viscosity 1, (..., robots, 4, 4).
+
+    Args:
+        tables: packed tables of the robots, one in each row.
+        gap: smallest distances between body and wall, m, (..., robots).
+        pitch: nose up, rad, (..., robots).
+        yaw: nose to the left, rad, (..., robots).
+
+    Returns:
+        Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
+    """
+    found = np.empty((gap.size, MOTIONS, MOTIONS))
+    which = np.ravel(np.broadcast_to(np.arange(len(tables)), gap.shape))
+    mean_resistances(tables, which, np.ravel(gap), np.ravel(pitch), np.ravel(yaw), found)
+    axes = along_the_tube(pitch, yaw)
+    whole: Samples = np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
+    return whole
 
 
 class TabledTube(Tube):
@@ -70,17 +98,26 @@ class TabledTube(Tube):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        return [*Slender().part_domain(batch, part), *seat_limits(batch, part)]
+        return [*Slender().part_domain(batch, part), *seat_limits(batch, part, _THINNEST_GAP)]
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
         for index in within(batch, self.part_domain(batch, "robot")):
-            seat, table = seat_of(batch, index), self.table_of(batch, index)
-            phases = 2.0 * np.pi * np.arange(_AVERAGED) / _AVERAGED
-            mean = np.mean([table.at(seat.offset, seat.pitch, seat.yaw, float(phase))[0] for phase in phases], axis=0)
-            along = along_the_tube(seat)
-            found[index] = number_of(batch.viscosity, index) * along.T @ mean @ along
+            seat, mean = seat_of(batch, index), np.empty((MOTIONS, MOTIONS))
+            mean_resistance_at(self.table_of(batch, index).packed, seat.offset, seat.pitch, seat.yaw, PHASES, mean)
+            axes = along_the_tube(np.array(seat.pitch), np.array(seat.yaw))
+            found[index] = 0.0
+            found[index][np.ix_(_HELD, _HELD)] = number_of(batch.viscosity, index) * axes.T @ mean @ axes
         return self._with_ends(batch, found)
+
+
+def tables_of(batch: RobotBatch) -> list[TubeTable | None]:
+    """The table of each robot of a batch; None where it has none, or no tube."""
+    radii = [tube_radius(batch, index) for index in range(batch.size)]
+    return [
+        find_table(RobotGeometry.of(batch, index), radius) if np.isfinite(radius) else None
+        for index, radius in enumerate(radii)
+    ]
 
 
 def tabled(batch: RobotBatch) -> TabledTube | None:
@@ -88,11 +125,7 @@ def tabled(batch: RobotBatch) -> TabledTube | None:
     if batch.placement.tail_drop:
         return None
     found: dict[str, TubeTable] = {}
-    for index in range(batch.size):
-        radius = tube_radius(batch, index)
-        if not np.isfinite(radius):
-            return None
-        table = find_table(RobotGeometry.of(batch, index), radius)
+    for index, table in enumerate(tables_of(batch)):
         if table is None:
             return None
         seat = seat_of(batch, index)

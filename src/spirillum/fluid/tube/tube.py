@@ -268,20 +268,23 @@ class Tube(SwimmerModel):
 
     def _with_ends(self, batch: RobotBatch, full: Samples) -> tuple[Samples, Samples]:
         """Ends condensed: (n, k, k) with the flow as last row and column, and the mean flow that goes with motions."""
-        length, radius = (
-            np.broadcast_to(v, (batch.size,)) for v in (batch.channel_length, 0.5 * batch.channel_diameter)
-        )
         flow = np.zeros(full.shape[:2])
-        opened = np.array([batch.placement.ends_of(float(value)) == "open" for value in length])
         if batch.placement.flow is not None:
             flow[:, -1] = batch.placement.flow
-        if np.any(opened):
-            viscosity = np.broadcast_to(batch.viscosity, (batch.size,))
-            against = 8.0 * np.pi * viscosity * (length + END_LOSS * radius) + full[:, -1, -1]
-            flow[:, :-1] = np.where(opened[:, None], full[:, :-1, -1] / against[:, None], 0.0)
+        against = np.broadcast_to(batch.viscosity, (batch.size,)) * self.against(batch)
+        if np.any(np.isfinite(against)):
+            flow[:, :-1] = full[:, :-1, -1] / (against + full[:, -1, -1])[:, None]
             full = full.copy()
             full[:, :-1, :-1] -= flow[:, :-1, None] * full[:, None, :-1, -1]
         return full, flow
+
+    def against(self, batch: RobotBatch) -> PerRobot:
+        """8 pi L_eff, m: what drives the mean flow through each tube, over viscosity and flow; infinite if closed."""
+        length, radius = (
+            np.broadcast_to(v, (batch.size,)) for v in (batch.channel_length, 0.5 * batch.channel_diameter)
+        )
+        opened = np.array([batch.placement.ends_of(float(value)) == "open" for value in length])
+        return np.where(opened, 8.0 * np.pi * (length + END_LOSS * radius), np.inf)
 
     def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:
         """See `SwimmerModel.resistance`; about the origin in body axes, ends condensed."""
