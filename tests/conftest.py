@@ -21,7 +21,6 @@ _LONGEST = (
     "test_follow_from_film_to_track.py",
     "test_flow_figure_against_its_field.py",
     "test_flow_command.py",
-    "test_settling_against_balances.py",
     "test_tube_pitched_and_wired.py",
     "test_examples_run.py",
 )

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from spirillum.designs.answer import Design as Design
     from spirillum.designs.design import design as design
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
+    from spirillum.dynamics.prediction import predict as predict
     from spirillum.dynamics.settling import Settling as Settling
     from spirillum.dynamics.settling import settle as settle
     from spirillum.dynamics.simulation import simulate as simulate
@@ -41,7 +42,6 @@ if TYPE_CHECKING:
     from spirillum.swimming.comparison import ModelComparison as ModelComparison
     from spirillum.swimming.comparison import compare_models as compare_models
     from spirillum.swimming.prediction import Prediction as Prediction
-    from spirillum.swimming.prediction import predict as predict
     from spirillum.swimming.preparation import Prepared as Prepared
     from spirillum.swimming.preparation import prepare as prepare
     from spirillum.swimming.preparation import prepare_all as prepare_all
@@ -86,7 +86,7 @@ _HOME = {
     "load": "spirillum.robot.load",
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",
-    "predict": "spirillum.swimming.prediction",
+    "predict": "spirillum.dynamics.prediction",
     "prepare": "spirillum.swimming.preparation",
     "prepare_all": "spirillum.swimming.preparation",
     "rank_models": "spirillum.calibration.ranking",

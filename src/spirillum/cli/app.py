@@ -115,7 +115,7 @@ def predict(
     Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --set tail.wavelength=20mm`
     """
     from spirillum.cli import renderer
-    from spirillum.swimming.prediction import predict as answer
+    from spirillum.dynamics.prediction import predict as answer
 
     with renderer.progress_bar(quiet=json) as progress:
         result = answer(

@@ -6,21 +6,21 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import gap_range, loaded_robot, placement_from
+from spirillum.cli.inputs import loaded_robot, placement_from
 from spirillum.cli.options import (
-    Accuracy,
+    Calibration,
     Eccentricity,
     Ends,
     Friction,
     Gap,
+    ImposedFlow,
     Json,
-    Phases,
     Picture,
+    Pitch,
     RobotArgument,
     Settings,
-    TailDrop,
     TailRate,
-    Tolerance,
+    Yaw,
 )
 
 __all__ = ["settle"]
@@ -31,24 +31,36 @@ def settle(
     output: Picture = None,
     tail_rate: TailRate = None,
     friction: Friction = None,
+    calibration: Calibration = None,
     gap: Gap = None,
     eccentricity: Eccentricity = None,
-    tail_drop: TailDrop = None,
-    ends: Ends = None,
-    drain: Annotated[
+    pitch: Pitch = None,
+    yaw: Yaw = None,
+    azimuth: Annotated[
         str | None,
-        typer.Option(metavar="FROM:TO", help="Gaps between which the film drains, such as 1mm:0.2mm."),
+        typer.Option(
+            metavar="ANGLE", help="Azimuth of the body's centre at the start, about +x from the lowest place."
+        ),
     ] = None,
-    gaps: Annotated[int, typer.Option(help="Number of gaps at which the film is computed, 2 to 32.")] = 5,
-    accuracy: Accuracy = None,
-    tolerance: Tolerance = None,
-    phases: Phases = None,
+    ends: Ends = None,
+    flow: ImposedFlow = None,
+    no_weight: Annotated[bool, typer.Option("--no-weight", help="Leave weight and buoyancy out.")] = False,
+    roughness: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Height of the asperities, else 1e-4 of the body's radius.")
+    ] = None,
+    friction_coefficient: Annotated[
+        float | None, typer.Option(help="Coefficient of dry friction where asperities touch; else 0.1.")
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="LENGTH", help="Gap to which draining is timed; else a fifth of that at the start."),
+    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Find where in its tube a robot comes to lie: azimuth, rest, and the draining of the film under it.
+    """Follow a robot laid down in its tube to where it comes to lie: its way, gap, azimuth, tilt, speed and body rate.
 
-    Example: `spirillum settle biorob2012-wide --tail-rate 1.2Hz --gap 0.5mm`
+    Example: `spirillum settle biorob2012-wide --gap 0.5mm --roughness 20um`
     """
     from spirillum.cli import renderer
     from spirillum.dynamics.settling import settle as answer
@@ -61,10 +73,12 @@ def settle(
             loaded,
             tail_rate=tail_rate,
             friction=friction,
-            resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
-            placement=placement_from(gap, eccentricity, None, tail_drop, ends, None),
-            drain=None if drain is None else gap_range(drain),
-            gaps=gaps,
+            calibration=calibration,
+            placement=placement_from(gap, eccentricity, pitch, None, ends, flow, yaw),
+            weight=not no_weight,
+            roughness=roughness,
+            in_tube={"azimuth": azimuth, "friction_coefficient": friction_coefficient},
+            until=until,
             progress=progress,
         )
     if target is not None:

@@ -20,7 +20,18 @@ from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.kernels import rigid_links, tube_motion, tube_steps, tube_table
 
-__all__ = ["INTEGRATOR", "INTERRUPTED", "TOLERANCE", "Checkpoint", "TubeTrajectory", "integrate_in_tube", "observed_at"]
+__all__ = [
+    "INTEGRATOR",
+    "INTERRUPTED",
+    "TOLERANCE",
+    "Checkpoint",
+    "TubeTrajectory",
+    "integrate_in_tube",
+    "observed_at",
+    "range_left",
+    "step_sizes",
+    "watched_limits",
+]
 
 TOLERANCE = 1e-8
 """Error of a step over the sizes of the state's components."""
@@ -150,10 +161,10 @@ def _stretch(
     run: _Run, duty: float, stop: float, end: float, inside: Samples, *, spent: bool, tell: Callable[[float], None]
 ) -> _Stretch:
     robot = run.robot.at_duty(duty)
-    data, limits = robot.data, _limits(robot, run.reach, spent=spent)
+    data, limits = robot.data, watched_limits(robot, run.reach, spent=spent)
     tube_steps.watched(run.state, 0.0, data, limits, robot.roughness, run.gaps)
     states = np.empty((inside.size, tube_motion.STATES))
-    sizes, done = _sizes(robot), 0
+    sizes, done = step_sizes(robot), 0
     events: list[Event] = []
     clip = stop <= end
     target, what = min(stop, end), ""
@@ -226,7 +237,7 @@ def _crossed(
         elif place == sites + tube_steps.ROOM:
             what = _END
         else:
-            what = _left(robot, inner, moment, data)
+            what = range_left(robot, inner, moment, data)
         run.state[:] = inner
         run.memory[tube_steps.TIME] = moment
         run.memory[tube_steps.STEP] = run.memory[tube_steps.LAST_STEP]
@@ -239,7 +250,7 @@ _RANGES = {tube_table.TOO_FAR_PITCHED: "pitch", tube_table.TOO_FAR_YAWED: "yaw"}
 """What `resistance_at` says was left."""
 
 
-def _left(robot: TubeRobot, state: Samples, time: float, data: Samples) -> str:
+def range_left(robot: TubeRobot, state: Samples, time: float, data: Samples) -> str:
     """A sentence on the range of the table that was left."""
     tube_motion.rates(np.empty(tube_motion.STATES), time, state, data, robot.table)
     name = _RANGES.get(int(data[tube_motion.OUTSIDE]), "place")
@@ -250,7 +261,8 @@ def _left(robot: TubeRobot, state: Samples, time: float, data: Samples) -> str:
     )
 
 
-def _limits(robot: TubeRobot, reach: Reach, *, spent: bool) -> Samples:
+def watched_limits(robot: TubeRobot, reach: Reach, *, spent: bool = False) -> Samples:
+    """Where tube and battery end, as `spirillum.kernels.tube_steps` reads it; a spent battery ends no more."""
     found = np.empty(tube_steps.LIMITS)
     found[tube_steps.CHANNEL], found[tube_steps.MIDDLE] = reach.channel, reach.middle
     found[tube_steps.NOSE], found[tube_steps.TIP] = reach.nose, reach.tip
@@ -259,7 +271,7 @@ def _limits(robot: TubeRobot, reach: Reach, *, spent: bool) -> Samples:
     return found
 
 
-def _sizes(robot: TubeRobot) -> Samples:
+def step_sizes(robot: TubeRobot) -> Samples:
     """Sizes of the state's components below which nothing matters; a small change of time; the time of a turn."""
     sizes = state_sizes(robot.drive, robot.length, robot.torque, tube_motion.STATES)
     changing = robot.drive[rigid_links.KIND] == rigid_links.MAGNETIC or len(robot.flow) > 1

@@ -11,7 +11,7 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.start import turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
-from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, tube_robot
+from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_start import StartPlace, check_roughness
 from spirillum.errors import InputError
@@ -29,7 +29,7 @@ from spirillum.units import show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_in_tube", "run_in_tube"]
+__all__ = ["check_in_tube", "links_in_tube", "run_in_tube"]
 
 
 def run_in_tube(
@@ -58,17 +58,9 @@ def run_in_tube(
         InputError: for a tail that does not turn, or a place where the robot cannot lie.
     """
     robot = steady.robot
-    turn = 2.0 * np.pi / turning_rate(steady)
     own = robot.drive.duty if robot.drive is not None else 1.0
-    around = _around(robot, placed, asked, roughness)
-    links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
-    start = StartPlace(
-        gap=placed.gap,
-        eccentricity=placed.eccentricity,
-        pitch=placed.pitch or 0.0,
-        yaw=placed.yaw,
-        azimuth=asked.azimuth,
-    )
+    links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
+    turn = links.turn
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
@@ -81,6 +73,29 @@ def run_in_tube(
     return dataset.assign_attrs(
         warnings="\n".join(said), error_estimate=error, table=table.key, error_against=TabledTube.error_against
     )
+
+
+def links_in_tube(
+    steady: Prediction,
+    table: TubeTable,
+    placed: Placement,
+    asked: InTube,
+    roughness: float | None,
+    *,
+    weight: bool,
+) -> tuple[TubeRobot, StartPlace]:
+    """What a robot's rates in its tube follow from, and where it is laid down; arguments as `run_in_tube`."""
+    turn = 2.0 * np.pi / turning_rate(steady)
+    around = _around(steady.robot, placed, asked, roughness)
+    links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)
+    start = StartPlace(
+        gap=placed.gap,
+        eccentricity=placed.eccentricity,
+        pitch=placed.pitch or 0.0,
+        yaw=placed.yaw,
+        azimuth=asked.azimuth,
+    )
+    return links, start
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:

@@ -16,7 +16,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import GAP_SHARE, Seat, largest_gap
 from spirillum.units import show
 
-__all__ = ["StartPlace", "check_in_table", "check_roughness", "laid_down"]
+__all__ = ["StartPlace", "check_in_table", "check_roughness", "laid_down", "state_at"]
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ def laid_down(robot: Robot, links: TubeRobot, start: StartPlace) -> Samples:
     """
     radius, a = float(links.tube[kernel.RADIUS]), 0.5 * robot.body.diameter
     if start.eccentricity is not None:
-        state = _at(start, start.eccentricity * (radius - a))
+        state = state_at(start, start.eccentricity * (radius - a))
     else:
-        state = _at(start, _offset(robot, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
+        state = state_at(start, _offset(robot, start, GAP_SHARE * a if start.gap is None else start.gap, radius))
     gaps = links.gaps(state)
     if gaps.min() <= 0.0:
         name = links.names[int(np.argmin(gaps))]
@@ -95,7 +95,8 @@ def check_in_table(links: TubeRobot, state: Samples, outside: float) -> None:
         )
 
 
-def _at(start: StartPlace, offset: float) -> Samples:
+def state_at(start: StartPlace, offset: float) -> Samples:
+    """The state, (19,), of a robot at rest whose body's mid-length is at an offset, m, in place of the start's gap."""
     from scipy.spatial.transform import Rotation
 
     state = np.zeros(kernel.STATES)

@@ -21,7 +21,7 @@ from spirillum.swimming.balance import (
 )
 from spirillum.swimming.motor import steady_current
 
-__all__ = ["DriveState", "at_rate", "driven", "one_piece"]
+__all__ = ["DriveState", "at_rate", "current_at", "driven", "one_piece"]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def at_rate(
     # What acts inside the joint cancels in the sum of both torques and does not change the motion.
     body_rate, tail = _rates_at(s, friction_torques("body", wall, np.zeros(1)), tail_rate, motor_rate)
     slip = np.where(np.isnan(motor_rate), tail - body_rate, motor_rate)
-    current = _current_at(motor, slip)
+    current = current_at(motor, slip)
     spare = motor.joint_torque_constant * current - s.rotor_load(body_rate, tail)
     if friction == "rotor":
         inferred = spare / slip
@@ -137,7 +137,7 @@ def _at_rate_paper(s: TorqueBalance, motor: Electrics, tail_rate: PerRobot, moto
     return DriveState(body_rate, tail, current, inferred, t, np.full(1, np.nan))
 
 
-def _current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
+def current_at(motor: Electrics, motor_rate: PerRobot) -> PerRobot:
     """Signed current at a given motor rate, from (17)."""
     emf = motor.joint_back_emf_constant * motor.polarity * motor_rate
     return motor.polarity * steady_current(motor, emf, np.zeros(1))

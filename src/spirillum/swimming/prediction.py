@@ -32,6 +32,7 @@ from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.intervals import Intervals, intervals_of
+from spirillum.swimming.lying import Lying
 from spirillum.swimming.steady import (
     calibrated_balance,
     friction_reading,
@@ -87,6 +88,8 @@ class Prediction:
     """Lateral motion and tilt held, or released."""
     interval_of: str = ""
     """Whose the intervals are, in half a sentence; empty without a posterior."""
+    lying: Lying | None = None
+    """Where a free robot comes to lie in its tube, from where it was laid down (`placement`); None for others."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -123,6 +126,7 @@ class Prediction:
             **quantities,
             **({"interval_of": self.interval_of} if self.interval_of else {}),
             "placement": self.placement,
+            **({"lying": self.lying.to_dict()} if self.lying else {}),
             **({"band": band.to_dict()} if band else {}),
             "error_estimate": quantity(
                 self.error_estimate,
@@ -182,8 +186,10 @@ def predict(
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
         band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
             place alone.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`: released, without weight
-            and walls; the forward velocity is then that along the axis of the screw on which the robot moves.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `tube`, the
+            robot is followed in its tube from the placement to its steady motion, with weight, film and contact
+            (`spirillum.settle` has the way there and more options). Free with `rft` or `slender` it has neither weight
+            nor walls; the forward velocity is then that along the axis of the screw on which the robot moves.
         progress: told what is being computed, how many places are done, and of how many.
 
     Raises:

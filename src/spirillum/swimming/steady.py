@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields
-from typing import cast, get_args
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from spirillum.swimming.freedom import Motion, Screw, check_full, motion_of
 from spirillum.swimming.motor import battery_voltage, run_time
 
 __all__ = [
+    "Rates",
     "Swimming",
     "calibrated_balance",
     "calibrated_resistance",
@@ -30,8 +32,10 @@ __all__ = [
     "requirements",
     "speed_difference",
     "swim",
+    "swimming_of",
 ]
 
+_MORE = ("wobble_angle", "path_radius", "step_out_rate", "phase_lag", "plug_velocity")
 _BLOCK = 1 << 15  # robots worked on at once: their columns stay in the processor's cache
 
 
@@ -195,9 +199,71 @@ def _answer(
         dissipated = np.where(from_field, shaft, dissipated)
     else:
         drive, shaft = load, load * slip
-    towing = body_axial(batch)[0] * speed**2
-    motor, current = batch.electrics, state.current
     none: PerRobot = np.full(1, np.nan)
+    rates = Rates(
+        speed=speed,
+        body_rate=body_rate,
+        tail_rate=tail_rate,
+        load=load,
+        drive=drive,
+        shaft=shaft,
+        friction=state.torques.power(body_rate, tail_rate),
+        dissipated=dissipated,
+        current=state.current,
+        effective=state.effective,
+        residual=state.residual,
+    )
+    more = {
+        "wobble_angle": none if screw is None else screw.tilt,
+        "path_radius": none if screw is None else screw.radius,
+        "step_out_rate": state.step_out,
+        "phase_lag": state.lag,
+        "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
+    }
+    return swimming_of(batch, rates, valid, more)
+
+
+class Rates(NamedTuple):
+    """Steady motion, torques and powers from which all other quantities follow; SI, signed about +x."""
+
+    speed: PerRobot
+    """U_x."""
+    body_rate: PerRobot
+    """Omega_x."""
+    tail_rate: PerRobot
+    """omega, in the lab."""
+    load: PerRobot
+    """T_h of (18)."""
+    drive: PerRobot
+    """Torque that turns the rotor, or the whole of one piece, against the fluid."""
+    shaft: PerRobot
+    """Its power."""
+    friction: PerRobot
+    """Power lost to friction."""
+    dissipated: PerRobot
+    """Power lost to the fluid."""
+    current: PerRobot
+    """I of the motor; NaN without one."""
+    effective: PerRobot
+    """B_eff, or B of the wall."""
+    residual: PerRobot
+    """Motor torque that the reading leaves unexplained."""
+
+
+def swimming_of(batch: RobotBatch, rates: Rates, valid: Flags, more: Mapping[str, PerRobot]) -> Swimming:
+    """All quantities of steady swimming.
+
+    Args:
+        batch: the robots.
+        rates: their motion.
+        valid: which of them have one.
+        more: further quantities of `Swimming` by name; those that are left out are NaN.
+    """
+    speed, body_rate, tail_rate, load, drive, shaft, friction, dissipated, current, effective, residual = rates
+    slip = tail_rate - body_rate
+    none: PerRobot = np.full(1, np.nan)
+    towing = body_axial(batch)[0] * speed**2
+    motor = batch.electrics
     voltage = electrical = lasting = none
     if motor is not None and batch.drive == "dc-motor":
         voltage = battery_voltage(motor, current)
@@ -213,11 +279,11 @@ def _answer(
         "drive_torque": drive,
         "motor_current": current,
         "battery_voltage": voltage,
-        "effective_friction": state.effective,
-        "motor_residual_torque": state.residual,
+        "effective_friction": effective,
+        "motor_residual_torque": residual,
         "electrical_power": electrical,
         "shaft_power": shaft,
-        "friction_power": state.torques.power(body_rate, tail_rate),
+        "friction_power": friction,
         "dissipated_power": dissipated,
         "hydrodynamic_efficiency": towing / shaft,
         "propulsive_power": towing,
@@ -226,14 +292,10 @@ def _answer(
         "reynolds_number": batch.density * np.abs(speed) * batch.body_diameter / batch.viscosity,
         "tail_reynolds_number": batch.density * np.abs(tail_rate) * batch.amplitude**2 / batch.viscosity,
         "battery_run_time": lasting,
-        "wobble_angle": none if screw is None else screw.tilt,
-        "path_radius": none if screw is None else screw.radius,
-        "step_out_rate": state.step_out,
-        "phase_lag": state.lag,
-        "plug_velocity": none if mean_flow is None else _plug_velocity(mean_flow, speed, body_rate, tail_rate),
+        **{name: more.get(name, none) for name in _MORE},
     }
     # A motor driven beyond any root of (17), or a friction inferred at rest, is no answer either.
-    moving = valid & np.isfinite(speed) & ~np.isinf(state.effective)
+    moving = valid & np.isfinite(speed) & ~np.isinf(effective)
     if motor is not None and batch.drive == "dc-motor" and batch.joint == "revolute":
         moving = moving & np.isfinite(current)
     shaped = {name: np.where(moving, value, np.nan) for name, value in values.items()}

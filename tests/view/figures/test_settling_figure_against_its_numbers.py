@@ -1,4 +1,4 @@
-"""The figure of `settle` shows the path and the films that it is given."""
+"""The figure of `settle` shows the way and the place that it is given."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -6,41 +6,43 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.dynamics.resting_forces import Film, descent_of
 from spirillum.view.figures.settling import settling_figure
 
+TIME = np.linspace(0.0, 30.0, 200)
+WAY = {
+    "time": TIME,
+    "gap": 5e-4 / (1.0 + TIME) ** 2,
+    "azimuth": -0.1 * (1.0 - np.exp(-TIME)),
+    "pitch": 0.01 * np.exp(-TIME),
+    "yaw": -0.02 * TIME / 30.0,
+}
 
-@pytest.fixture
-def settling() -> Any:
-    """Made-up films with a power law, in the place of an answer."""
-    gaps = np.array([1e-3, 5e-4, 2e-4])
-    films = [
-        Film(h, 0.011 - h, -0.2, np.array([[-3e-3, 0.0, 0.0, 0.0]]), np.diag([15.0, 2.5e-3 * h**-1.5, 0.02]))
-        for h in gaps
-    ]
+
+def settling(state: str) -> Any:
+    """A made-up way in the place of an answer."""
     return SimpleNamespace(
         robot=SimpleNamespace(name="a robot with $ in its name"),
         prediction=SimpleNamespace(tail_rotation_rate=7.5),
         weight=0.028,
-        films=films,
-        descent=descent_of(films, 0.028),
-        lubrication_ratios=np.array([1.0, 0.9, 0.8]),
+        roughness=1e-6,
+        friction_coefficient=0.1,
+        lying=SimpleNamespace(state=state, gap=6e-7, azimuth=-0.1, pitch=0.001, yaw=-0.03),
+        way=WAY.__getitem__,
     )
 
 
-def test_panels_show_gap_azimuth_and_resistance(settling: Any) -> None:
-    gap, azimuth, resistance = settling_figure(settling).axes
+def test_panels_show_gap_azimuth_and_tilt() -> None:
+    gap, azimuth, tilt = settling_figure(settling("steady")).axes
     assert gap.get_xlabel() == "time (s)"
     assert "(mm)" in gap.get_ylabel()
-    assert gap.lines[0].get_ydata() == pytest.approx(1e3 * settling.descent.gap)
-    assert azimuth.lines[0].get_ydata() == pytest.approx(np.rad2deg(settling.descent.azimuth))
-    thin, computed = resistance.lines
-    assert computed.get_ydata() == pytest.approx([2.5e-6 * h**-1.5 for h in (1e-3, 5e-4, 2e-4)])
-    assert np.asarray(computed.get_ydata()) / np.asarray(thin.get_ydata()) == pytest.approx([1.0, 0.9, 0.8])
-    assert "(kN s/m)" in resistance.get_ylabel()
+    assert gap.get_yscale() == "log"
+    assert gap.lines[0].get_ydata() == pytest.approx(1e3 * WAY["gap"])
+    assert azimuth.lines[0].get_ydata() == pytest.approx(np.rad2deg(WAY["azimuth"]))
+    assert [line.get_label() for line in tilt.lines if not str(line.get_label()).startswith("_")] == ["pitch", "yaw"]
+    assert gap.lines[1].get_ydata()[0] == pytest.approx(6e-4)
+    assert azimuth.lines[1].get_ydata()[0] == pytest.approx(np.rad2deg(-0.1))
 
 
-def test_body_without_a_straight_side_has_no_thin_film_line(settling: Any) -> None:
-    settling.lubrication_ratios = np.full(3, np.nan)
-    *_, resistance = settling_figure(settling).axes
-    assert len(resistance.lines) == 1
+def test_no_place_is_drawn_where_none_was_found() -> None:
+    gap, azimuth, tilt = settling_figure(settling("changing")).axes
+    assert [len(panel.lines) for panel in (gap, azimuth, tilt)] == [1, 1, 2]

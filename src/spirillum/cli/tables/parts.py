@@ -11,7 +11,17 @@ from rich.table import Table
 
 from spirillum.units import display_unit, in_unit
 
-__all__ = ["Answer", "add_bands", "add_quantities", "counted", "friendly", "grid", "show_error", "show_placement"]
+__all__ = [
+    "Answer",
+    "add_bands",
+    "add_quantities",
+    "counted",
+    "friendly",
+    "grid",
+    "show_error",
+    "show_lying",
+    "show_placement",
+]
 
 
 Answer = Mapping[str, Any]
@@ -63,6 +73,23 @@ def show_placement(placement: Answer, console: Console) -> None:
         elif name != "kind" and isinstance(item, str):
             said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
     console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
+
+
+def show_lying(lying: Answer, console: Console) -> None:
+    """Where a free robot comes to lie."""
+    said = [_STATES[lying["state"]]]
+    for name, item in lying.items():
+        if isinstance(item, Mapping) and item["value"] not in (None, 0.0):
+            said.append(f"{name.replace('_', ' ')} {' '.join(friendly(item['value'], item['unit']))}".rstrip())
+    console.print(f"laid down there and followed: {', '.join(said)}", highlight=False, soft_wrap=True)
+
+
+_STATES = {
+    "steady": "steady",
+    "orbits": "orbits the tube's axis",
+    "goes around": "goes around the tube",
+    "changing": "still changing",
+}
 
 
 def _band_words(item: Mapping[str, Any]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error, show_placement
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error, show_lying, show_placement
 
 __all__ = ["table"]
 
@@ -23,6 +23,8 @@ def table(answer: Answer, console: Console) -> None:
         add_quantities(rows, quantities)
     console.print(rows)
     show_placement(answer["placement"], console)
+    if "lying" in answer:
+        show_lying(answer["lying"], console)
     if answer["forward_velocity"].get("kind") == "interval":
         level = answer["forward_velocity"]["level"]
         console.print(f"low and high: {100 * level:g} % interval of the robot's own motion", highlight=False)

@@ -1,11 +1,10 @@
-"""How a robot settles in its tube: gap and azimuth over time, and the film's resistance over the gap."""
+"""How a robot settles in its tube: gap, azimuth and tilt over time, and where it comes to lie."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, NullLocator, StrMethodFormatter
 
 from spirillum.dynamics.settling import Settling
 from spirillum.units import Hz
@@ -16,7 +15,7 @@ __all__ = ["settling_figure"]
 
 
 def settling_figure(settling: Settling) -> Figure:
-    """Three panels: gap over time, azimuth over time, normal resistance over the gap with thin-film theory.
+    """Three panels over time: gap, azimuth, pitch and yaw; dashed where the robot comes to lie.
 
     Args:
         settling: what `spirillum.settle` returns.
@@ -26,7 +25,8 @@ def settling_figure(settling: Settling) -> Figure:
         sheet = Sheet(
             f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
-            "level, from the lowest place · computed, nothing is measured",
+            f"roughness {1e6 * settling.roughness:.3g} um · friction {settling.friction_coefficient:.3g} · "
+            "computed, nothing is measured",
             width=9.0,
             heights=[2.2],
             columns=3,
@@ -36,44 +36,47 @@ def settling_figure(settling: Settling) -> Figure:
         add_letters(panels)
         _gap(panels[0], settling)
         _azimuth(panels[1], settling)
-        _resistance(panels[2], settling)
+        _tilt(panels[2], settling)
         return sheet.finished()
 
 
 def _gap(axes: Axes, settling: Settling) -> None:
-    descent = settling.descent
-    lengths = Scale.of(descent.gap, "m")
-    axes.plot(descent.time, lengths(descent.gap), color=COLOURS["blue"])
-    axes.set_ylim(bottom=0.0)
-    axes.set_xlim(0.0, descent.time[-1])
-    axes.set_xlabel("time (s)")
+    gap = settling.way("gap")
+    lengths = Scale.of(gap, "m")
+    axes.semilogy(settling.way("time"), lengths(gap), color=COLOURS["blue"])
+    if settling.lying.state == "steady":
+        _steady(axes, float(lengths(np.array(settling.lying.gap))))
+        axes.legend(loc="upper right")
+    _over_time(axes, settling)
     axes.set_ylabel(f"gap under the body ({lengths.unit})")
 
 
 def _azimuth(axes: Axes, settling: Settling) -> None:
-    descent = settling.descent
-    axes.plot(descent.time, np.rad2deg(descent.azimuth), color=COLOURS["vermillion"])
-    axes.set_xlim(0.0, descent.time[-1])
-    axes.set_xlabel("time (s)")
+    axes.plot(settling.way("time"), np.rad2deg(settling.way("azimuth")), color=COLOURS["vermillion"])
+    if settling.lying.state == "steady":
+        _steady(axes, np.rad2deg(settling.lying.azimuth))
+    _over_time(axes, settling)
     axes.set_ylabel("azimuth on the wall (deg)")
 
 
-def _resistance(axes: Axes, settling: Settling) -> None:
-    gaps = np.array([film.gap for film in settling.films])
-    values = np.array([film.normal_resistance for film in settling.films])
-    lengths, scale = Scale.of(gaps, "m"), Scale.of(values, "N s/m")
-    thin = values / settling.lubrication_ratios
-    if np.all(np.isfinite(thin)):
-        axes.loglog(
-            lengths(gaps), scale(thin), color="#555555", linestyle=(0, (4, 2)), label=r"thin film, $\propto h^{-3/2}$"
-        )
-    axes.loglog(lengths(gaps), scale(values), color=COLOURS["blue"], marker="o", linestyle="none", label="computed")
-    ticks = np.array([1.0, 2.0, 5.0]) * 10.0 ** np.arange(-9, 9)[:, None]
-    for axis, shown in ((axes.xaxis, lengths(gaps)), (axes.yaxis, scale(values))):
-        inside = ticks[(ticks > 0.8 * shown.min()) & (ticks < 1.25 * shown.max())]
-        axis.set_major_locator(FixedLocator(inside.tolist()))
-        axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axes.set_xlabel(f"gap $h$ ({lengths.unit})")
-    axes.set_ylabel(f"resistance to sinking ({scale.unit})")
+def _tilt(axes: Axes, settling: Settling) -> None:
+    for name, colour, rest in (
+        ("pitch", "green", settling.lying.pitch),
+        ("yaw", "purple", settling.lying.yaw),
+    ):
+        axes.plot(settling.way("time"), np.rad2deg(settling.way(name)), color=COLOURS[colour], label=name)
+        if settling.lying.state == "steady":
+            _steady(axes, np.rad2deg(rest), label="")
+    _over_time(axes, settling)
+    axes.set_ylabel("tilt against the wall (deg)")
     axes.legend(loc="upper right")
+
+
+def _over_time(axes: Axes, settling: Settling) -> None:
+    axes.set_xlim(0.0, settling.way("time")[-1])
+    axes.set_xlabel("time (s)")
+
+
+def _steady(axes: Axes, value: float, label: str = "steady") -> None:
+    """Where the robot comes to lie."""
+    axes.axhline(value, color="#555555", linestyle=(0, (4, 2)), linewidth=0.9, label=label or None)

@@ -1,0 +1,210 @@
+"""Free motion of a robot in its tube: where weight, film, contact and its own motion make it lie, and how it swims.
+
+The motion is the run of `simulate`, followed to where it no longer changes from turn to turn of the tail; every
+quantity is the mean over such a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.dynamics.averages import Stretch
+from spirillum.dynamics.integration import Progress, Reach
+from spirillum.dynamics.long_run import LongRun, long_run
+from spirillum.dynamics.record import dataset_of
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
+from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
+from spirillum.dynamics.tube_start import check_in_table, check_roughness, laid_down
+from spirillum.errors import InputError
+from spirillum.kernels import rigid_links
+from spirillum.kernels import tube_motion as kernel
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.drives import current_at
+from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.swimming.preparation import table_for
+from spirillum.swimming.steady import Rates, swimming_of
+from spirillum.units import KINDS, parse_option, show
+
+__all__ = ["FreeMotion", "free_motion"]
+
+_SAMPLES = 240
+"""Samples of the turn over which means are taken."""
+_NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
+_LIGHT = 1e-9
+"""Weight in the fluid, over the forces that act, below which a robot has none."""
+
+
+class FreeMotion(NamedTuple):
+    """A free robot in its tube, followed to its steady motion."""
+
+    prediction: Prediction
+    """The steady motion; where it lies is `prediction.lying`."""
+    run: LongRun
+    """How it came there."""
+    robot: TubeRobot
+    """What its rates follow from."""
+    start_gap: float
+    """Smallest distance of body and wall where it was laid down, m."""
+
+
+def free_motion(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    tail_rate: str | float | None = None,
+    friction: str | None = None,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    weight: bool = True,
+    roughness: str | float | None = None,
+    in_tube: InTube | Mapping[str, Any] | None = None,
+    until: float | None = None,
+    progress: Progress | None = None,
+) -> FreeMotion:
+    """Follow a free robot in its tube from where it is laid down to its steady motion.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
+        tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
+        friction: reading of the friction; None: the robot's own.
+        calibration: calibration file whose effective friction replaces the robot's.
+        placement: where it is laid down, the ends of the channel, and a constant flow.
+        weight: let weight and buoyancy act, if the masses are known.
+        roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
+        in_tube: azimuth of the start and coefficient of dry friction.
+        until: gap that it has to reach, m; None: no such gap.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Raises:
+        InputError: for wrong input, or a motion that cannot be followed for a turn.
+    """
+    placed, asked = Placement.of(placement), InTube.of(in_tube)
+    height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+    _check(asked)
+    ready, _, batch = prepared(load(robot), "tube", calibration=calibration, placement=placed)
+    if batch.drive == "magnetic":
+        raise InputError(
+            "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: `simulate`, or motion "
+            "'held'"
+        )
+    check_in_tube(ready, placed, asked, height)
+    table = table_for(batch, progress=progress)
+    held = predict(ready, model="tube", tail_rate=tail_rate, friction=friction, placement=placed, band=False)
+    links, start = links_in_tube(held, table, placed, asked, height, weight=weight)
+    links = _driven(links, held, prescribed=tail_rate is not None)
+    state = laid_down(ready, links, start)
+    check_roughness(links.roughness, float(links.gaps(state).min()))
+    check_in_table(links, state, observed_at(links, state)[kernel.OUTSIDE])
+    gap = float(observed_at(links, state)[rigid_links.FILM])
+    if until is not None and not until < gap:
+        raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
+    load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
+    heavy = load_size > _LIGHT * links.torque
+    tell = progress or (lambda _what, _done, _total: None)
+    sign = float(np.sign(held.tail_rotation_rate))
+    run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
+    swimming = _means(held, links, run, prescribed=tail_rate is not None)
+    warnings = (*held.warnings, *_said(run, links, weight=weight))
+    found = replace(held, swimming=swimming, warnings=warnings, motion="free", lying=run.lying)
+    return FreeMotion(found, run, links, gap)
+
+
+def _check(asked: InTube) -> None:
+    """Refuse what changes in time.
+
+    Raises:
+        InputError: if there is something.
+    """
+    for name in ("wait", "flow"):
+        if getattr(asked, name) is not None:
+            raise InputError(
+                f"in_tube.{name} = {str(getattr(asked, name))[:80]} has no steady motion; allowed: with `simulate`"
+            )
+
+
+def _driven(links: TubeRobot, held: Prediction, *, prescribed: bool) -> TubeRobot:
+    """The robot with its drive on, or with its tail at the rate that was asked for."""
+    drive = held.robot.drive
+    if not prescribed:
+        return links.at_duty(1.0 if drive is None else drive.duty)
+    changed = links.drive.copy()
+    changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
+    changed[rigid_links.GIVEN] = held.tail_rotation_rate
+    return replace(links, drive=changed)
+
+
+def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
+    """What to be careful about, a sentence each."""
+    found = [run.ended] if run.ended else []
+    if weight and not links.weight.any():
+        found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+    if run.lying.state == "goes around":
+        found.append("its weight does not hold the robot: it goes around the tube")
+    slow = run.lying.approach_time
+    if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
+        found.append(
+            f"a small distance from the steady motion falls by e in {slow:.3g} s: a trial of some turns does not reach "
+            "it; `simulate` follows the way there"
+        )
+    return found
+
+
+def _means(held: Prediction, links: TubeRobot, run: LongRun, *, prescribed: bool) -> Swimming:
+    """Means over the last turn (going around: over the last circuit, of speeds and rates alone)."""
+    turn = run.turn
+    time = np.linspace(0.0, turn.time, _SAMPLES + 1)
+    duty = float(links.drive[rigid_links.DUTY])
+    start = run.start.copy()
+    start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
+    start[rigid_links.CURRENT + 1 :] = 0.0
+    followed = integrate_in_tube(links, start, time, [Switch(0.0, duty)], _NOWHERE)
+    more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
+    series = dataset_of(held, links, followed, [Stretch(0.0, float(followed.time[-1]))], more, {})
+
+    def mean(name: str) -> float:
+        return float(np.trapezoid(series[name].values, followed.time) / followed.time[-1])
+
+    tail = mean("tail_rotation_rate")
+    body = mean("body_rotation_rate")
+    load_torque = mean("drive_torque")
+    current, effective, residual = held.motor_current, held.effective_friction, np.nan
+    motor = held.batch.electrics
+    if motor is not None and held.batch.drive == "dc-motor":
+        if prescribed:
+            slip = tail - body
+            current = float(current_at(motor, np.array([slip]))[0])
+            spare = float(motor.joint_torque_constant[0]) * current - load_torque
+            if held.friction == "rotor":
+                effective = spare / slip
+            else:
+                residual = spare - (float(motor.joint_rotor_friction[0]) * slip if held.friction == "body" else 0.0)
+        else:
+            current = mean("motor_current")
+    rates = {
+        "speed": mean("forward_velocity"),
+        "body_rate": body,
+        "tail_rate": tail,
+        "load": load_torque,
+        "drive": load_torque,
+        "shaft": mean("shaft_power"),
+        "friction": effective * (tail - body) ** 2
+        if prescribed and held.friction == "rotor"
+        else mean("friction_power"),
+        "dissipated": mean("dissipated_power"),
+        "current": current,
+        "effective": effective,
+        "residual": residual,
+    }
+    arrays = Rates(**{name: np.array([value]) for name, value in rates.items()})
+    flow = {"plug_velocity": np.array([mean("mean_flow")])}
+    return swimming_of(held.batch, arrays, np.array([True]), flow)

@@ -1,0 +1,158 @@
+"""Free motion in the tube: its steady place against runs, laws, symmetries and balances; all answers agree."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.dynamics.free_motion import FreeMotion, free_motion
+from spirillum.dynamics.resting_film import lubrication_resistance
+from spirillum.dynamics.tube_integration import observed_at
+from spirillum.dynamics.turn_map import TurnMap
+from spirillum.kernels import tube_motion as kernel
+
+ROUGH = "100 um"  # it comes to rest soon
+
+
+@lru_cache
+def robot() -> Any:
+    return sp.load("biorob2012-wide", **{"friction.effective": "1.1e-5 N m s/rad"})
+
+
+@lru_cache
+def found(coefficient: float = 0.1, tail_rate: str | None = None) -> FreeMotion:
+    in_tube = {"friction_coefficient": coefficient}
+    return free_motion(robot(), roughness=ROUGH, in_tube=in_tube, tail_rate=tail_rate)
+
+
+def test_simulation_laid_down_at_the_steady_place_stays_there() -> None:
+    """Within the ripple of the tail's phase: speed and body rate to 1 %, azimuth and yaw to 0.1 degrees."""
+    motion = found().prediction
+    lying = motion.lying
+    assert lying is not None
+    assert lying.state == "steady"
+    place = {"gap": lying.gap, "pitch": lying.pitch, "yaw": lying.yaw}
+    run = sp.simulate(
+        robot(),
+        model="tube",
+        motion="free",
+        roughness=ROUGH,
+        placement=place,
+        in_tube={"azimuth": lying.azimuth, "friction_coefficient": 0.1},
+        timing={"turns": 6.0},
+    )
+    assert float(run["mean_forward_velocity"]) == pytest.approx(motion.forward_velocity, rel=0.01)
+    assert float(run["mean_body_rotation_rate"]) == pytest.approx(motion.body_rotation_rate, rel=0.01)
+    assert np.degrees(float(run["azimuth"][-1])) == pytest.approx(np.degrees(lying.azimuth), abs=0.1)
+    assert np.degrees(float(run["wall_yaw"][-1])) == pytest.approx(np.degrees(lying.yaw), abs=0.1)
+
+
+def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> None:
+    """From a tenth of a degree beside it: by e in the approach time, once the faster ways have died out."""
+    motion = found()
+    lying = motion.run.lying
+    turns = TurnMap(motion.robot, 1.0)
+    state = motion.run.start.copy()
+    rest = float(observed_at(motion.robot, state)[kernel.AZIMUTH])
+    cos, sin = np.cos(0.002), np.sin(0.002)
+    state[1:3] = cos * state[1] - sin * state[2], sin * state[1] + cos * state[2]
+    state[3:7] = _turned_about_x(state[3:7], 0.002)
+    away, time = [], 0.0
+    for _ in range(70):
+        turn = turns.after(state)
+        state, time = turn.state, time + turn.time
+        away.append((time, float(observed_at(motion.robot, state)[kernel.AZIMUTH]) - rest))
+    late = np.array(away[45:])
+    slope = np.polyfit(late[:, 0], np.log(np.abs(late[:, 1])), 1)[0]
+    assert -1.0 / slope == pytest.approx(lying.approach_time, rel=0.1)
+
+
+def _turned_about_x(quaternion: np.ndarray, angle: float) -> np.ndarray:
+    w, x, y, z = quaternion
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return np.array([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y])
+
+
+def test_film_carries_the_body_and_dry_friction_rolls_it_back() -> None:
+    """The tail is right-handed: the body turns to negative rates, and so does the azimuth in a film."""
+    film, dry = found(0.0).run.lying, found(0.3).run.lying
+    assert found(0.0).prediction.body_rotation_rate < 0
+    assert film.azimuth < -0.1
+    assert dry.azimuth > film.azimuth + 0.1
+
+
+def test_asperities_carry_the_weight_less_what_the_film_does() -> None:
+    weight = float(found().robot.weight[:2].sum())
+    assert found().run.lying.contact_force == pytest.approx(weight, rel=0.1)
+    assert found(0.0).run.lying.contact_force == pytest.approx(weight * np.cos(found(0.0).run.lying.azimuth), rel=0.1)
+
+
+def test_powers_of_the_steady_motion_balance() -> None:
+    """Of the motor: K_m I omega_m goes to friction and shaft; of the shaft: to the fluid, and to dry friction."""
+    motion = found(0.0).prediction
+    given = robot().motor.torque_constant * motion.motor_current * motion.motor_rotation_rate
+    assert motion.shaft_power + motion.friction_power == pytest.approx(given, rel=2e-3)
+    assert motion.shaft_power == pytest.approx(motion.dissipated_power, rel=2e-3)
+    assert motion.tail_rotation_rate - motion.body_rotation_rate == pytest.approx(motion.motor_rotation_rate)
+
+
+def test_friction_is_inferred_at_a_tail_rate_that_is_given() -> None:
+    """At the rate at which the motor turns it: the friction that was put in, and the same place."""
+    driven = found()
+    rate = driven.prediction.tail_rotation_rate
+    given = found(0.1, f"{rate!r} rad/s")
+    assert given.prediction.effective_friction == pytest.approx(1.1e-5, rel=0.01)
+    assert given.prediction.forward_velocity == pytest.approx(driven.prediction.forward_velocity, rel=0.01)
+    assert given.run.lying.azimuth == pytest.approx(driven.run.lying.azimuth, abs=2e-3)
+
+
+def test_predict_settle_and_the_engine_say_the_same() -> None:
+    """With the robot's own roughness and friction; what `settle` adds is the way there."""
+    rough = {"roughness": ROUGH, "in_tube": {"friction_coefficient": 0.1}}
+    answer = sp.settle(robot(), **rough, until="0.2 mm")
+    motion = found()
+    assert answer.prediction.forward_velocity == pytest.approx(motion.prediction.forward_velocity, rel=1e-9)
+    assert answer.lying == motion.run.lying
+    gap, time = answer.way("gap"), answer.way("time")
+    assert np.interp(answer.drainage_time, time, gap) == pytest.approx(2e-4, rel=1e-2)
+    run = sp.simulate(robot(), model="tube", motion="free", timing={"duration": "3 s"}, roughness=ROUGH)
+    step = int(np.argmin(np.abs(time - answer.drainage_time)))
+    for name, ours in (("wall_gap", "gap"), ("azimuth", "azimuth"), ("wall_pitch", "pitch"), ("wall_yaw", "yaw")):
+        theirs = float(np.interp(time[step], run["time"], run[name]))
+        assert float(answer.way(ours)[step]) == pytest.approx(theirs, rel=0.01), name
+    content = answer.to_dict()
+    assert content["lying"]["azimuth"]["value"] == motion.run.lying.azimuth
+    assert content["drainage_time"]["until"]["value"] == 2e-4
+
+
+def test_film_under_the_level_robot_is_a_thin_one() -> None:
+    """Over 3 sqrt(2) pi mu L (a_e/h)^(3/2) of the straight side: towards 1 as the gap falls."""
+    ratios = sp.settle(robot(), roughness=ROUGH).lubrication_ratios
+    assert ratios == pytest.approx(np.ones(ratios.size), abs=0.05)
+    a, h = 9e-3, 1e-7
+    xi = np.arccosh(1 + h / a)
+    exact = 4 * np.pi * 3.5 * 0.026 / (xi - np.tanh(xi))  # beside a plane (Jeffrey and Onishi), h/a -> 0
+    assert lubrication_resistance(3.5, 0.026, a, np.inf, h) == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "options", "words"),
+    [
+        ({"channel": "none"}, {}, "channel"),
+        ({}, {"placement": {"gap": "15 mm"}}, "placement.gap"),
+        ({}, {"placement": {"tail_drop": "1 mm"}}, "placement.tail_drop"),
+        ({}, {"until": "1 mm"}, "until = 1 mm; allowed: less than 0.5 mm"),
+        ({}, {"until": "1"}, 'until = "1" has no unit'),
+        ({}, {"in_tube": {"wait": "1 s"}}, "in_tube.wait = 1.0 has no steady motion"),
+        ({}, {"tail_rate": "0 Hz"}, "a tail at rest"),
+    ],
+)
+def test_bad_input_is_one_sentence(overrides: dict[str, Any], options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sp.InputError) as refused:
+        sp.settle(sp.load("biorob2012-wide", **overrides), **options)
+    assert words in str(refused.value)
+    assert "\n" not in str(refused.value)
