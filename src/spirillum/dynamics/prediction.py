@@ -7,7 +7,6 @@ from functools import wraps
 from inspect import signature
 from typing import ParamSpec
 
-from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.swimming import prediction
 from spirillum.swimming.prediction import Prediction
@@ -28,6 +27,8 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
             return steady(*args, **kwargs)
         if asked.get("posterior") is not None:
             raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
+        from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
+
         found = free_motion(
             asked["robot"],
             tail_rate=asked.get("tail_rate"),
