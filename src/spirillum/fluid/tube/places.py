@@ -37,7 +37,7 @@ _UPPER = (0.55, 0.78, 1.0)
 _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
 _UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
-_DOWN = (0.0, 0.3, 0.65, 1.0)
+_DOWN = (0.0, 0.28, 0.55, 0.8, 1.0)
 LARGEST_YAW = float(np.radians(4.0))
 """Largest yaw of yawed places, rad."""
 _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
