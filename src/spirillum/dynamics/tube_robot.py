@@ -110,11 +110,10 @@ def tube_robot(steady: Prediction, table: Samples, around: Surroundings, *, turn
     a, half = 0.5 * robot.body.diameter, 0.5 * robot.body.length
     drag = 6.0 * np.pi * robot.fluid.viscosity * a * np.diag([1.0, 1.0, 1.0, a**2, half**2, half**2, a**2])
     torque = torque_scale(drag, heavy, drive)
-    load = float(heavy[: rigid_links.MOMENT_BODY].sum())
     tube = np.zeros(kernel.TUBE - 2)
     tube[kernel.RADIUS] = 0.5 * robot.channel.diameter
     tube[kernel.ROUGHNESS] = ROUGHNESS_SHARE * a if around.roughness is None else around.roughness
-    tube[kernel.LOAD] = abs(load) if load != 0 else torque / half
+    tube[kernel.LOAD] = torque / half  # its weight, or what its drive presses a lighter one with
     tube[kernel.COEFFICIENT], tube[kernel.SLIDING] = around.coefficient, _SLIDING_SHARE * a * 2.0 * np.pi / turn
     tube[kernel.VISCOSITY] = robot.fluid.viscosity
     tube[kernel.ENDS], tube[kernel.LENGTH] = around.ends, around.length
