@@ -10,7 +10,7 @@ from spirillum.units import KINDS, parse_option
 if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
 
-__all__ = ["angle", "gap_range", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
+__all__ = ["angle", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
@@ -89,15 +89,3 @@ def time_window(text: str) -> tuple[float, float]:
     if not colon or ":" in stop:
         raise InputError(f"on = {text[:40]!r} is not FROM:TO, for example 0s:2s")
     return parse_option("on", start, KINDS["time"]), parse_option("on", stop, KINDS["time"])
-
-
-def gap_range(text: str) -> tuple[str, str]:
-    """FROM:TO, such as ``1mm:0.2mm``.
-
-    Raises:
-        InputError: if it is none.
-    """
-    largest, colon, smallest = text.partition(":")
-    if not colon:
-        raise InputError(f"drain = {text[:40]!r} is not FROM:TO, for example 1mm:0.2mm")
-    return largest, smallest
