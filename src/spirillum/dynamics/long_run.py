@@ -128,7 +128,7 @@ def long_run(
             if found is not None and np.all(np.abs(found.multipliers) < _STABLE):
                 progress("free motion in the tube", _MOST_TURNS, _MOST_TURNS)
                 largest = float(np.abs(found.multipliers[0]))
-                slow = -found.turn.time / np.log(largest) if largest < 2.0 - _STABLE else float("nan")
+                slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - _STABLE else float("nan")
                 name: State = "steady" if heavy else "orbits"
                 return LongRun(path, found.turn, found.state, _lying(name, found.turn, path, slow), "")
     if not ended:
