@@ -120,7 +120,10 @@ def test_a_robot_in_anothers_channel_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["calibrate", "observations.csv", WIDE, "-o", ""], "output = ''; allowed: a folder for the results"),
+        (
+            ["calibrate", "observations.csv", WIDE, "-o", ""],
+            "an empty name of a file; allowed: a folder for the results",
+        ),
         (["suggest", "posterior.nc", "--rows", "0"], "rows = 0; allowed: at least 1"),
     ],
 )

@@ -124,10 +124,10 @@ def test_every_parameter_reaches_the_prediction(
     ("settings", "words"),
     [
         ({"posterior": "missing.nc"}, "missing.nc does not exist"),
-        ({"posterior": "calibration.toml"}, "is no posterior, or damaged"),
+        ({"posterior": "calibration.toml"}, "is not a NetCDF-4 file"),
         ({"posterior": "other.nc"}, "is no posterior of a calibration"),
         ({"posterior": "unmixed.nc"}, "unmixed.nc has not converged"),
-        ({"posterior": "cut.nc"}, "is no posterior, or damaged"),
+        ({"posterior": "cut.nc"}, "cut.nc cannot be read"),
         ({"posterior": "posterior.nc", "model": "rft"}, "is of model 'sbt', not 'rft'"),
         ({"posterior": "posterior.nc", "calibration": "calibration.toml"}, "a posterior alone"),
         ({"posterior": "posterior.nc", "calibrated": False}, "a posterior alone"),
@@ -136,12 +136,16 @@ def test_every_parameter_reaches_the_prediction(
 def test_wrong_posteriors_are_refused(fitted: Path, settings: dict[str, Any], words: str) -> None:
     import xarray as xr
 
+    from spirillum.fitted.posterior_file import posterior_checksum
+
     whole = (fitted / "posterior.nc").read_bytes()
     (fitted / "cut.nc").write_bytes(whole[: len(whole) // 2])
     xr.Dataset({"x": ("x", [1.0])}).to_netcdf(fitted / "other.nc", engine="h5netcdf")
     with xr.open_datatree(fitted / "posterior.nc", engine="h5netcdf") as tree:
         tree.load()
         tree.attrs["converged"] = 0
+        values = {str(name): item.values for name, item in tree["posterior"].data_vars.items()}
+        tree.attrs["checksum"] = posterior_checksum(tree.attrs, values)
         tree.to_netcdf(fitted / "unmixed.nc", engine="h5netcdf")
     ready = {
         name: fitted / value if name in ("posterior", "calibration") else value for name, value in settings.items()

@@ -46,8 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _prepare() -> None:
     """What only a process of its own may set."""
     gc.set_threshold(_OBJECTS)
-    # A user's settings of figures are not ours, and a damaged file of them stops the library.
+    # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
+    os.environ["MPLBACKEND"] = "agg"
     for number in range(3):  # else a file that is opened could take the place of a closed stream
         try:
             os.fstat(number)

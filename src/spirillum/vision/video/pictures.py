@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from io import BytesIO
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +32,12 @@ def read_image(path: Path, *, grey: bool = False) -> np.ndarray | None:
     """
     cv2 = required("cv2", "measuring a video", "video")
     data = read_bytes(path, _WHAT, LARGEST_PICTURE)
-    size = _size(data)
-    if size is None:
+    pixels = _pixels(data)
+    if pixels is None:
         return None
-    if size[0] * size[1] > MOST_PIXELS:
-        many = f"{size[0]} x {size[1]} pixels"
-        raise InputError(f"{path} has {many}; allowed: at most {MOST_PIXELS // 1_000_000} million")
+    if pixels > MOST_PIXELS:
+        million = MOST_PIXELS // 1_000_000
+        raise InputError(f"{path} has more than {million} million pixels; allowed: at most {million} million")
     try:
         found: np.ndarray | None = cv2.imdecode(
             np.frombuffer(data, np.uint8), cv2.IMREAD_GRAYSCALE if grey else cv2.IMREAD_COLOR
@@ -46,16 +47,16 @@ def read_image(path: Path, *, grey: bool = False) -> np.ndarray | None:
     return found
 
 
-def _size(data: bytes) -> tuple[int, int] | None:
-    """Width and height as the head of an image states them; None where it is no image."""
+def _pixels(data: bytes) -> float | None:
+    """Number of pixels as the head of an image states it; None where it is no image."""
     from PIL import Image
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of large pictures: they are refused by our own limit
             with Image.open(BytesIO(data), formats=_KINDS) as image:
-                return image.size
+                return image.width * image.height
     except Image.DecompressionBombError:
-        return MOST_PIXELS, 2
+        return inf
     except Exception:  # a damaged file raises whatever the library meets first
         return None

@@ -1,0 +1,155 @@
+"""Runs that are killed, interrupted, short of space, or two at once: nothing half, nothing lost, nothing refused."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["kills", "disks", "pairs", "interrupts"])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_no_promise_is_broken(faults: ModuleType, kind: str, seed: int) -> None:
+    assert faults.run(kind, seed, 12) == []
+
+
+@pytest.mark.slow
+def test_a_small_disk_is_said(faults: ModuleType) -> None:
+    tried = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True, check=False)
+    if tried.returncode:
+        pytest.skip("no file system may be mounted here")
+    assert faults.run("tmpfs", 1, 12) == []
+
+
+def limited(folder: Path, command: list[str], limit: int) -> subprocess.CompletedProcess[str]:
+    """A command whose files may not grow beyond a size, as on a full disk."""
+    script = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)\n"
+    script += "from spirillum.cli import main; sys.argv[:2] = ['spirillum']; main()"
+    return subprocess.run(
+        [sys.executable, "-c", script, str(limit), *command], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such limits")
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["simulate", "biorob2012-wide", "-o", "out.nc", "--duration", "0.1s"],
+        ["render", "biorob2012-wide", "-o", "out.mp4", "--size", "64x64", "--fps", "5", "--duration", "0.6s"],
+    ],
+)
+def test_a_full_disk_is_said_and_leaves_nothing(tmp_path: Path, command: list[str]) -> None:
+    found = limited(tmp_path, command, 1000)
+    assert (found.returncode, found.stdout) == (2, "")
+    assert found.stderr == "spirillum: no space is left for the output; allowed: a place with space\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such streams")
+@pytest.mark.parametrize(
+    ("arguments", "streams", "code"),
+    [
+        ("predict missing.toml", "2>&-", 2),
+        ("predict missing.toml", "2>/dev/full", 2),
+        ("robot show biorob2012-wide --json", ">&-", 0),
+        ("robot show biorob2012-wide --json", ">/dev/full 2>/dev/full", 2),
+    ],
+)
+def test_a_stream_that_nobody_reads_changes_no_exit_code(arguments: str, streams: str, code: int) -> None:
+    command = f"{sys.executable} -m spirillum {arguments} {streams}"
+    assert subprocess.run(command, shell=True, check=False, capture_output=True).returncode == code
+
+
+def test_an_interrupt_while_modules_are_imported_is_one_too() -> None:
+    script = (
+        "import os, signal, sys\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'spirillum.cli.app':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from spirillum.cli import main\n"
+        "sys.argv = ['spirillum', '--help']\n"
+        "main()\n"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; what was done is kept\n")
+
+
+SETTINGS = "text.usetex: True\nfont.family: nowhere\nbackend: nonsense\nlines.nonsense: 1\nfigure.facecolor: red\n"
+
+
+def test_figures_are_ours_whatever_the_users_settings_are(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "spirillum", "compare-models", "biorob2012-wide", "--model", "sbt", "-o"]
+    subprocess.run([*command, "plain.png"], cwd=tmp_path, check=True, capture_output=True)
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "matplotlibrc").write_bytes(b"\xff\xfe")
+    (tmp_path / "matplotlibrc").write_text(SETTINGS)
+    settings = os.environ | {"MPLCONFIGDIR": str(tmp_path / "config"), "MPLBACKEND": "nonsense"}
+    found = subprocess.run(
+        [*command, "set.png"], cwd=tmp_path, env=settings, check=False, capture_output=True, text=True
+    )
+    assert (found.returncode, found.stderr) == (0, "")
+    assert (tmp_path / "set.png").read_bytes() == (tmp_path / "plain.png").read_bytes()
+    (tmp_path / "matplotlibrc").write_bytes(b"\xff\xfe")
+    found = subprocess.run([*command, "set.png"], cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert found.returncode == 2
+    assert found.stderr.startswith("spirillum: the settings of matplotlib cannot be read")
+
+
+def test_figures_are_ours_in_a_session_with_other_settings(tmp_path: Path) -> None:
+    import matplotlib as mpl
+
+    from spirillum.view.figures.style import new_figure, save_as, styled
+
+    def draw(name: str) -> bytes:
+        with styled():
+            figure = new_figure(2.0, 1.0)
+            figure.subplots().plot([0, 1], label="µ")
+        save_as(figure, tmp_path / name)
+        return (tmp_path / name).read_bytes()
+
+    plain = draw("plain.png")
+    with mpl.rc_context({"text.usetex": True, "axes.facecolor": "red", "axes.titlesize": 40, "savefig.bbox": "tight"}):
+        assert draw("set.png") == plain
+        assert mpl.rcParams["text.usetex"]
+
+
+def test_without_a_home_nothing_is_kept_and_nothing_made(tmp_path: Path) -> None:
+    script = (
+        "import pwd\n"
+        "def unknown(*_): raise KeyError('no such user')\n"
+        "pwd.getpwuid = pwd.getpwnam = unknown\n"
+        "import sys; sys.argv = ['spirillum', *sys.argv[1:]]\n"
+        "from spirillum.cli import main; main()\n"
+    )
+    kept = {name: value for name, value in os.environ.items() if name not in ("HOME", "USER", "LOGNAME", "USERNAME")}
+    kept = {name: value for name, value in kept.items() if not name.startswith(("XDG_", "SPIRILLUM_"))}
+    (tmp_path / "o.csv").write_text(
+        "channel_diameter_mm,wavelength_mm,amplitude_mm,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"
+        "40,20,2.5,1.1,1.2,-0.4\n40,25,2.5,1.2,1.2,-0.4\n40,30,2.5,1.25,1.2,-0.4\n"
+    )
+    for command in (
+        ["predict", "biorob2012-wide", "--model", "tube", "--no-band"],
+        ["calibrate", "o.csv", "biorob2012-wide", "--method", "paper"],
+        ["rank-models", "o.csv", "biorob2012-wide", "--model", "sbt", "--model", "rft"],
+    ):
+        found = subprocess.run(
+            [sys.executable, "-c", script, *command],
+            cwd=tmp_path,
+            env=kept,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert found.returncode in (0, 2), found.stderr
+        assert "Traceback" not in found.stderr
+    assert not (tmp_path / "~").exists()
+
+
+def test_signals_reach_nobody_else() -> None:
+    assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN

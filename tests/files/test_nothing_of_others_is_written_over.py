@@ -1,0 +1,279 @@
+"""A file that this program has not written stays as it is, whatever a command is asked to do beside it."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.errors import InputError
+from spirillum.files import (
+    MARK,
+    file_name,
+    is_own,
+    output_folder,
+    protected,
+    results_folder,
+    text_cell,
+    whole_file,
+    whole_folder,
+    write_text,
+)
+from spirillum.files.locks import LEFTOVER, private_folder, sweep
+
+WIDE = "biorob2012-wide"
+Refused = Callable[..., str]
+TINY = {"trials": 1, "camera": {"size": "64x64", "fps": 10.0}, "duration": 0.2}
+
+
+def small(tmp_path: Path, *names: str) -> Path:
+    """A study of robots with these names."""
+    for place, name in enumerate(names):
+        text = f'extends = "{WIDE}"\nname = {name!r}\ntail.wavelength = "{20 + place} mm"\n'
+        (tmp_path / f"r{place}.toml").write_text(text)
+    robots = ", ".join(f'"r{place}.toml"' for place in range(len(names)))
+    (tmp_path / "s.toml").write_text(f'title = "t"\nrobots = [{robots}]\nmodels = ["sbt"]\n')
+    return tmp_path / "s.toml"
+
+
+def test_names_stay_in_their_folder_and_apart(tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    (home / "setup.toml").write_text("precious")
+    names = ("..", "truth-observations.csv", "Virtual-Experiment.json", "a/b", "A?B")
+    found = sp.virtual_experiment(small(tmp_path, *names), home / "exp", **TINY)
+    assert (home / "setup.toml").read_text() == "precious"
+    assert {path.name for path in home.iterdir()} == {"setup.toml", "exp"}
+    made = {path.name for path in (home / "exp").iterdir()}
+    assert made == {*found.robots, "truth-observations.csv", "virtual-experiment.json"}
+    assert len({name.casefold() for name in made}) == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "safe"),
+    [
+        ("..", "unnamed"),
+        ("../x", "x"),
+        ("a/../b", "a-..-b"),
+        (".hidden", "hidden"),
+        ("", "unnamed"),
+        ("nul", "nul-"),
+        ("COM1.txt", "COM1.txt-"),
+        ("-rf", "rf"),
+        ("µ robot", "µ-robot"),
+        ("x" * 300, "x" * 100),
+        ("a\0b\n", "a-b-"),
+        ("end.", "end"),
+    ],
+)
+def test_a_name_becomes_one_part_of_a_path(name: str, safe: str) -> None:
+    assert file_name(name) == safe
+    assert file_name(name, {safe.upper()}) == f"{safe}-2"
+
+
+@pytest.mark.parametrize("text", ["=HYPERLINK(1)", "+1", "-1", "@a", "\t=1"])
+def test_a_cell_is_no_formula(text: str) -> None:
+    assert text_cell(text) == f"'{text.strip()}"
+
+
+def test_a_formula_as_a_name_is_text_in_tables(tmp_path: Path) -> None:
+    found = sp.virtual_experiment(small(tmp_path, "=cmd|1"), tmp_path / "exp", **TINY)
+    cells = [line.split(",")[0] for line in found.observations.read_text().splitlines() if not line.startswith("#")]
+    assert not any(cell.startswith(("=", "+", "-", "@")) for cell in cells)
+
+
+@pytest.mark.parametrize("name", ["run.nc", "run.png", "run.mp4"])
+def test_commands_refuse_files_that_they_did_not_write(tmp_path: Path, refused: Refused, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(b"precious")
+    option = {".nc": "-o", ".png": "--plot", ".mp4": "--movie"}[path.suffix]
+    more = [] if option == "-o" else ["-o", str(tmp_path / "other.nc")]
+    assert "unknown origin" in refused("simulate", WIDE, option, str(path), *more)
+    assert path.read_bytes() == b"precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_was_written_here_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a.html"
+    for text in ("<p>first</p>", "<p>second</p>"):
+        write_text(path, text)
+        assert path.read_text() == f"{text}<!-- {MARK} -->\n"
+    path.write_text("mine")
+    with pytest.raises(InputError, match="unknown origin"):
+        write_text(path, "third")
+    path.write_bytes(b"")  # a place that was kept free, as tempfile makes one
+    write_text(path, "third")
+
+
+@pytest.mark.parametrize("name", ["f.png", "f.svg", "f.pdf"])
+def test_pictures_say_who_drew_them(tmp_path: Path, name: str) -> None:
+    from spirillum.view.figures.style import new_figure, save_as
+
+    save_as(new_figure(1.0, 1.0), tmp_path / name)
+    assert is_own(tmp_path / name)
+    save_as(new_figure(1.0, 1.0), tmp_path / name)
+
+
+def test_an_input_is_not_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "a.html"
+    write_text(path, "ours")
+    (tmp_path / "link").symlink_to(path)
+    with protected(tmp_path / "link"), pytest.raises(InputError, match="read by this command"):
+        write_text(path, "new")
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "a.html").touch()
+    with protected(tmp_path / "images"), pytest.raises(InputError, match="read by this command"):
+        write_text(tmp_path / "images" / "a.html", "new")
+    write_text(path, "new")
+
+
+def test_measuring_does_not_replace_films_or_files_of_others(tmp_path: Path, refused: Refused) -> None:
+    trial = sp.render(WIDE, tmp_path / "a.mp4", trial={"duration": 0.2}, camera={"size": "64x64", "fps": 10.0})
+    other = tmp_path / "a.annotated.mp4"
+    other.write_bytes(trial.path.read_bytes())
+    command = ("measure", str(trial.path), str(other), "--setup", str(trial.setup), "-o", str(tmp_path))
+    before = other.read_bytes()
+    assert "read by this command" in refused(*command)
+    assert other.read_bytes() == before
+    other.unlink()
+    for name in ("a.nc", "report.html", "observations.csv", "a.annotated.mp4", "a.movement.nc"):
+        (tmp_path / name).write_text("precious")
+        assert f"{name} is there and of unknown origin" in refused(*command[:2], *command[3:])
+        assert (tmp_path / name).read_text() == "precious"
+        (tmp_path / name).unlink()
+
+
+def test_a_planted_link_at_a_temporary_name_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "target").write_text("precious")
+    with whole_file(tmp_path / "a.txt") as temporary:
+        assert temporary.parent.stat().st_mode & 0o077 == 0  # nobody else can plant one
+        temporary.write_text("text")
+    assert (tmp_path / "target").read_text() == "precious"
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "figures").symlink_to(tmp_path)
+    with pytest.raises(InputError, match="figures is a link"):
+        output_folder(tmp_path / "out" / "figures", tmp_path / "out")
+
+
+def test_two_runs_in_one_folder_are_kept_apart(tmp_path: Path) -> None:
+    with (
+        results_folder(tmp_path / "out") as folder,
+        pytest.raises(InputError, match="being written by another run"),
+        results_folder(folder),
+    ):
+        pass
+    assert not (tmp_path / "out").exists()  # made here, and empty
+    with results_folder(tmp_path / "out"):
+        (tmp_path / "out" / "a").touch()
+    with results_folder(tmp_path / "out"):
+        pass
+    assert (tmp_path / "out" / "a").exists()
+
+
+def test_leftovers_of_dead_runs_go_and_those_of_living_ones_stay(tmp_path: Path) -> None:
+    dead = tmp_path / f"{LEFTOVER}0123abcd"
+    dead.mkdir()
+    (dead / "half.nc").write_text("half")
+    with private_folder(tmp_path) as living:
+        sweep(tmp_path, again=True)
+        assert living.is_dir()
+        assert not dead.exists()
+    (tmp_path / ".r.part").mkdir()
+    (tmp_path / ".r.part" / "mine").touch()
+    with whole_folder(tmp_path / "r") as part:
+        (part / "1.png").touch()
+    assert {path.name for path in tmp_path.iterdir()} == {"r", ".r.part"}
+    assert (tmp_path / ".r.part" / "mine").exists()
+
+
+def test_a_folder_that_has_come_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    writing = whole_folder(tmp_path / "r")
+    (writing.__enter__() / "1.png").touch()
+    (tmp_path / "r").mkdir()
+    (tmp_path / "r" / "other").touch()
+    with pytest.raises(InputError, match="cannot be written"):
+        writing.__exit__(None, None, None)
+    assert [path.name for path in tmp_path.rglob("*")] == ["r", "other"]
+
+
+def test_an_interrupted_calibration_is_run_again_and_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [f"40,{w},2.5,{1 + 0.01 * w},{1.2},{-0.4}" for w in (15, 20, 25)]
+    header = "channel_diameter_mm,wavelength_mm,amplitude_mm,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
+    (tmp_path / "o.csv").write_text("\n".join([header, *rows]) + "\n")
+    options = {"method": "least-squares", "free": "body_drag", "output": tmp_path / "c"}
+    from spirillum.results import calibration
+
+    drawn = calibration.save
+    monkeypatch.setattr(calibration, "calibration_figures", lambda _found: dict.fromkeys(("residuals", "profiles")))
+    monkeypatch.setattr(calibration, "save", _stopped_at_the_second(drawn))
+    with pytest.raises(KeyboardInterrupt):
+        sp.calibrate(tmp_path / "o.csv", WIDE, **options)
+    first = (tmp_path / "c" / "calibration.toml").read_bytes()
+
+    def full(*_: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(calibration, "predictions_text", full)
+        with pytest.raises(OSError, match="No space"):
+            sp.calibrate(tmp_path / "o.csv", WIDE, **options, figures=False)
+    assert (tmp_path / "c" / "calibration.toml").read_bytes() == first
+    found = sp.calibrate(tmp_path / "o.csv", WIDE, **options, figures=False)
+    assert found.files == ("calibration.toml", "predictions.csv")
+
+
+def _stopped_at_the_second(drawn: Callable[..., tuple[Path, Path]]) -> Callable[..., tuple[Path, Path]]:
+    from spirillum.view.figures.style import new_figure
+
+    count = 0
+
+    def save(_figure: object, path: Path) -> tuple[Path, Path]:
+        nonlocal count
+        count += 1
+        if count == 2:
+            raise KeyboardInterrupt
+        return drawn(new_figure(1.0, 1.0), path)
+
+    return save
+
+
+def test_files_appear_with_the_permissions_of_new_files(tmp_path: Path) -> None:
+    mask = os.umask(0o027)
+    try:
+        write_text(tmp_path / "a.txt", "text")
+    finally:
+        os.umask(mask)
+    assert (tmp_path / "a.txt").stat().st_mode & 0o777 == 0o640
+
+
+def test_files_that_belong_together_appear_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sp.export(WIDE, tmp_path / "r.urdf", sidecar=False, fineness=0.2)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    write = Path.write_bytes
+
+    def full(self: Path, data: bytes) -> int:
+        if self.name == "r.urdf":
+            raise OSError(28, "No space left on device")
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space"):
+        sp.export(WIDE, tmp_path / "r.urdf", sidecar=False, fineness=0.5)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_marks_do_not_disturb_readers(tmp_path: Path) -> None:
+    import xarray as xr
+
+    from spirillum.files import write_dataset
+
+    dataset = xr.Dataset({"a": ("x", np.arange(5.0))})
+    for _ in range(2):
+        write_dataset(dataset, tmp_path / "a.nc")
+        with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as found:
+            assert found.identical(dataset)
+    assert (tmp_path / "a.nc").read_bytes().endswith(f"\n{MARK}\n".encode())
