@@ -54,7 +54,7 @@ def prepared(folder: Path) -> None:
     for name, trial in (("o", 1), ("p", 2)):
         rows = "".join(f"40,{w},2.5,{trial},{1 + 0.01 * w},1.2,-0.4\n" for w in (15, 20, 25))
         (folder / f"{name}.csv").write_text(_ROWS + rows)
-    (folder / "m.csv").write_text("time_s,nose_x_mm,nose_y_mm\n0,0,0\n0.2,1,0\n0.4,2,0\n0.6,3,0\n")
+    (folder / "m.csv").write_text("time_s,x_mm,y_mm\n0,0,0\n0.2,1,0\n0.4,2,0\n0.6,3,0\n")
 
 
 def started(command: list[str], folder: Path, limit: int | None = None) -> subprocess.Popen[str]:

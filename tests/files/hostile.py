@@ -40,7 +40,7 @@ OBSERVATIONS = (
 )
 DUTY = "time_s,duty\n0,1\n1,0.5\n2,1\n"
 CANDIDATES = "channel_diameter_mm,wavelength_mm,amplitude_mm\n40,20,2.5\n40,25,2.5\n"
-MARKS = "video,time_s,nose_x_px,nose_y_px\na,0,10,20\na,1,30,20\n"
+MARKS = "video,time_s,x_px,y_px\na,0,10,20\na,1,30,20\n"
 NASTY = (
     *("nan", "-inf", "1e400", "-0", "1" * 400, "0x7fffffffffffffff", "1979-05-27", "true", '""', '"1 mm"', '"0 mm"'),
     *(
