@@ -49,6 +49,10 @@ def _prepare() -> None:
     # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
     os.environ["MPLBACKEND"] = "agg"
+    try:
+        Path.home()
+    except RuntimeError:  # an unknown user, as in some containers: libraries ask for a home where they are imported
+        os.environ["HOME"] = os.devnull
     for number in range(3):  # else a file that is opened could take the place of a closed stream
         try:
             os.fstat(number)
