@@ -46,7 +46,7 @@ def turned(points: np.ndarray, phase: float) -> np.ndarray:
 
 
 @lru_cache
-def surface(shape: str, along: int = 400, around: int = 361) -> np.ndarray:
+def surface(shape: str, along: int = 200, around: int = 181) -> np.ndarray:
     """Points on one side of a surface of revolution, edges included: the other side is its mirror image in y."""
     outline = SHAPES[shape]
     x, rho = (

@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.outline import Outline
+from spirillum.robot.outline import Line, Outline
 from spirillum.robot.placement import Placement
 
 __all__ = [
@@ -44,8 +44,7 @@ GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
 """Least and largest gap over the body's radius of the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
 STEEPEST_PITCH = 0.25 * np.pi
 """Largest pitch of a placement, nose up or down, rad."""
-_SAMPLES = 257
-_ROUNDS = 4  # each narrows the bracket of the farthest ring by a factor of 128
+_SAMPLES = (257, *(33,) * 5)  # rings of a curved piece; each number narrows the bracket of the farthest one
 _STEPS = 181  # pitches that are tried before the first contact is bracketed
 _NARROWEST = 1e-10  # of the bracket around it, rad
 _AROUND = 64  # points of a yawed ring among which Newton's method begins
@@ -131,12 +130,13 @@ class Seat:
         reach = 0.0
         for piece in outline.pieces:
             low, high = 0.0, 1.0
-            for _ in range(_ROUNDS):
-                t = np.linspace(low, high, _SAMPLES)
+            # Along a straight piece the distance is convex: it is largest at one of its ends.
+            for count in (2,) if isinstance(piece, Line) else _SAMPLES:
+                t = np.linspace(low, high, count)
                 distance, _ = self._farthest(*piece.points(t))
                 at = int(np.argmax(distance))
                 reach = max(reach, float(distance[at]))
-                low, high = float(t[max(at - 1, 0)]), float(t[min(at + 1, _SAMPLES - 1)])
+                low, high = float(t[max(at - 1, 0)]), float(t[min(at + 1, count - 1)])
         return float(self.radius - reach)
 
     def tail_clearance(self, points: Samples, wire_radius: float) -> TailClearance:
