@@ -173,9 +173,12 @@ def _mean_flow(time: float, flow: Samples) -> float:
         return float(flow[last, 1])
     if time <= flow[0, 0]:
         return float(flow[0, 1])
-    at = np.searchsorted(flow[:, 0], time)
-    share = (time - flow[at - 1, 0]) / (flow[at, 0] - flow[at - 1, 0])
-    return float(flow[at - 1, 1] + share * (flow[at, 1] - flow[at - 1, 1]))
+    before, after = 0, last
+    while after - before > 1:
+        middle = (before + after) // 2
+        before, after = (middle, after) if flow[middle, 0] < time else (before, middle)
+    share = (time - flow[before, 0]) / (flow[after, 0] - flow[before, 0])
+    return float(flow[before, 1] + share * (flow[after, 1] - flow[before, 1]))
 
 
 @compiled
@@ -351,7 +354,8 @@ def observe(time: Samples, states: Samples, data: Samples, table: Samples, out: 
     """Write what is in `OBSERVED` for samples of one stretch between switchings into the rows of `out`."""
     for row in range(time.size):
         _moved(time[row], states[row], data, table)
-        out[row] = data[_OUT:_ROTATION]
+        for column in range(_ROTATION - _OUT):
+            out[row, column] = data[_OUT + column]
 
 
 @compiled

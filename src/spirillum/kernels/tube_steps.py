@@ -176,14 +176,16 @@ def _step(
             a[i, j] = -jacobian[_ACTING[i], j]
         a[i, i] += 1.0 / (GAMMA * step)
     _factorised(a, order)
-    _stage(0, step, f, jacobian, a, order, b, increments)
-    for stage in range(1, STAGES):
+    for i in range(STATES):
+        moved[1, i] = f[i]
+    for stage in range(STAGES):  # one call of `_stage`: a stage that is a literal is compiled apart
         for i in range(STATES):
             new[i] = y[i]
         for j in range(stage):
             for i in range(STATES):
                 new[i] += WEIGHTS[stage, j] * increments[j, i]
-        rates(moved[1], time + NODES[stage] * step, new, data, table)
+        if stage > 0:
+            rates(moved[1], time + NODES[stage] * step, new, data, table)
         _stage(stage, step, moved[1], jacobian, a, order, b, increments)
     for i in range(STATES):
         new[i] += increments[STAGES - 1, i]
