@@ -1,5 +1,6 @@
 """Free runs in a channel: energy, weight, films, events, and the steady motion that they come to."""
 
+import ast
 import json
 from pathlib import Path
 from typing import Any
@@ -280,9 +281,12 @@ def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
+def test_wrong_types_get_a_sentence_too() -> None:
+    """In a process of its own, where annotations are not checked."""
+    import subprocess
+    import sys
+
+    wrong: list[tuple[dict[str, Any], str]] = [
         ({"timing": {"turn": 3.0}}, "timing.turn is not a known field (did you mean turns?)"),
         ({"timing": 3.0}, "timing = 3.0; allowed: a Timing, a mapping or None"),
         ({"timing": {"turns": "many"}}, "turns = many"),
@@ -293,17 +297,18 @@ def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
         ({"timing": {"on": [1]}}, "on = [1]"),
         ({"timing": {"duty": 0.5}}, "duty = 0.5"),
         ({"timing": {"samples_per_turn": "x"}}, "samples-per-turn = x"),
-    ],
-)
-def test_wrong_types_get_a_sentence_too(options: dict[str, Any], words: str) -> None:
-    """In a process of its own, where annotations are not checked."""
-    import subprocess
-    import sys
-
-    call = f"sp.simulate('biorob2012-wide', **{options!r})"
-    script = f"import spirillum as sp\ntry: {call}\nexcept sp.InputError as e: print(e)"
+    ]
+    script = f"""
+import spirillum as sp
+for options in {[options for options, _ in wrong]!r}:
+    try: sp.simulate("biorob2012-wide", **options)
+    except sp.InputError as error: print(repr(str(error)))
+"""
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert words in found.stdout
+    sentences = [ast.literal_eval(line) for line in found.stdout.splitlines()]
+    assert [(words, words in sentence) for (_, words), sentence in zip(wrong, sentences, strict=True)] == [
+        (words, True) for _, words in wrong
+    ]
 
 
 def test_powers_are_what_their_definitions_say() -> None:

@@ -48,7 +48,7 @@ def places(geometry: RobotGeometry) -> Places:
 
 @pytest.fixture(scope="module")
 def film(geometry: RobotGeometry) -> np.ndarray:
-    return FilmTable.of(geometry.body, R, intervals=5).packed  # coarse: it is only added and taken away
+    return FilmTable.of(geometry.body, R, intervals=1).packed  # coarse: it is only added and taken away
 
 
 def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.ndarray:

@@ -61,16 +61,16 @@ def in_other_axes(matrix: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 def test_mirror_image(body: str) -> None:
     """Yaw, phase and hand mirrored: so is everything."""
     for pitch, yaw in ((0.1, 0.15), (0.0, -0.1)):
-        one = robot(body, Seat(1.0, 0.2, pitch, yaw=yaw), 0.7)
-        other = robot(body, Seat(1.0, 0.2, pitch, yaw=-yaw), np.pi - 0.7, -1.0)
+        one = robot(body, Seat(1.0, 0.2, pitch, yaw=yaw), 0.7, tolerance=1e-3)
+        other = robot(body, Seat(1.0, 0.2, pitch, yaw=-yaw), np.pi - 0.7, -1.0, tolerance=1e-3)
         assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-8
 
 
 @pytest.mark.parametrize("body", BODIES)
 def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
     """Two decoupled systems against the coupled one: nose up and the tail at phi, nose to the left at phi + 90 deg."""
-    pitched = robot(body, Seat(1.0, 0.0, -0.12), 0.7)
-    yawed = robot(body, Seat(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi)
+    pitched = robot(body, Seat(1.0, 0.0, -0.12), 0.7, tolerance=1e-3)
+    yawed = robot(body, Seat(1.0, 0.0, yaw=0.12), 0.7 + 0.5 * np.pi, tolerance=1e-3)
     quarter = axis_rotation(np.array([0.5 * np.pi]))[0]  # z to -y
     np.testing.assert_allclose(quarter @ [0, 0, 1], [0, -1, 0], atol=1e-15)
     assert difference(yawed, in_other_axes(pitched, quarter)) < 1e-8
@@ -78,8 +78,8 @@ def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
 
 def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
     """Offset and pitch in one vertical plane: from 180 degrees further, above the axis and pitched the other way."""
-    below = robot("capsule", Seat(1.0, 0.2, 0.1, yaw=0.07), 0.7)
-    above = robot("capsule", Seat(1.0, -0.2, -0.1, yaw=-0.07), 0.7 + np.pi)
+    below = robot("capsule", Seat(1.0, 0.2, 0.1, yaw=0.07), 0.7, tolerance=1e-3)
+    above = robot("capsule", Seat(1.0, -0.2, -0.1, yaw=-0.07), 0.7 + np.pi, tolerance=1e-3)
     half = axis_rotation(np.array([np.pi]))[0]
     assert difference(below, in_other_axes(above, half)) < 1e-8
 
@@ -92,9 +92,9 @@ def test_reciprocal_positive_and_continuous(body: str) -> None:
     scale = np.sqrt(np.diag(whole))
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
     assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 0.005
-    pitched = robot(body, Seat(1.0, 0.2, 0.1))
+    pitched = robot(body, Seat(1.0, 0.2, 0.1), tolerance=1e-3)
     for yaw, error in ((1e-9, 5e-8), (1e-3, 2e-3), (-1e-3, 2e-3)):
-        assert difference(pitched, robot(body, Seat(1.0, 0.2, 0.1, yaw=yaw))) < error
+        assert difference(pitched, robot(body, Seat(1.0, 0.2, 0.1, yaw=yaw), tolerance=1e-3)) < error
     level, hardly = robot(body, Seat(1.0, 0.2)), robot(body, Seat(1.0, 0.2, yaw=1e-9))
     assert difference(level, hardly) < 3e-4  # other rings, other averages
 
@@ -115,7 +115,7 @@ def test_a_sphere_does_not_feel_its_yaw() -> None:
 
 def test_convergence_with_fineness() -> None:
     place = Seat(1.0, 0.35, 0.1, yaw=0.1)
-    coarse, fine, finest = (robot("capsule", place, tolerance=tolerance) for tolerance in (1e-3, 1e-4, 1e-5))
+    coarse, fine, finest = (robot("capsule", place, tolerance=tolerance) for tolerance in (1e-3, 1e-4, 2e-5))
     assert difference(coarse, finest) < 3e-3
     assert difference(fine, finest) < 0.5 * difference(coarse, finest)
 

@@ -130,27 +130,27 @@ def test_words_name_plane_frame_phase_and_motion(around: Flow) -> None:
     assert "frame of the swimming robot" in _words(flow_figure(turned, turned.plane(resolution=20)))
 
 
-@pytest.mark.parametrize("resolution", [2, 3, 5])
-@pytest.mark.parametrize("plane", ["xz", "yz"])
+@pytest.mark.parametrize(("plane", "resolution"), [("xz", 2), ("yz", 2), ("yz", 3), ("xz", 5)])
 def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str, tmp_path: Path) -> None:
     save_as(flow_figure(around, around.plane(plane, resolution=resolution)), tmp_path / "flow.png")
 
 
 @pytest.mark.parametrize(
-    "fields",
+    ("fields", "suffixes"),
     [
-        {"name": "$x_{1}$ of a very long name " * 6, "channel": "none"},
-        {"tail.handedness": "left", "drive.kind": "rate", "drive.rate": "-1 Hz"},
-        {"body.diameter": "2 um", "body.length": "4 um", "tail.length": "20 um", "tail.wavelength": "5 um",
-         "tail.amplitude": "0.8 um", "tail.wire_diameter": "100 nm", "coupling.length": "0 mm", "channel": "none"},
-        {"body.diameter": "0.9 m", "body.length": "1 m", "channel": "none"},
+        ({"name": "$x_{1}$ of a very long name " * 6, "channel": "none"}, ("png", "pdf", "svg")),
+        ({"tail.handedness": "left", "drive.kind": "rate", "drive.rate": "-1 Hz"}, ("png",)),
+        ({"body.diameter": "2 um", "body.length": "4 um", "tail.length": "20 um", "tail.wavelength": "5 um",
+          "tail.amplitude": "0.8 um", "tail.wire_diameter": "100 nm", "coupling.length": "0 mm", "channel": "none"},
+         ("svg",)),
+        ({"body.diameter": "0.9 m", "body.length": "1 m", "channel": "none"}, ("pdf",)),
     ],
 )  # fmt: skip
-def test_any_robot_can_be_drawn(fields: dict[str, str], sphere: Any, tmp_path: Path) -> None:
+def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
     robot = sp.load(WIDE, **fields)
     flow = Flow(sp.predict(robot), replace(sphere, radius=0.5 * robot.body.diameter), 0.0, "lab")
     figure = flow_figure(flow, flow.plane(resolution=30))
-    for suffix in ("png", "pdf", "svg"):
+    for suffix in suffixes:
         save_as(figure, tmp_path / f"flow.{suffix}")
         assert (tmp_path / f"flow.{suffix}").stat().st_size > 5_000
 
