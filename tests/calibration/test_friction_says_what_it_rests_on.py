@@ -86,8 +86,14 @@ def coverage(made: Callable[..., Path], count: int, **options: Any) -> float:
 
 
 def test_intervals_hold_the_truth_where_the_viscosity_is_off_as_stated(made: Callable[..., Path]) -> None:
+    stated, unstated = coverage(made, 6, assume_uncertainty={"fluid.viscosity": "14%"}), coverage(made, 6)
+    assert unstated < 0.85
+    assert stated > 0.88
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_over_many_viscosities(made: Callable[..., Path]) -> None:
     assert coverage(made, 25, assume_uncertainty={"fluid.viscosity": "14%"}) > 0.88
-    assert coverage(made, 8) < 0.85
 
 
 def test_friction_of_each_tail_leaves_nothing_to_tell_viscosity_by(made: Callable[..., Path]) -> None:
