@@ -205,6 +205,12 @@ def test_a_posterior_of_places_needs_a_table(one_gap: Path) -> None:
         )
 
 
+def test_a_study_does_not_take_draws_of_places(one_gap: Path) -> None:
+    study = {"title": "one", "robots": [WIDE], "models": ["tube"]}
+    with pytest.raises(InputError, match="has a place of its own"):
+        sp.study(study, posterior=one_gap / "fitted" / "posterior.nc")
+
+
 def test_held_runs_begin_at_the_place_of_each_draw(one_gap: Path) -> None:
     run = sp.simulate(WIDE, posterior=one_gap / "fitted" / "posterior.nc", draws=20, timing={"duration": "0.3 s"})
     steady = sp.predict(WIDE, model="tube", posterior=one_gap / "fitted" / "posterior.nc")

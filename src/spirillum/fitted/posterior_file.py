@@ -90,6 +90,11 @@ class PosteriorFile:
         return int(next(iter(self.draws.values())).shape[0])
 
     @property
+    def places_robots(self) -> bool:
+        """Whether the place of a robot in its channel is among the draws."""
+        return any(name in self.draws for name in (*_PLACE, "roughness"))
+
+    @property
     def tail_rate(self) -> float | None:
         """Median of the observed tail rates, rad/s, without sign; None where none is in the file."""
         rates = [abs(rate) for tail in self.tails if (rate := tail.get("tail_rate")) is not None]

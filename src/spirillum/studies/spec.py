@@ -290,7 +290,13 @@ def _fitted(
     if calibration is not None and posterior is not None:
         raise InputError("posterior together with a calibration; allowed: one of them")
     file = None if calibration is None else read_calibration(calibration)
-    return file, None if posterior is None else read_posterior(posterior, *study.models)
+    drawn = None if posterior is None else read_posterior(posterior, *study.models)
+    if drawn is not None and drawn.places_robots:
+        raise InputError(
+            f"{drawn.source} has a place of its own for the robots of each channel, and a study one for all; allowed: "
+            "`predict` of each robot with it, or the study without"
+        )
+    return file, drawn
 
 
 def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:
