@@ -11,8 +11,8 @@ robot = sp.load("biorob2012-wide", **{"friction.effective": "1.1e-5 N m s/rad"})
 held = sp.predict(robot, model="rft")
 free = sp.predict(robot, model="rft", motion="free")
 
-afloat = sp.simulate(robot, weight=False, placement={"eccentricity": 0.0}, timing={"turns": 20.0})
-lying = sp.simulate(robot, timing={"turns": 20.0})
+afloat = sp.simulate(robot, model="rft", weight=False, placement={"eccentricity": 0.0}, timing={"turns": 20.0})
+lying = sp.simulate(robot, model="rft", timing={"turns": 20.0})
 mean = {name: 1e3 * float(run["mean_forward_velocity"]) for name, run in (("afloat", afloat), ("lying", lying))}
 print(f"held {1e3 * held.forward_velocity:.4f}, lying {mean['lying']:.4f}, free {1e3 * free.forward_velocity:.4f} mm/s")
 

@@ -69,7 +69,7 @@ with tempfile.TemporaryDirectory() as name:
     predicted = sp.predict(
         sp.load("biorob2012-wide", **new_tail), calibration=folder / "calibration.toml", tail_rate="1.2 Hz"
     )
-    planted = sp.predict(sp.load(robot_file(folder, 25, 2.5), **new_tail), tail_rate="1.2 Hz")
+    planted = sp.predict(sp.load(robot_file(folder, 25, 2.5), **new_tail), model="sbt", tail_rate="1.2 Hz")
     speeds = [answer.to_dict()["forward_velocity"]["value"] for answer in (predicted, planted)]
     print(f"a new tail: {1e3 * speeds[0]:.4f} mm/s predicted, {1e3 * speeds[1]:.4f} mm/s planted")
 

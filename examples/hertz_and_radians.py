@@ -7,9 +7,9 @@ import math
 
 import spirillum as sp
 
-turning = sp.predict("biorob2012-wide", tail_rate="1 Hz")
+turning = sp.predict("biorob2012-wide", model="sbt", tail_rate="1 Hz")
 for same in ("1 turn/s", "60 rpm", "6.283185307179586 rad/s", 2 * math.pi):  # a bare float is rad/s
-    again = sp.predict("biorob2012-wide", tail_rate=same)
+    again = sp.predict("biorob2012-wide", model="sbt", tail_rate=same)
     assert math.isclose(again.forward_velocity, turning.forward_velocity, rel_tol=1e-12)
 assert math.isclose(turning.tail_rotation_rate, 2 * math.pi)
 

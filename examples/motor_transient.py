@@ -8,7 +8,7 @@ import numpy as np
 
 import spirillum as sp
 
-steady = sp.predict("biorob2012-wide")
+steady = sp.predict("biorob2012-wide", model="sbt")
 run = sp.simulate("biorob2012-wide", motion="held", model="sbt", timing={"duration": "2 s"})
 end = run.isel(time=-1)
 

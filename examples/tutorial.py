@@ -41,8 +41,8 @@ def a_robot_of_our_own(folder: Path) -> sp.Robot:
 
 def a_prediction(robot: sp.Robot) -> sp.Prediction:
     """Predict at a given tail rate, where no friction has to be known."""
-    slow = sp.predict(robot, tail_rate="1.2 Hz")
-    fast = sp.predict(robot, tail_rate="2.4 Hz")
+    slow = sp.predict(robot, model="sbt", tail_rate="1.2 Hz")
+    fast = sp.predict(robot, model="sbt", tail_rate="2.4 Hz")
     speed, body = 1e3 * slow.forward_velocity, slow.body_rotation_rate / Hz
     print(f"at 1.2 Hz: {speed:.3f} mm/s, body {body:.3f} Hz")
     # Stokes flow has no memory and no scale of speed: twice the rate is twice the speed.
@@ -102,9 +102,9 @@ def friction_at_an_observed_rate(folder: Path) -> None:
     """Infer B_eff from a synthetic rate, which was made with a known friction."""
     known = 1.1e-5  # N m s/rad, chosen for this example
     robot = sp.load("biorob2012-wide", **{"friction.effective": f"{known} N m s/rad"})
-    rate = sp.predict(robot).tail_rotation_rate / Hz
+    rate = sp.predict(robot, model="sbt").tail_rotation_rate / Hz
 
-    inferred = sp.predict("biorob2012-wide", tail_rate=f"{rate!r} Hz")
+    inferred = sp.predict("biorob2012-wide", model="sbt", tail_rate=f"{rate!r} Hz")
     print(f"at {rate:.3f} Hz (synthetic): {inferred.effective_friction:.4g} N m s/rad")
     assert np.isclose(inferred.effective_friction, known, rtol=1e-9)
 

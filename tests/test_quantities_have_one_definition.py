@@ -52,8 +52,8 @@ def assert_registered(dataset: Any) -> None:
 
 
 def test_runs_carry_the_registrys_units() -> None:
-    assert_registered(sp.simulate("biorob2012-wide", motion="held", timing={"turns": 0.2}))
-    assert_registered(sp.simulate("biorob2012-wide", timing={"turns": 0.2}))
+    assert_registered(sp.simulate("biorob2012-wide", motion="held", timing={"turns": 0.2}, model="rft"))
+    assert_registered(sp.simulate("biorob2012-wide", timing={"turns": 0.2}, model="rft"))
 
 
 def test_studies_carry_the_registrys_units() -> None:

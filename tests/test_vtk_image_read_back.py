@@ -55,7 +55,7 @@ def read(path: Path) -> Image:
 @pytest.fixture(scope="module")
 def box(sphere: Any) -> xr.Dataset:
     """The flow around a sphere in a box with a different number of points along x than across."""
-    flow = Flow(sp.predict("biorob2012-wide", tail_rate="1.2 Hz"), sphere, 0.5, "lab")
+    flow = Flow(sp.predict("biorob2012-wide", tail_rate="1.2 Hz", model="sbt"), sphere, 0.5, "lab")
     return flow.volume(resolution=21)
 
 

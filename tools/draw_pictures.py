@@ -26,7 +26,7 @@ def _frame(film: Path, number: int) -> Any:
 
 
 if __name__ == "__main__":
-    flow = sp.flow("biorob2012-wide", tail_rate="1.2 Hz")
+    flow = sp.flow("biorob2012-wide", model="slender", tail_rate="1.2 Hz")
     tilted = sp.load("magnetic-helix", **{"magnetic.moment_angle": "75 deg"})
     best = sp.design(
         "biorob2012-wide",

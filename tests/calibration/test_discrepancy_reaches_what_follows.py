@@ -61,7 +61,7 @@ def test_without_discrepancy_every_quantity_is_that_of_a_prediction(rate: float 
     for drag, rotation in zip(known.draws["body_drag"][:, 1], known.draws["body_rotation"][:, 1], strict=True):
         factors = {"body_drag": float(drag), "body_rotation": float(rotation)}
         own = robot.model_copy(update={"calibration": {"sbt": robot.calibration["sbt"].model_copy(update=factors)}})
-        alone.append(sp.predict(own, tail_rate=rate, friction=reading))
+        alone.append(sp.predict(own, tail_rate=rate, friction=reading, model="sbt"))
     told = 0
     for name in NAMES:
         if np.isfinite(found.low[name]):
@@ -107,7 +107,7 @@ def test_a_robot_without_channel_has_its_value_inside_its_interval(robot: Any) -
     known = posterior({"advance": 0.02, "turning": 0.02}, spread=0.01)
     own = known.central(load(robot))
     low, high = limits(load(robot), known, tail_rate=6.0)
-    value = sp.predict(own, tail_rate=6.0).forward_velocity
+    value = sp.predict(own, tail_rate=6.0, model="sbt").forward_velocity
     assert min(low["forward_velocity"], high["forward_velocity"]) < value
     assert value < max(low["forward_velocity"], high["forward_velocity"])
     # The rule of a calibration file: the widest channel is the nearest to an unbounded fluid.

@@ -170,7 +170,8 @@ def test_a_calibration_that_does_nothing_says_so(tmp_path: Path) -> None:
     assert "is for model 'sbt'" in warnings
     assert "is for model 'rft'" in warnings
     path.write_text("[fitted]\nnormal_factor = 1.2\n")
-    assert any("is for model 'sbt'" in said for said in sp.predict(WIDE, calibration=path, tail_rate=6.0).warnings)
+    other = sp.predict(WIDE, model="sbt", calibration=path, tail_rate=6.0).warnings
+    assert any("is for model 'sbt'" in said for said in other)
     served = sp.predict(WIDE, model="rft", calibration=path, tail_rate=6.0).warnings
     assert not any("nothing in" in said for said in served)
 

@@ -29,7 +29,7 @@ def test_sensitivities_are_the_torques_of_the_balance(made: Callable[..., Path],
         factors = {name: found.values[name].value for name in ("body_drag", "body_rotation")}
         own = robot.model_copy(update={"calibration": {"sbt": robot.calibration["sbt"].model_copy(update=factors)}})
         rate = float(seen.motor_rate.mean[place])
-        steady = sp.predict(own, tail_rate=float(seen.tail_rate[place]), friction="rotor")
+        steady = sp.predict(own, tail_rate=float(seen.tail_rate[place]), friction="rotor", model="sbt")
         torque = robot.motor.torque_constant * steady.motor_current
         change = {name: values[place] for name, values in found.friction_sensitivity.items()}
         assert change["motor.torque_constant"] == pytest.approx(torque / rate, rel=2e-3)

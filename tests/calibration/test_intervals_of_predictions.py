@@ -66,7 +66,8 @@ def test_middle_and_limits_are_those_of_predictions_one_by_one(fitted: Path) -> 
     for n in range(size):
         factors = {"body_drag": float(thin["body_drag"][n, 0]), "body_rotation": float(thin["body_rotation"][n, 0])}
         own = robot.calibration["sbt"].model_copy(update=factors)
-        speeds.append(sp.predict(robot.model_copy(update={"calibration": {"sbt": own}})).forward_velocity)
+        changed = robot.model_copy(update={"calibration": {"sbt": own}})
+        speeds.append(sp.predict(changed, model="sbt").forward_velocity)
     low, high = np.quantile(speeds, [0.025, 0.975])
     assert found.low["forward_velocity"] == pytest.approx(low, rel=1e-12)
     assert found.high["forward_velocity"] == pytest.approx(high, rel=1e-12)

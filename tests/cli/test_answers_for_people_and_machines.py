@@ -65,8 +65,10 @@ def test_prediction_has_the_keys_of_the_contract(run: Callable[..., Any], preset
 
 
 def test_table_shows_the_same_numbers_and_every_warning(run: Callable[..., Any]) -> None:
-    outcome = run("predict", "biorob2012-wide", "--set", "channel.diameter=35 mm", "--set", "body.diameter=17mm")
-    expected = sp.predict(sp.load("biorob2012-wide", channel={"diameter": "35 mm"}, body={"diameter": "17 mm"}))
+    changed = ("--set", "channel.diameter=35 mm", "--set", "body.diameter=17mm")
+    outcome = run("predict", "biorob2012-wide", "--model", "sbt", *changed)
+    other = sp.load("biorob2012-wide", channel={"diameter": "35 mm"}, body={"diameter": "17 mm"})
+    expected = sp.predict(other, model="sbt")
     assert outcome.code == 0
     assert f"{expected.forward_velocity * 1e3:.4g}" in outcome.out
     assert len(expected.warnings) == 3
@@ -108,7 +110,7 @@ def test_simulation_writes_what_it_says(run: Callable[..., Any], tmp_path: Path)
     import xarray as xr
 
     target = tmp_path / "run.nc"
-    arguments = ("--duration", "0.5s", "--on", "0s:0.2s", "--on", "0.3 s:0.4 s", "--json")
+    arguments = ("--model", "rft", "--duration", "0.5s", "--on", "0s:0.2s", "--on", "0.3 s:0.4 s", "--json")
     answer = json.loads(run("simulate", "biorob2012-wide", "-o", str(target), *arguments).out)
     with xr.open_dataset(target) as stored:
         assert answer["final_position"]["value"] == pytest.approx(stored["position"][-1].values)
@@ -168,7 +170,7 @@ def test_calibration_files_replace_the_robots_factors(run: Callable[..., Any], t
         '[calibration.sbt.fitted_to]\nchannel_diameter = "40 mm"\nbody_diameter = "18 mm"\nbody_length = "35 mm"\n'
     )
     with_file = json.loads(run("predict", "biorob2012-wide", "--calibration", str(path), "--json").out)
-    without = json.loads(run("predict", "biorob2012-wide", "--no-calibration", "--json").out)
+    without = json.loads(run("predict", "biorob2012-wide", "--model", "sbt", "--no-calibration", "--json").out)
     assert with_file["forward_velocity"] == without["forward_velocity"]
     path.write_text("[calibration.sbt]\nbody_drag = -1\n")
     outcome = run("predict", "biorob2012-wide", "--calibration", str(path))

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 WIDE = "biorob2012-wide"
-SMALL = ("--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2Hz")
+SMALL = ("--model", "slender", "--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2Hz")
 
 
 @pytest.fixture(autouse=True)
@@ -120,7 +120,7 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
         (["--volume", "flow.vti", "--volume-resolution", "900"], "allowed: at most 2000000 points"),
         (["-o", "flow.png", "--phase", "1"], 'phase = "1" has no unit'),
         (["-o", "flow.png", "--frame", "tail"], "frame = 'tail'"),
-        (["-o", "flow.png", "--model", "rft"], "model = 'rft'; allowed: slender, tube"),
+        (["-o", "flow.png", "--model", "rft"], "model = 'rft'; allowed: auto, slender, tube"),
         (["-o", "flow.png", "--model", "tube", "--gap", "50mm"], "placement.gap"),
         (["-o", "flow.png", "--model", "tube", "--ends", "shut"], "placement.ends"),
         (["-o", "flow.png", "--model", "tube", "--tolerance", "2"], "tolerance = 2.0"),

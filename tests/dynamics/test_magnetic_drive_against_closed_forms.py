@@ -106,7 +106,9 @@ def test_held_robot_follows_until_its_load_is_too_large() -> None:
 
 
 def test_energy_of_a_magnetic_run_is_balanced() -> None:
-    run = sp.simulate(sp.load("magnetic-helix", **{"magnetic.rotation_rate": "3 Hz"}), timing={"turns": 20.0})
+    run = sp.simulate(
+        sp.load("magnetic-helix", **{"magnetic.rotation_rate": "3 Hz"}), model="rft", timing={"turns": 20.0}
+    )
     spent = run["dissipated_energy"] + run["potential_energy"] - run["potential_energy"][0]
     scale = float(run["drive_energy"][-1])
     np.testing.assert_allclose(run["drive_energy"] / scale, spent / scale, atol=1e-7)

@@ -19,7 +19,7 @@ def robot(**changes: Any) -> Any:
 
 
 def held(**timing: Any) -> Any:
-    return sp.simulate(robot(), motion="held", timing=timing)
+    return sp.simulate(robot(), motion="held", timing=timing, model="rft")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_duties_have_steady_motions_of_their_own(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("motion", ["held", "free"])
 def test_a_motion_that_still_starts_is_not_steady(motion: str, decay: float) -> None:
-    run = sp.simulate(robot(), motion=motion, timing={"duration": 1.0, "on": [(0.0, 3.0 * decay)]})
+    run = sp.simulate(robot(), motion=motion, timing={"duration": 1.0, "on": [(0.0, 3.0 * decay)]}, model="rft")
     assert np.isnan(run["mean_forward_velocity_steady"])
     assert float(run["time_steady"]) == 0.0
     assert float(run["mean_forward_velocity_on"]) > 0
@@ -81,7 +81,7 @@ def test_a_run_that_is_never_on_has_no_means_while_on() -> None:
 
 def test_a_free_robot_without_floor_swims_steadily_as_its_screw() -> None:
     afloat = robot(channel="none")
-    run = sp.simulate(afloat, weight=False, timing={"duration": 6.0, "on": [(0.0, 3.0)]})
+    run = sp.simulate(afloat, weight=False, timing={"duration": 6.0, "on": [(0.0, 3.0)]}, model="rft")
     tail = sp.predict(afloat, model="rft", motion="free")
     assert float(run["mean_tail_rotation_rate_steady"]) == pytest.approx(tail.tail_rotation_rate, rel=1e-3)
     turns = float(run["time_steady"]) * tail.tail_rotation_rate / (2 * np.pi)
@@ -91,6 +91,6 @@ def test_a_free_robot_without_floor_swims_steadily_as_its_screw() -> None:
 
 def test_samples_stay_evenly_spaced() -> None:
     for motion in ("held", "free"):
-        run = sp.simulate(robot(), motion=motion, timing={"duration": 1.0, "on": [(0.0, 0.43217)]})
+        run = sp.simulate(robot(), motion=motion, timing={"duration": 1.0, "on": [(0.0, 0.43217)]}, model="rft")
         np.testing.assert_allclose(np.diff(run["time"]), float(run["time"][1]), rtol=1e-9)
         assert run.attrs["steady"]

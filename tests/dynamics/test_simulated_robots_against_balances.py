@@ -22,7 +22,11 @@ def events(run: Any) -> dict[str, float]:
 def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
     robot = sp.load("biorob2012-narrow", **{"drive.duty": 0.7})
     run = sp.simulate(
-        robot, friction=reading, placement={"pitch": "1 deg"}, timing={"turns": 12.0, "on": [(0.0, 0.5), (0.7, 5.0)]}
+        robot,
+        friction=reading,
+        placement={"pitch": "1 deg"},
+        timing={"turns": 12.0, "on": [(0.0, 0.5), (0.7, 5.0)]},
+        model="rft",
     )
     chemical = run["resistive_energy"] + run["magnetic_energy"] + run["conversion_energy"] + run["drive_energy"]
     scale = float(run["electrical_energy"][-1])
@@ -36,7 +40,7 @@ def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
 def test_lying_robot_swims_between_held_and_free() -> None:
     """The floor holds lateral motion in part: a hundredth of the speed lies between held and free."""
     robot = sp.load("biorob2012-wide", **QUIET)
-    run = sp.simulate(robot, timing={"turns": 10.0})
+    run = sp.simulate(robot, timing={"turns": 10.0}, model="rft")
     held, free = (sp.predict(robot, model="rft", motion=motion) for motion in ("held", "free"))
     assert free.forward_velocity < float(run["mean_forward_velocity"]) < held.forward_velocity
     assert float(run["mean_tail_rotation_rate"]) == pytest.approx(held.tail_rotation_rate, rel=5e-3)
@@ -47,7 +51,7 @@ def test_lying_robot_swims_between_held_and_free() -> None:
 def test_series_are_named_as_in_a_prediction() -> None:
     """Over the last turn torque and powers are those of the held robot, up to what lateral freedom changes."""
     robot = sp.load("biorob2012-wide", **QUIET)
-    run, held = sp.simulate(robot, timing={"turns": 4.0}), sp.predict(robot, model="rft")
+    run, held = sp.simulate(robot, timing={"turns": 4.0}, model="rft"), sp.predict(robot, model="rft")
     for name in ("drive_torque", "shaft_power", "friction_power", "electrical_power", "motor_current"):
         assert float(run[name][-100:].mean()) == pytest.approx(getattr(held, name), rel=1e-2), name
 
@@ -74,7 +78,9 @@ def test_sphere_sinks_at_its_weight_over_its_drag() -> None:
         },
         channel={"diameter": "1 m", "length": "1 m"},
     )
-    run = sp.simulate(robot, placement={"eccentricity": 0.0}, calibrated=False, timing={"duration": "0.01 s"})
+    run = sp.simulate(
+        robot, placement={"eccentricity": 0.0}, calibrated=False, timing={"duration": "0.01 s"}, model="rft"
+    )
     from spirillum.robot.robot import STANDARD_GRAVITY
 
     weight = (4e-3 - 985 * np.pi / 6 * 0.018**3) * STANDARD_GRAVITY
@@ -118,6 +124,7 @@ def test_capsule_drains_as_a_line_does() -> None:
         placement={"gap": "0.02 mm"},
         roughness="1 nm",
         timing={"duration": "30 s", "samples_per_turn": 10_000, "turns": 1.0},
+        model="rft",
     )
     gap = run["wall_gap"].values
     assert gap[-1] < 0.5 * gap[0]
@@ -131,12 +138,14 @@ def test_capsule_drains_as_a_line_does() -> None:
 
 
 def test_start_is_where_the_placement_says() -> None:
-    run = sp.simulate("biorob2012-wide", placement={"gap": "1.3 mm"}, timing={"turns": 0.1})
+    run = sp.simulate("biorob2012-wide", placement={"gap": "1.3 mm"}, timing={"turns": 0.1}, model="rft")
     assert float(run["wall_gap"][0]) == pytest.approx(1.3e-3, rel=1e-9)
-    run = sp.simulate("biorob2012-wide", placement={"gap": "1.3 mm", "pitch": "2 deg"}, timing={"turns": 0.1})
+    run = sp.simulate(
+        "biorob2012-wide", placement={"gap": "1.3 mm", "pitch": "2 deg"}, timing={"turns": 0.1}, model="rft"
+    )
     assert float(run["pitch"][0]) == pytest.approx(np.radians(2.0), rel=1e-9)
     assert float(run["wall_gap"][0]) == pytest.approx(1.3e-3, rel=2e-2)  # a ring's farthest point, to the tilt squared
-    run = sp.simulate("biorob2012-wide", placement={"eccentricity": 0.0}, timing={"turns": 0.1})
+    run = sp.simulate("biorob2012-wide", placement={"eccentricity": 0.0}, timing={"turns": 0.1}, model="rft")
     assert float(run["wall_gap"][0]) == pytest.approx(0.011, rel=1e-9)
 
 
@@ -149,7 +158,7 @@ def test_pressed_robot_stays_off_the_wall_and_its_energy_balanced(channel: str, 
         "magnetic-helix",
         **{"channel": {"diameter": channel}, "magnetic.moment_angle": angle, "magnetic.field": field},
     )
-    run = sp.simulate(robot, timing={"turns": 4.0})
+    run = sp.simulate(robot, timing={"turns": 4.0}, model="rft")
     assert "film as thin as the roughness" in events(run)
     assert float(run["wall_gap"].min()) > 1e-4 * 1.5e-3  # the roughness
     spent = run["dissipated_energy"] + run["potential_energy"] - run["potential_energy"][0]
@@ -195,18 +204,18 @@ def test_film_is_lost_as_its_gradient_says() -> None:
 )
 def test_start_at_the_wall_names_what_puts_it_there(placement: Any, roughness: Any, words: str) -> None:
     with pytest.raises(sp.InputError, match="allowed") as caught:
-        sp.simulate("biorob2012-wide", placement=placement, roughness=roughness)
+        sp.simulate("biorob2012-wide", placement=placement, roughness=roughness, model="rft")
     assert words in str(caught.value)
 
 
 def test_battery_spent_before_the_first_sample_is_found() -> None:
-    run = sp.simulate(sp.load("biorob2012-wide", **{"battery.capacity": "1e-9 C"}), timing={"turns": 1.0})
+    run = sp.simulate(sp.load("biorob2012-wide", **{"battery.capacity": "1e-9 C"}), timing={"turns": 1.0}, model="rft")
     assert 0 < events(run)["battery empty"] < 1e-3
 
 
 def test_run_ends_where_the_tube_ends() -> None:
     robot = sp.load("biorob2012-wide", **{"channel.length": "120 mm"})
-    run = sp.simulate(robot, timing={"duration": "60 s"})
+    run = sp.simulate(robot, timing={"duration": "60 s"}, model="rft")
     along = np.cos(float(run["pitch"][-1])) * np.cos(float(run["yaw"][-1]))
     nose = float(run["position"][-1, 0]) + 0.0175 * along
     assert nose - run.attrs["channel_middle"] == pytest.approx(0.06, abs=1e-9)
@@ -215,7 +224,7 @@ def test_run_ends_where_the_tube_ends() -> None:
 
 def test_spent_battery_drives_no_longer() -> None:
     robot = sp.load("biorob2012-wide", **{"battery.capacity": "0.2 mA h"})
-    run = sp.simulate(robot, timing={"duration": "4 s"})
+    run = sp.simulate(robot, timing={"duration": "4 s"}, model="rft")
     when = events(run)["battery empty"]
     after = run.sel(time=slice(when + 0.1, None))
     assert float(run["battery_charge_used"][-1]) == pytest.approx(0.72, rel=1e-6)
@@ -227,8 +236,12 @@ def test_duty_file_and_windows_are_one_thing(tmp_path: Path) -> None:
     table = tmp_path / "duty.csv"
     table.write_text("# the remote\ntime_s, duty\n0.1,1\n0.3,0\n", "utf-8")
     for motion in ("free", "held"):
-        by_file = sp.simulate("biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "duty": table})
-        by_window = sp.simulate("biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "on": [(0.1, 0.3)]})
+        by_file = sp.simulate(
+            "biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "duty": table}, model="rft"
+        )
+        by_window = sp.simulate(
+            "biorob2012-wide", motion=motion, timing={"duration": "0.5 s", "on": [(0.1, 0.3)]}, model="rft"
+        )
         assert by_file.equals(by_window)
 
 
@@ -249,7 +262,7 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
     table = tmp_path / "duty.csv"
     table.write_text(text, "utf-8")
     with pytest.raises(sp.InputError, match="allowed") as caught:
-        sp.simulate("biorob2012-wide", timing={"duty": table})
+        sp.simulate("biorob2012-wide", timing={"duty": table}, model="rft")
     assert words in str(caught.value)
 
 
@@ -277,7 +290,7 @@ def test_wrong_duty_files_are_refused(tmp_path: Path, text: str, words: str) -> 
 )
 def test_wrong_runs_are_refused(options: dict[str, Any], words: str) -> None:
     with pytest.raises(sp.InputError, match="allowed") as caught:
-        sp.simulate("biorob2012-wide", **options)
+        sp.simulate("biorob2012-wide", **{"model": "rft", **options})
     assert words in str(caught.value)
 
 

@@ -12,7 +12,7 @@ PHASE = np.radians(40.0)
 @pytest.fixture(scope="module")
 def swimming() -> sp.Flow:
     """The paper's robot at one phase of its tail."""
-    return sp.flow(WIDE, tail_rate="1.2 Hz", phase=PHASE)
+    return sp.flow(WIDE, tail_rate="1.2 Hz", phase=PHASE, model="slender")
 
 
 def _directions(count: int) -> np.ndarray:
@@ -98,7 +98,7 @@ def test_tail_pumps_fluid_backwards(swimming: sp.Flow) -> None:
 def test_turning_the_tail_turns_the_flow(swimming: sp.Flow) -> None:
     cos, sin = np.cos(PHASE), np.sin(PHASE)
     turn = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
-    at_rest = sp.flow(WIDE, tail_rate="1.2 Hz", phase="0 deg", frame="body")
+    at_rest = sp.flow(WIDE, tail_rate="1.2 Hz", phase="0 deg", frame="body", model="slender")
     points = np.array([[-0.06, 0.006, 0.001], [-0.02, 0.01, -0.02], [0.03, 0.0, 0.01]])
     turned = swimming.velocity(points @ turn.T) - np.array([swimming.prediction.forward_velocity, 0, 0])
     np.testing.assert_allclose(turned, at_rest.velocity(points) @ turn.T, rtol=1e-9, atol=1e-12)
@@ -117,4 +117,4 @@ def test_turning_the_tail_turns_the_flow(swimming: sp.Flow) -> None:
 )
 def test_wrong_questions_are_named(arguments: dict[str, str], words: str) -> None:
     with pytest.raises(sp.InputError, match=words):
-        sp.flow(WIDE, **arguments)
+        sp.flow(WIDE, **arguments, model="slender")

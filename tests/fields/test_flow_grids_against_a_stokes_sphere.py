@@ -17,7 +17,7 @@ COMPONENTS = ("velocity_x", "velocity_y", "velocity_z")
 @pytest.fixture(scope="module")
 def around(sphere: Any) -> Flow:
     """The sphere's flow under the name of a robot: the grids follow the robot, the field the sphere."""
-    prediction = sp.predict("biorob2012-wide", tail_rate="1.2 Hz")
+    prediction = sp.predict("biorob2012-wide", tail_rate="1.2 Hz", model="sbt")
     return Flow(prediction, sphere, 0.0, "lab")
 
 
@@ -125,7 +125,9 @@ def test_settings_and_versions_go_into_the_attributes(around: Flow) -> None:
     attributes = around.plane(resolution=5).attrs
     assert {"robot", "frame", "phase", "forward_velocity", "settings", "versions", "warnings"} <= set(attributes)
     assert "walls are not computed" in attributes["warnings"]
-    free = Flow(sp.predict(sp.load("biorob2012-wide", channel="none"), tail_rate=7.5), around.field, 0.0, "lab")
+    free = Flow(
+        sp.predict(sp.load("biorob2012-wide", channel="none"), tail_rate=7.5, model="sbt"), around.field, 0.0, "lab"
+    )
     assert "walls" not in free.plane(resolution=5).attrs["warnings"]
 
 

@@ -105,7 +105,7 @@ def test_reversed_tail_retraces_the_path() -> None:
 
 def test_left_handed_robot_is_the_mirror_image() -> None:
     right, left = (
-        sp.simulate(robot(**{"tail.handedness": hand}), weight=False, timing={"duration": "2 s"})
+        sp.simulate(robot(**{"tail.handedness": hand}), weight=False, timing={"duration": "2 s"}, model="rft")
         for hand in ("right", "left")
     )
     mirror = np.array([1.0, 1.0, -1.0])  # z -> -z takes the wire at phase 0 into its mirror image
@@ -131,7 +131,7 @@ def test_unbounded_fluid_has_no_direction() -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: sp.predict("biorob2012-wide", motion="free"), "model 'sbt'"),
+        (lambda: sp.predict("biorob2012-wide", motion="free", model="sbt"), "model 'sbt'"),
         (lambda: sp.predict("magnetic-helix", model="tube", motion="free"), "channel"),
         (lambda: sp.predict("biorob2012-wide", model="rft", motion="loose"), "motion = 'loose'"),
         (lambda: sp.predict("magnetic-helix", model="rft", motion="free"), "magnetic"),

@@ -64,7 +64,7 @@ def test_a_gear_is_a_motor_with_the_joints_constants(reading: str) -> None:
 @pytest.mark.parametrize("motion", ["held", "free"])
 def test_runs_of_a_geared_motor_balance_their_energy(motion: str) -> None:
     timing = {"duration": "0.5 s", "on": [("0 s", "0.3 s")]}
-    one, other = (sp.simulate(make(4.0), motion=motion, timing=timing) for make in (geared, equivalent))
+    one, other = (sp.simulate(make(4.0), motion=motion, timing=timing, model="rft") for make in (geared, equivalent))
     for name in ("tail_angle", "motor_current", "motor_torque", "electrical_energy", "conversion_energy"):
         np.testing.assert_allclose(one[name], other[name], rtol=1e-6, atol=1e-12)
     lost = one["resistive_energy"] + one["magnetic_energy"] + one["conversion_energy"] + one["friction_energy"]
@@ -83,7 +83,7 @@ def test_constants_of_the_motors_shaft_are_what_is_fitted(tmp_path: Any) -> None
     for wavelength in (15.0, 20.0, 25.0):
         for amplitude in (1.5, 2.5):
             tail = {"tail.wavelength": f"{wavelength} mm", "tail.amplitude": f"{amplitude} mm"}
-            swum = sp.predict(geared(3.0, **{"friction.effective": "4e-5 N m s/rad"}, **tail))
+            swum = sp.predict(geared(3.0, **{"friction.effective": "4e-5 N m s/rad"}, **tail), model="sbt")
             rates = [swum.tail_rotation_rate / (2 * np.pi), swum.body_rotation_rate / (2 * np.pi)]
             rows.append(f"{WIDE},40,{wavelength},{amplitude},1,{1e3 * swum.forward_velocity},{rates[0]},{rates[1]}")
     path = tmp_path / "o.csv"

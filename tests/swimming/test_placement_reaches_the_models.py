@@ -44,7 +44,7 @@ def test_prediction(walled: Any) -> None:
     assert not any("no calibration" in sentence for sentence in answer.warnings)
     carried = sp.predict(WIDE, model="walled", tail_rate="1.2 Hz", placement={"flow": 1e-3}, band=False)
     assert carried.forward_velocity > answer.forward_velocity
-    assert sp.predict(WIDE, tail_rate="1 Hz").to_dict()["plug_velocity"]["value"] is None
+    assert sp.predict(WIDE, tail_rate="1 Hz", model="sbt").to_dict()["plug_velocity"]["value"] is None
 
 
 def test_a_tail_at_rest_is_carried_by_a_flow(walled: Any) -> None:
@@ -84,7 +84,7 @@ def test_models_without_walls_refuse(walled: Any) -> None:
         text = refused(call)
         assert "placement.gap = 0.0005 m with model '" in text
         assert text.endswith("which does not compute the channel's walls; allowed: only with model tube, walled")
-    assert "placement.ends = closed" in refused(lambda: sp.predict(WIDE, placement={"ends": "closed"}))
+    assert "placement.ends = closed" in refused(lambda: sp.predict(WIDE, placement={"ends": "closed"}, model="sbt"))
     assert "placement.gap = 6 mm; allowed: at most 5 mm" in refused(
         lambda: sp.predict(WIDE, model="walled", placement={"gap": "6 mm"})
     )

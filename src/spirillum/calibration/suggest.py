@@ -36,8 +36,8 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
-from spirillum.swimming.prediction import calibration_warnings
 from spirillum.swimming.steady import requirements
 
 __all__ = ["Candidate", "Suggestion", "suggest"]

@@ -38,6 +38,7 @@ from spirillum.cli.options import (
     TailRate,
     Tolerance,
     Yaw,
+    complete_auto_models,
     complete_models,
     complete_parts,
     complete_resistance_models,
@@ -85,7 +86,7 @@ def _root(
 
 def predict(
     robot: RobotArgument,
-    model: Model = "sbt",
+    model: Model = "auto",
     tail_rate: TailRate = None,
     friction: Friction = None,
     no_calibration: NoCalibration = False,
@@ -102,17 +103,22 @@ def predict(
     flow: ImposedFlow = None,
     tolerance: Tolerance = None,
     phases: Phases = None,
-    no_band: Annotated[
-        bool,
-        typer.Option("--no-band", help="Model tube: the reference place alone where gap or pitch is not given; fast."),
-    ] = False,
+    band: Annotated[
+        bool | None,
+        typer.Option(
+            "--band/--no-band",
+            help="Model tube: the band over gap and pitch where they are not given, or the reference place alone; else "
+            "with it where the robot has a table (see `prepare`), without which it takes minutes.",
+            show_default=False,
+        ),
+    ] = None,
     motion: Motion = "held",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
     """Predict the steady swimming of one robot.
 
-    Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --set tail.wavelength=20mm`
+    Example: `spirillum predict biorob2012-wide --tail-rate 1.2Hz --gap 0.3mm`
     """
     from spirillum.cli import renderer
     from spirillum.dynamics.prediction import predict as answer
@@ -129,7 +135,7 @@ def predict(
             posterior_for=posterior_for,
             resolution={"accuracy": accuracy, "tolerance": tolerance, "phases": phases},
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
-            band=not no_band,
+            band=band,
             motion=motion,
             progress=progress,
         )
@@ -250,7 +256,7 @@ def study(
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option(autocompletion=complete_models, help="A model instead of the study's; repeatable."),
+        typer.Option(autocompletion=complete_auto_models, help="A model instead of the study's, or auto; repeatable."),
     ] = None,
     band: Annotated[
         bool | None,

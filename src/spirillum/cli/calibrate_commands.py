@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Json, Model, Settings, complete_models, complete_robots, starting
+from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
 
 __all__ = ["calibrate", "rank_models", "suggest"]
@@ -28,7 +28,7 @@ def _complete_methods(incomplete: str) -> list[str]:
 def calibrate(
     observations: _Observations,
     robot: _Robots,
-    model: Model = "sbt",
+    model: NamedModel = "sbt",
     free: Annotated[
         str | None,
         typer.Option(metavar="NAME,...", help="Free parameters; else those that the paper fitted with this model."),

@@ -34,7 +34,7 @@ def _complete_accuracies(incomplete: str) -> list[str]:
 
 
 def _complete_models(incomplete: str) -> list[str]:
-    return starting(("slender", "tube"), incomplete)
+    return starting(("auto", "slender", "tube"), incomplete)
 
 
 def flow(
@@ -64,8 +64,11 @@ def flow(
     ] = "lab",
     model: Annotated[
         str,
-        typer.Option(autocompletion=_complete_models, help="slender (unbounded fluid) or tube (in the channel)."),
-    ] = "slender",
+        typer.Option(
+            autocompletion=_complete_models,
+            help="slender (unbounded fluid), tube (in the channel), or auto: tube where there is a channel.",
+        ),
+    ] = "auto",
     tail_rate: TailRate = None,
     friction: Friction = None,
     accuracy: Annotated[

@@ -20,6 +20,7 @@ from spirillum.cli.options import (
     Posterior,
     RobotArgument,
     Settings,
+    complete_auto_models,
     complete_models,
 )
 
@@ -29,10 +30,11 @@ if TYPE_CHECKING:
 __all__ = ["magnetic_sweep", "simulate"]
 
 _FullModel = Annotated[
-    str | None,
+    str,
     typer.Option(
-        autocompletion=complete_models,
-        help="Hydrodynamic model: rft, slender or tube; held also sbt. Else that of the calibration, or rft.",
+        autocompletion=complete_auto_models,
+        help="Hydrodynamic model: rft, slender, tube, held also sbt; or auto: that of the posterior or calibration, "
+        "else tube in a channel (free: where the robot has a table, see `prepare`) and slender without.",
     ),
 ]
 _RunMotion = Annotated[
@@ -46,7 +48,7 @@ _RunMotion = Annotated[
 def simulate(
     robot: RobotArgument,
     output: Output,
-    model: _FullModel = None,
+    model: _FullModel = "auto",
     motion: _RunMotion = None,
     friction: Friction = None,
     turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail (of the field).")] = 3.0,

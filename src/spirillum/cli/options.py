@@ -18,6 +18,7 @@ __all__ = [
     "Json",
     "Model",
     "Motion",
+    "NamedModel",
     "NoCalibration",
     "Output",
     "Phases",
@@ -31,6 +32,7 @@ __all__ = [
     "TailRate",
     "Tolerance",
     "Yaw",
+    "complete_auto_models",
     "complete_frames",
     "complete_models",
     "complete_parts",
@@ -64,6 +66,11 @@ def complete_robots(incomplete: str) -> list[str]:
 def complete_models(incomplete: str) -> list[str]:
     """Names of models that make a robot swim."""
     return starting(("rft", "sbt", "slender", "tube"), incomplete)
+
+
+def complete_auto_models(incomplete: str) -> list[str]:
+    """Names of models that make a robot swim, and the word that leaves the choice open."""
+    return starting(("auto", "rft", "sbt", "slender", "tube"), incomplete)
 
 
 def complete_resistance_models(incomplete: str) -> list[str]:
@@ -108,8 +115,16 @@ def _complete_friction(incomplete: str) -> list[str]:
 
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
-Model = Annotated[
+NamedModel = Annotated[
     str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft, slender or tube.")
+]
+Model = Annotated[
+    str,
+    typer.Option(
+        autocompletion=complete_auto_models,
+        help="Hydrodynamic model: sbt, rft, slender, tube; or auto: that of the posterior or calibration, else tube in "
+        "a channel and slender without.",
+    ),
 ]
 Accuracy = Annotated[
     str | None,

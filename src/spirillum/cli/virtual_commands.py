@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
+from spirillum.cli.options import Friction, Json, NamedModel, RobotArgument, Settings, TailRate, starting
 
 if TYPE_CHECKING:
     from spirillum.robot.arguments import Options
@@ -58,7 +58,7 @@ def render(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
     ],
-    model: Model = "sbt",
+    model: NamedModel = "sbt",
     tail_rate: TailRate = None,
     friction: Friction = None,
     forward_velocity: Annotated[

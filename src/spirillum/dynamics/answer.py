@@ -46,6 +46,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
     content: dict[str, Any] = {
         "robot": dataset.attrs["robot"],
         "model": dataset.attrs["model"],
+        **({"model_reason": dataset.attrs["model_reason"]} if "model_reason" in dataset.attrs else {}),
         "friction": dataset.attrs["friction"],
         "motion": dataset.attrs["motion"],
         "error_estimate": quantity(

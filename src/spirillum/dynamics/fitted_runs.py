@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.discrepancy import drawn_discrepancy
 from spirillum.swimming.intervals import LEVEL
+from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DRAWS", "check_draws", "chosen_model", "with_intervals"]
+__all__ = ["DRAWS", "check_draws", "chosen_run", "with_intervals"]
 
 DRAWS = 100
 """Draws of a posterior that are run."""
 _FEWEST, _MOST = 20, 1000
-_DEFAULT = "rft"
 _FACTORS = {
     "mean_forward_velocity": ("advance", "motor_rate"),
     "mean_tail_rotation_rate": ("motor_rate",),
@@ -36,46 +36,55 @@ _FACTORS = {
 _OVER = ("", "_on", "_steady")
 
 
-def chosen_model(
-    model: str | None, motion: str | None, calibration: str | Path | None, posterior: PosteriorFile | None
-) -> tuple[str, str, list[str]]:
-    """Model and motion of a run: those that are asked for, else those that go with what was fitted.
+def chosen_run(
+    model: str,
+    motion: str | None,
+    robot: Robot,
+    placement: Placement,
+    calibration: str | Path | None,
+    posterior: PosteriorFile | None,
+) -> tuple[ModelChoice, str, list[str]]:
+    """Model and motion of a run: those that are asked for, else those that go with the robot and with what was fitted.
 
     Args:
-        model: name of the model; None: that of the posterior or calibration, or `rft` without one.
-        motion: `free` or `held`; None: `held` for a model of the axial entries or of one place, else `free`.
+        model: name of the model, or `auto`; a free robot then moves in its tube where it has a table.
+        motion: `free` or `held`; None: `held` with a fitted model of the axial entries or of one place, else `free`.
+        robot: the robot.
+        placement: where it starts.
         calibration: calibration file; None without one.
         posterior: posterior; None without one.
 
     Returns:
         Both, and what was chosen instead of the usual, a sentence each.
+
+    Raises:
+        InputError: for an unknown model, or a calibration that was fitted with several.
     """
-    source = "" if posterior is None else posterior.source
-    fitted = [] if posterior is None else [posterior.model]
-    if calibration is not None:
-        file = read_calibration(calibration)
-        source = str(calibration)
-        fitted = [file.provenance.model] if file.provenance.model else list(file.calibration)
-    said = []
-    name = model
-    if name is None:
-        name = fitted[0] if len(fitted) == 1 else _DEFAULT
-        if name != _DEFAULT:
-            said.append(f"the run takes model '{name}', to which {source} was fitted")
-    elif fitted and name not in fitted:
-        said.append(
-            f"{source} was fitted with model '{fitted[0]}' and the run takes '{name}', on which its factors do not "
-            f"act; allowed: also --model {fitted[0]}"
-        )
-    chosen = find_swimmer_model(name)
-    if motion is not None:
-        return name, motion, said
-    if chosen.axial_only or chosen.placed:
+    choice = choose_model(
+        model,
+        robot,
+        placement=placement,
+        calibration=calibration,
+        posterior=posterior,
+        tables_only=motion != "held",
+    )
+    said = [choice.caution] if choice.caution else []
+    if not choice.fitted:
+        fitted = fitted_models(calibration, posterior)
+        if fitted and choice.model not in fitted:
+            source = calibration if posterior is None else posterior.source
+            said.append(
+                f"{source} was fitted with model '{fitted[0]}' and the run takes '{choice.model}', on which its "
+                f"factors do not act; allowed: also --model {fitted[0]}"
+            )
+        return choice, motion or "free", said
+    said.append(f"the run takes model '{choice.model}': {choice.reason}")
+    chosen = find_swimmer_model(choice.model)
+    if motion is None and (chosen.axial_only or chosen.placed):
         why = "knows the entries along and about the motor axis only" if chosen.axial_only else "is fitted to one place"
-        if model is None:
-            said.append(f"model '{name}' {why}: the run is held, with two degrees of freedom")
-            return name, "held", said
-    return name, "free", said
+        said.append(f"model '{choice.model}' {why}: the run is held, with two degrees of freedom")
+        return choice, "held", said
+    return choice, motion or "free", said
 
 
 def check_draws(draws: int) -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from inspect import signature
 from typing import ParamSpec
 
 from spirillum.errors import InputError
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
 from spirillum.swimming import prediction
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction
 
 __all__ = ["predict"]
@@ -23,7 +27,15 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
     @wraps(steady)
     def predicted(*args: _P.args, **kwargs: _P.kwargs) -> Prediction:
         asked = known.bind(*args, **kwargs).arguments
-        if (asked.get("model"), asked.get("motion")) != ("tube", "free"):
+        model = asked.get("model", AUTO)
+        if asked.get("motion") != "free" or model not in ("tube", AUTO):
+            return steady(*args, **kwargs)
+        choice = ModelChoice("tube")
+        if model == AUTO and asked.get("posterior") is None:
+            where = Placement.of(asked.get("placement"))
+            known = asked.get("calibration")
+            choice = choose_model(AUTO, load(asked["robot"]), placement=where, calibration=known, motion="free")
+        if choice.model != "tube":
             return steady(*args, **kwargs)
         if asked.get("posterior") is not None:
             raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
@@ -37,7 +49,7 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
             placement=asked.get("placement"),
             progress=asked.get("progress"),
         )
-        return found.prediction
+        return replace(found.prediction, choice=choice)
 
     return predicted
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
-from spirillum.dynamics.fitted_runs import DRAWS, check_draws, chosen_model, with_intervals
+from spirillum.dynamics.fitted_runs import DRAWS, check_draws, chosen_run, with_intervals
 from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
@@ -34,6 +34,7 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
+from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import friction_reading, requirements
@@ -48,7 +49,7 @@ __all__ = ["simulate"]
 def simulate(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str | None = None,
+    model: str = AUTO,
     motion: str | None = None,
     friction: str | None = None,
     calibrated: bool = True,
@@ -66,13 +67,15 @@ def simulate(
     """Simulate swimming from rest.
 
     A free robot is two rigid links with weight, buoyancy and motor current, in a fluid whose resistance is that of the
-    model (without walls); films of fluid keep it off the wall of its channel. With `tube` the walls, film, contact and
-    dry friction are those of the robot's table (`spirillum.prepare`), which is made first where there is none.
+    model. With `tube` the walls, film, contact and dry friction are those of the robot's table (`spirillum.prepare`),
+    which is made first where there is none. The other models know no walls: films of fluid keep the robot off that of
+    its channel.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
-        model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`. None: the model to which the posterior or
-            the calibration was fitted, or `rft` without one.
+        model: `rft`, `slender` or `tube`; with `motion="held"` also `sbt`; or `auto`: what the posterior or the
+            calibration was fitted with, else `tube` for a robot in a channel and `slender` for one without. A free
+            robot without a table for its tube then takes `slender`, too, and a warning says so.
         motion: `free` (six degrees of freedom), or `held`: forward motion and roll alone, for a `dc-motor` drive. None:
             `free`, but `held` where the model is that of a posterior or calibration and cannot be free.
         friction: reading of the friction; None: the robot's own.
@@ -104,14 +107,17 @@ def simulate(
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        known = read_posterior(posterior, *([] if model is None else [model]))
+        known = read_posterior(posterior, *([] if model == AUTO else [model]))
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
     check_draws(draws)
     if friction is not None:
         friction_reading(friction)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
-    model, motion, said = chosen_model(model, motion, calibration, known)
+    own = load(robot)
+    central = own if known is None else known.central(own)
+    choice, motion, said = chosen_run(model, motion, central, placed, calibration, known)
+    model = choice.model
     held, asked = motion_of(motion) == "held", InTube.of(in_tube)
     walled = model == "tube" and not held
     if held:
@@ -132,15 +138,13 @@ def simulate(
             calibration=calibration,
             resolution=resolution,
             placement=there if walled or drawn is not None else None,
-            band=not walled,
+            band=False,
             progress=tell,
         )
         if table is not None:
             return run_in_tube(steady, table, timing, there, touching, rough, weight, tell)
         return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, weight, tell)
 
-    own = load(robot)
-    central = own if known is None else known.central(own)
     dataset = run(central, times, progress)
     if known is not None:
         reading = friction_reading(friction or central.friction.reading)
@@ -151,7 +155,8 @@ def simulate(
             dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), draws, tell
         )
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
-    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]))
+    reason = {"model_reason": choice.reason} if choice.reason else {}
+    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **reason)
 
 
 def _fitted_place(

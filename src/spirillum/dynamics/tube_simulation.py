@@ -23,7 +23,8 @@ from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
-from spirillum.swimming.prediction import Prediction, flow_limit
+from spirillum.swimming.cautions import flow_limit
+from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
 
 if TYPE_CHECKING:

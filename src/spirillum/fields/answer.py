@@ -29,7 +29,7 @@ def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any
     """
     content = {
         "robot": flow.robot.name,
-        "model": flow.prediction.model.name,
+        **flow.prediction.answered_by,
         "friction": flow.prediction.friction,
         "calibrated": flow.prediction.calibrated,
         "frame": flow.frame,

@@ -18,10 +18,12 @@ from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.domain import seat_of
+from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict, prepared
 from spirillum.units import KINDS, Kind, parse_option, show
 from spirillum.version import versions
@@ -188,7 +190,7 @@ class Flow:
 def flow(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str = "slender",
+    model: str = AUTO,
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = False,
@@ -206,7 +208,7 @@ def flow(
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `slender` (unbounded fluid) or `tube` (in the channel).
+        model: `slender` (unbounded fluid), `tube` (in the channel), or `auto`: `tube` for a robot in a channel.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
@@ -227,12 +229,14 @@ def flow(
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
     _check_not_yawed(placement)
+    robot = load(robot)
+    choice = _choice(model, robot, placement)
     wanted = Resolution.of(resolution)
-    if wanted.accuracy is None and model == "slender":
+    if wanted.accuracy is None and choice.model == "slender":
         wanted = wanted.model_copy(update={"accuracy": "high"})
     prediction = predict(
         robot,
-        model=_checked_model(model),
+        model=choice.model,
         tail_rate=tail_rate,
         friction=friction,
         calibrated=calibrated,
@@ -240,19 +244,26 @@ def flow(
         placement=placement,
         band=False,
     )
+    prediction = replace(prediction, choice=choice)
     around = Flow(prediction, _field(prediction, angle), angle, cast("Frame", frame))
     force = around.field.wrench()[:3]
     sideways = force - (force @ around.heading) * around.heading
     return replace(around, held_force=float(np.linalg.norm(sideways)))
 
 
-def _checked_model(model: str) -> str:
-    if model not in FLOW_MODELS:
+def _choice(model: str, robot: Robot, placement: Placement | Mapping[str, Any] | None) -> ModelChoice:
+    """One of `FLOW_MODELS`, and why it is taken.
+
+    Raises:
+        InputError: for another one.
+    """
+    allowed = (AUTO, *FLOW_MODELS)
+    if model not in allowed:
         raise InputError(
-            f"model = {model!r}{did_you_mean(str(model), FLOW_MODELS)}; allowed: {', '.join(FLOW_MODELS)}, whose "
-            "tractions give a flow"
+            f"model = {model!r}{did_you_mean(str(model), allowed)}; allowed: {', '.join(allowed)}, whose tractions "
+            "give a flow"
         )
-    return model
+    return choose_model(model, robot, placement=Placement.of(placement))
 
 
 def _field(prediction: Prediction, phase: float) -> FluidField:
@@ -283,17 +294,18 @@ def seat_in_tube(
 
     Args:
         robot: the robot.
-        model: `slender` or `tube`.
+        model: `slender`, `tube` or `auto`.
         placement: as `flow`.
         resolution: as `flow`.
 
     Raises:
         InputError: for wrong input, or a robot outside the domain of `tube`.
     """
-    if _checked_model(model) != "tube":
+    chosen = _choice(model, robot, placement).model
+    if chosen != "tube":
         return None
     _check_not_yawed(placement)
-    return seat_of(prepared(robot, model, placement=placement, resolution=resolution)[2])
+    return seat_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
 
 
 def _check_not_yawed(placement: Placement | Mapping[str, Any] | None) -> None:

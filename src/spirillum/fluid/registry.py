@@ -33,15 +33,19 @@ def find_model(name: str) -> ResistanceModel:
     return MODELS[name]
 
 
-def find_swimmer_model(name: str) -> SwimmerModel:
+def find_swimmer_model(name: str, *more: str) -> SwimmerModel:
     """The model of that name that makes a robot swim.
+
+    Args:
+        name: of the model.
+        more: what is allowed where it was asked, besides the models.
 
     Raises:
         InputError: if there is none.
     """
     if str(name) not in SWIMMER_MODELS:
-        hint = did_you_mean(str(name), SWIMMER_MODELS)
-        raise InputError(f"model = {name!r}{hint}; allowed: {', '.join(SWIMMER_MODELS)}")
+        allowed = [*more, *SWIMMER_MODELS]
+        raise InputError(f"model = {name!r}{did_you_mean(str(name), allowed)}; allowed: {', '.join(allowed)}")
     return SWIMMER_MODELS[name]
 
 

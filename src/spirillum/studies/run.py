@@ -16,8 +16,8 @@ from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_t
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
-from spirillum.swimming.prediction import calibration_warnings
 from spirillum.version import own_version
 
 if TYPE_CHECKING:
@@ -60,7 +60,8 @@ def computed_study(
     answers: list[tuple[Task, Part]] = []
     band: list[tuple[BandTask, Part]] = []
     found: list[Caution] = []
-    warnings = [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
+    warnings = list(loaded.cautions)
+    warnings += [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         warnings.append(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "

@@ -30,6 +30,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 from spirillum.swimming.band import left_open
+from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.units import Hz
 
 __all__ = ["Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
@@ -97,8 +98,9 @@ class Study(Section):
     """Title of report and figures."""
     note: Annotated[Text, Field(max_length=5000)] = ""
     """What a reader has to know about the study, such as assumptions."""
-    models: Annotated[tuple[str, ...], Field(min_length=1)] = ("sbt", "rft")
-    """Hydrodynamic models."""
+    models: Annotated[tuple[str, ...], Field(min_length=1)] = (AUTO,)
+    """Hydrodynamic models; `auto`: that of the posterior or calibration, else `tube` if every robot has a table for its
+    tube (see `spirillum prepare`), and `slender` if not."""
     friction: Annotated[tuple[FrictionReading, ...], Field(min_length=1)] = ("none", "rotor", "paper")
     """Readings of the friction."""
     claims: Literal["none", "biorob2012"] = "none"
@@ -124,9 +126,9 @@ class Study(Section):
         if (self.grid is None) == (self.robots is None):
             problems.append("grid and robots: allowed: exactly one of a [grid] table and a `robots` list")
         problems += [
-            f"models = '{name}' is unknown; allowed: {', '.join(SWIMMER_MODELS)}"
+            f"models = '{name}' is unknown; allowed: {', '.join((AUTO, *SWIMMER_MODELS))}"
             for name in self.models
-            if name not in SWIMMER_MODELS
+            if name not in (AUTO, *SWIMMER_MODELS)
         ]
         lists: dict[str, tuple[Any, ...]] = {
             "models": self.models,
@@ -154,7 +156,7 @@ class Study(Section):
 
     def _problems_of_the_band(self) -> list[str]:
         models = [SWIMMER_MODELS[name] for name in self.models if name in SWIMMER_MODELS]
-        if not self.band or any(left_open(self.placement, model) for model in models):
+        if not self.band or AUTO in self.models or any(left_open(self.placement, model) for model in models):
             return []
         if any(model.placed for model in models):
             return ["band = true, but the placement leaves nothing open; allowed: a placement without gap or pitch"]
@@ -185,6 +187,8 @@ class LoadedStudy:
     """B_eff of tails that a calibration knows, and what it rests on."""
     posterior: PosteriorFile | None = None
     """Draws over which answers have intervals."""
+    cautions: tuple[str, ...] = ()
+    """What to be careful about in the choice of the models, a sentence each."""
 
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
@@ -260,10 +264,6 @@ def load_study(
     sources = list(study.grid.channels.values()) if study.grid else study.robots or []
     robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
     _check_drives(study, sources, robots, name)
-    try:
-        check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from error
     if study.predicted and not (calibration is None and posterior is None):
         raise InputError(
             f"{name}: predicted together with a calibration or posterior; allowed: one of them, for what is predicted "
@@ -271,6 +271,11 @@ def load_study(
         )
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
+    study, cautions = _with_models(study, robots, calibration, drawn)
+    try:
+        check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
     known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
     friction = known.friction
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
@@ -278,7 +283,7 @@ def load_study(
         question["friction"] = [item.model_dump() for item in friction]
     if drawn:
         question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
-    loaded = LoadedStudy(study, robots, question, known, drawn)
+    loaded = LoadedStudy(study, robots, question, known, drawn, cautions)
     if drawn and loaded.count > LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {LARGEST_WITH_INTERVALS}")
     return loaded
@@ -290,13 +295,37 @@ def _fitted(
     if calibration is not None and posterior is not None:
         raise InputError("posterior together with a calibration; allowed: one of them")
     file = None if calibration is None else read_calibration(calibration)
-    drawn = None if posterior is None else read_posterior(posterior, *study.models)
+    asked = () if AUTO in study.models else study.models
+    drawn = None if posterior is None else read_posterior(posterior, *asked)
     if drawn is not None and drawn.places_robots:
         raise InputError(
             f"{drawn.source} has a place of its own for the robots of each channel, and a study one for all; allowed: "
             "`predict` of each robot with it, or the study without"
         )
     return file, drawn
+
+
+def _with_models(
+    study: Study, robots: Sequence[Robot], calibration: str | Path | None, posterior: PosteriorFile | None
+) -> tuple[Study, tuple[str, ...]]:
+    """The study with a model in place of `auto`, the same for all robots, and what to be careful about in it."""
+    if AUTO not in study.models:
+        return study, ()
+    own = LoadedStudy(study, tuple(robots), {})
+    for index in range(own.count):  # until the first robot without a table: one model answers for all
+        choice = choose_model(
+            AUTO,
+            own.robot_at(index),
+            placement=study.placement,
+            calibration=calibration,
+            posterior=posterior,
+            tables_only=True,
+        )
+        if choice.fitted or choice.model != WALLED:
+            break
+    models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
+    cautions = (choice.caution,) if choice.caution else ()
+    return study.model_copy(update={"models": tuple(models)}), cautions
 
 
 def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:

@@ -22,8 +22,8 @@ from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
+from spirillum.swimming.cautions import accuracy_limits
 from spirillum.swimming.intervals import intervals_of
-from spirillum.swimming.prediction import accuracy_limits
 from spirillum.swimming.steady import requirements, swim
 
 __all__ = [

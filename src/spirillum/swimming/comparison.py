@@ -102,7 +102,7 @@ class ModelComparison:
             "model": name,
             "title": answer.model.title,
             "answered": True,
-            **{key: value for key, value in answer.to_dict().items() if key not in left_out},
+            **{key: value for key, value in answer.to_dict(others=False).items() if key not in left_out},
             "relative_difference": {key: quantity(self.relative_difference(name, key), "1") for key in _UNITS},
         }
 

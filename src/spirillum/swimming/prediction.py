@@ -19,7 +19,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
+from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
@@ -27,12 +27,15 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import GAP_SHARE
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import Band, band_of
+from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, no_band_warnings
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.intervals import Intervals, intervals_of
 from spirillum.swimming.lying import Lying
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import (
     calibrated_balance,
     friction_reading,
@@ -41,20 +44,11 @@ from spirillum.swimming.steady import (
 )
 from spirillum.units import KINDS, parse_option, show
 
-__all__ = [
-    "Prediction",
-    "accuracy_limits",
-    "calibration_warnings",
-    "checked_batch",
-    "flow_limit",
-    "predict",
-    "prepared",
-]
+__all__ = ["Prediction", "checked_batch", "predict", "prepared"]
 
 _LARGEST_REYNOLDS = 0.1
 _GAP_STEP = 1.02
 """Ratio of gaps to which the least one that a model resolves is told."""
-_INERTIA = "inertia is neglected (Stokes flow)"
 
 
 @dataclass(frozen=True)
@@ -90,6 +84,10 @@ class Prediction:
     """Whose the intervals are, in half a sentence; empty without a posterior."""
     lying: Lying | None = None
     """Where a free robot comes to lie in its tube, from where it was laid down (`placement`); None for others."""
+    choice: ModelChoice | None = None
+    """Why the model was taken; None where nobody asked."""
+    tail_rate: float | None = None
+    """Lab rate of the tail that was asked for, rad/s; None: the robot's drive."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -108,9 +106,34 @@ class Prediction:
         found = self.model.placement_of(self.batch)
         return found if self.band is None else self.band.placed(found)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The answer of `spirillum predict --json`."""
+    @property
+    def answered_by(self) -> dict[str, str]:
+        """Name of the model, `form` where it has more than one, and `model_reason` where nobody named one."""
+        form = {} if self.model.form is None else {"form": self.model.form}
+        reason = {"model_reason": self.choice.reason} if self.choice is not None and self.choice.reason else {}
+        return {"model": self.model.name, **form, **reason}
+
+    @cached_property
+    def other_models(self) -> OtherModels | None:
+        """What models say that leave out what this one knows; None where none can be held against it."""
+        return other_models(
+            self.robot,
+            self.model,
+            self.forward_velocity,
+            tail_rate=self.tail_rate,
+            friction=self.friction,
+            motion=self.motion,
+            flow=self.batch.placement.flow,
+        )
+
+    def to_dict(self, *, others: bool = True) -> dict[str, Any]:
+        """The answer of `spirillum predict --json`.
+
+        Args:
+            others: what other models say stands in it.
+        """
         band = self.band
+        beside = self.other_models if others else None
         over = band or self.intervals
         quantities = {
             name: quantity(getattr(self, name), unit, **_MORE.get(name, {}), **(over.of(name) if over else {}))
@@ -118,8 +141,7 @@ class Prediction:
         }
         content = {
             "robot": self.robot.name,
-            "model": self.model.name,
-            **({} if self.model.form is None else {"form": self.model.form}),
+            **self.answered_by,
             "friction": self.friction,
             "calibrated": self.calibrated,
             "motion": self.motion,
@@ -128,6 +150,7 @@ class Prediction:
             "placement": self.placement,
             **({"lying": self.lying.to_dict()} if self.lying else {}),
             **({"band": band.to_dict()} if band else {}),
+            **({"other_models": beside.to_dict()} if beside else {}),
             "error_estimate": quantity(
                 self.error_estimate,
                 "1",
@@ -149,7 +172,7 @@ _MORE = {
 def predict(
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
-    model: str = "sbt",
+    model: str = AUTO,
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibrated: bool = True,
@@ -158,19 +181,20 @@ def predict(
     posterior_for: str = "new",
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
-    band: bool = True,
+    band: bool | None = None,
     motion: str = "held",
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
 
     Where the answer depends on the robot's place in its channel and `placement` leaves its gap or its pitch open, the
-    answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and has a band over the places
-    that are possible, see `spirillum.swimming.band`.
+    answer stands at a reference place (a gap of 0.5 mm for the paper's robot, level) and, where the robot has a table
+    for its tube (`spirillum.prepare`), has a band over the places that are possible, see `spirillum.swimming.band`.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
-        model: `sbt`, `rft`, `slender` or `tube`.
+        model: `sbt`, `rft`, `slender`, `tube`, or `auto`: what the posterior or the calibration was fitted with, else
+            `tube` for a robot in a channel and `slender` for one without.
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides. With a DC-motor the current then follows from (17) at the drive's duty and
             the effective friction from (18).
@@ -184,8 +208,8 @@ def predict(
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
-        band: answer with the band over what the placement leaves open, which takes minutes; else at the reference
-            place alone.
+        band: answer with the band over what the placement leaves open, or at the reference place alone; None: with it
+            where the robot has a table, without which it takes minutes.
         motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `tube`, the
             robot is followed in its tube from the placement to its steady motion, with weight, film and contact
             (`spirillum.settle` has the way there and more options). Free with `rft` or `slender` it has neither weight
@@ -196,15 +220,19 @@ def predict(
         InputError: for wrong input, or a robot outside the model's domain.
     """
     drawn, given = None, Placement.of(placement)
+    where = given
     robot = load(robot)
     unset = robot.friction.effective is None
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        drawn = read_posterior(posterior, model)
+        drawn = read_posterior(posterior, *([] if model == AUTO else [model]))
         robot = drawn.central(robot)
-        placement = drawn.placed(robot, given)
-    ready, chosen, batch = prepared(robot, model, calibration=calibration, resolution=resolution, placement=placement)
+        where = drawn.placed(robot, given)
+    choice = choose_model(model, robot, placement=where, calibration=calibration, posterior=drawn, motion=motion)
+    ready, chosen, batch = prepared(
+        robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
+    )
     reading = friction_reading(friction or ready.friction.reading)
     fitted = fitted_of(calibration, drawn)
     rate = _rate(tail_rate, batch.placement)
@@ -230,6 +258,7 @@ def predict(
         raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
     warnings = [
         *ready.warnings,
+        *([choice.caution] if choice.caution else []),
         *(calibration_warnings(ready, chosen.name) if calibrated else ()),
         *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
         *drive_warnings(_without_fitted_friction(ready) if unset and rate else ready, chosen, reading, result, rate),
@@ -240,8 +269,10 @@ def predict(
     error = (
         chosen.stated_speed_error(batch) if check is None else float(speed_difference(answer(batch, check), result)[0])
     )
-    over = band_of(batch, chosen, result, answer, tell) if band else None
+    bound = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
+    over = band_of(batch, chosen, result, answer, tell) if bound else None
     left_out = () if over is None else over.left_out
+    warnings += no_band_warnings(batch, chosen) if band is None and not bound else []
     if known is not None and whose == "measured":
         middles = {name: np.array([middle]) for name, middle in known.middle.items() if np.isfinite(middle)}
         result = replace(result, **middles)
@@ -263,6 +294,8 @@ def predict(
         over,
         motion_of(motion),
         _interval_statement(drawn, ready, whose),
+        choice,
+        rate,
     )
 
 
@@ -357,45 +390,6 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
     return rate
 
 
-def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
-    """What has to hold for the answer to be accurate; each broken one is a warning."""
-    return [
-        *model.cautions(batch),
-        flow_limit(batch, abs(batch.placement.flow or 0.0)),
-        Limit.of(
-            "Reynolds number (body diameter)",
-            result.reynolds_number,
-            "at most",
-            _LARGEST_REYNOLDS,
-            "1",
-            _INERTIA,
-            "reynolds-number",
-        ),
-        Limit.of(
-            "Reynolds number (tail amplitude)",
-            result.tail_reynolds_number,
-            "at most",
-            _LARGEST_REYNOLDS,
-            "1",
-            _INERTIA,
-            "tail-reynolds-number",
-        ),
-    ]
-
-
-def flow_limit(batch: RobotBatch, flow: float) -> Limit:
-    """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
-    return Limit.of(
-        "Reynolds number (imposed flow, body diameter)",
-        batch.density * flow * batch.body_diameter / batch.viscosity,
-        "at most",
-        _LARGEST_REYNOLDS,
-        "1",
-        _INERTIA,
-        "flow-reynolds-number",
-    )
-
-
 def _why_not(
     batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, rate: float | None, *, calibrated: bool
 ) -> str:
@@ -412,37 +406,6 @@ def _why_not(
             f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
         )
     return f"model '{model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
-
-
-def calibration_warnings(robot: Robot, model: str) -> list[str]:
-    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
-
-    A model that computes the walls takes none.
-    """
-    if find_swimmer_model(model).placed:
-        return []
-    entry = robot.calibration.get(model)
-    if entry is None:
-        if robot.channel is None:  # nothing to stand for
-            return []
-        return [
-            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
-        ]
-    fitted = entry.fitted_to
-    channel = robot.channel.diameter if robot.channel else None
-    pairs = (
-        ("channel.diameter", channel, fitted.channel_diameter),
-        ("body.diameter", robot.body.diameter, fitted.body_diameter),
-        ("body.length", robot.body.length, fitted.body_length),
-    )
-    differing = [
-        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
-        for name, value, fit in pairs
-        if value is None or not np.isclose(value, fit, rtol=1e-6)
-    ]
-    if not differing:
-        return []
-    return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
 
 
 def _free_warnings(robot: Robot, motion: str) -> list[str]:

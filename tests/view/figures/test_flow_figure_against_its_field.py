@@ -23,7 +23,7 @@ WIDE = "biorob2012-wide"
 @pytest.fixture(scope="module")
 def around(sphere: Any) -> Flow:
     """A sphere's flow under the name of a robot."""
-    return Flow(sp.predict(WIDE, tail_rate="1.2 Hz"), sphere, 0.4, "lab")
+    return Flow(sp.predict(WIDE, tail_rate="1.2 Hz", model="sbt"), sphere, 0.4, "lab")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def in_tube(sphere: Any) -> Callable[..., Flow]:
     from spirillum.robot.placement import Placement
 
     def make(**placement: str) -> Flow:
-        prediction = sp.predict(WIDE, tail_rate="1.2 Hz")
+        prediction = sp.predict(WIDE, tail_rate="1.2 Hz", model="sbt")
         placed = prediction.batch.placed(Placement.of(placement))
         return Flow(replace(prediction, model=Tube(), batch=placed), sphere, 0.4, "lab")
 
@@ -99,7 +99,9 @@ def test_the_section_covers_the_robots_solids(around: Flow) -> None:
 @pytest.mark.usefixtures("without_lines", "unplaced")
 def test_the_wire_is_cut_where_it_crosses_the_plane(around: Flow) -> None:
     """At z = 0 a plain wire crosses where sin(kx + phi) = 0, a half wavelength apart, at +B_o and -B_o in turn."""
-    plain = Flow(sp.predict(sp.load(WIDE, **{"tail.taper": "none"}), tail_rate=7.5), around.field, 0.4, "lab")
+    plain = Flow(
+        sp.predict(sp.load(WIDE, **{"tail.taper": "none"}), tail_rate=7.5, model="sbt"), around.field, 0.4, "lab"
+    )
     axes = flow_figure(plain, plain.plane("xy", resolution=20)).axes[0]
     cuts = [item for item in axes.collections if type(item).__name__ == "QuadContourSet" and not item.filled]
     (cut,) = cuts
@@ -148,7 +150,7 @@ def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str,
 )  # fmt: skip
 def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
     robot = sp.load(WIDE, **fields)
-    flow = Flow(sp.predict(robot), replace(sphere, radius=0.5 * robot.body.diameter), 0.0, "lab")
+    flow = Flow(sp.predict(robot, model="sbt"), replace(sphere, radius=0.5 * robot.body.diameter), 0.0, "lab")
     figure = flow_figure(flow, flow.plane(resolution=30))
     for suffix in suffixes:
         save_as(figure, tmp_path / f"flow.{suffix}")

@@ -218,7 +218,7 @@ def test_robot_that_does_not_move_can_be_drawn(run: Any) -> None:
 
 
 def test_held_run_has_no_path_but_its_rates() -> None:
-    run = sp.simulate("biorob2012-wide", motion="held", timing={"duration": 0.2, "samples_per_turn": 50})
+    run = sp.simulate("biorob2012-wide", motion="held", timing={"duration": 0.2, "samples_per_turn": 50}, model="rft")
     shown = panels(run)
     assert not [label for label in shown if label.startswith("$")]
     assert shown["rate (Hz)"].lines[0].get_ydata() == pytest.approx(run["tail_rotation_rate"].values / (2 * np.pi))

@@ -55,7 +55,7 @@ def test_roll_of_a_robot_that_only_yaws_is_zero(free_robot: Any, run_of: Callabl
 
 
 def test_held_run_lies_at_its_height_and_rolls() -> None:
-    run = sp.simulate("biorob2012-wide", motion="held", timing={"duration": 0.2, "samples_per_turn": 50})
+    run = sp.simulate("biorob2012-wide", motion="held", timing={"duration": 0.2, "samples_per_turn": 50}, model="rft")
     poses = poses_of(run, height=-0.011)
     end = poses.at(0.2)
     assert end.position == pytest.approx([float(run["position"][-1]), 0.0, -0.011])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from spirillum.cli.tables.parts import Answer, add_quantities, grid
+from spirillum.cli.tables.parts import Answer, add_quantities, grid, show_reason
 
 __all__ = ["table"]
 
@@ -15,6 +15,7 @@ def table(answer: Answer, console: Console) -> None:
     rows = grid(title, "quantity", "value", "unit", "SI")
     add_quantities(rows, {**answer, **answer["placement"]})
     console.print(rows)
+    show_reason(answer, console)
     if answer["placement"].get("ends"):
         console.print(f"ends of the channel: {answer['placement']['ends']}", highlight=False)
     for item in answer["files"]:

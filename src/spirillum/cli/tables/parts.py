@@ -21,6 +21,7 @@ __all__ = [
     "show_error",
     "show_lying",
     "show_placement",
+    "show_reason",
 ]
 
 
@@ -99,6 +100,12 @@ def _band_words(item: Mapping[str, Any]) -> str:
     unit = display_unit(item["high"], item["unit"])
     low, high = (in_unit(item[key], item["unit"], unit) for key in ("low", "high"))
     return f" (open: band over {low} to {high} {unit})"
+
+
+def show_reason(answer: Answer, console: Console) -> None:
+    """Why this model answers, where nobody named one."""
+    if "model_reason" in answer:
+        console.print(f"model {answer['model']}: {escape(answer['model_reason'])}", highlight=False, soft_wrap=True)
 
 
 def show_error(error: Answer, console: Console) -> None:

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 from rich.console import Console
+from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, grid, show_error, show_lying, show_placement
+from spirillum.cli.tables.parts import (
+    Answer,
+    add_bands,
+    add_quantities,
+    grid,
+    show_error,
+    show_lying,
+    show_placement,
+    show_reason,
+)
 
 __all__ = ["table"]
 
@@ -25,6 +35,9 @@ def table(answer: Answer, console: Console) -> None:
     show_placement(answer["placement"], console)
     if "lying" in answer:
         show_lying(answer["lying"], console)
+    show_reason(answer, console)
+    if "other_models" in answer:
+        console.print(escape(answer["other_models"]["statement"]), highlight=False, soft_wrap=True)
     if answer["forward_velocity"].get("kind") == "interval":
         level = answer["forward_velocity"]["level"]
         console.print(f"low and high: {100 * level:g} % interval of the robot's own motion", highlight=False)

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.answer import quantity
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_error
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_error, show_reason
 from spirillum.dynamics.events import told
 from spirillum.units import display_unit, in_unit
 
@@ -34,6 +34,7 @@ def table(answer: Answer, console: Console) -> None:
             highlight=False,
             soft_wrap=True,
         )
+    show_reason(answer, console)
     if "in_tube" in answer:
         place = answer["in_tube"]
         shown = {

@@ -1,0 +1,101 @@
+"""What to be careful about in a predicted motion: its Reynolds number, its calibration, its place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit
+from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import Swimming
+from spirillum.swimming.band import left_open
+from spirillum.swimming.model_choice import has_table
+from spirillum.units import show
+
+__all__ = ["accuracy_limits", "calibration_warnings", "flow_limit", "no_band_warnings"]
+
+_LARGEST_REYNOLDS = 0.1
+_INERTIA = "inertia is neglected (Stokes flow)"
+
+
+def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) -> list[Limit]:
+    """What has to hold for the answer to be accurate; each broken one is a warning."""
+    return [
+        *model.cautions(batch),
+        flow_limit(batch, abs(batch.placement.flow or 0.0)),
+        Limit.of(
+            "Reynolds number (body diameter)",
+            result.reynolds_number,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            _INERTIA,
+            "reynolds-number",
+        ),
+        Limit.of(
+            "Reynolds number (tail amplitude)",
+            result.tail_reynolds_number,
+            "at most",
+            _LARGEST_REYNOLDS,
+            "1",
+            _INERTIA,
+            "tail-reynolds-number",
+        ),
+    ]
+
+
+def flow_limit(batch: RobotBatch, flow: float) -> Limit:
+    """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
+    return Limit.of(
+        "Reynolds number (imposed flow, body diameter)",
+        batch.density * flow * batch.body_diameter / batch.viscosity,
+        "at most",
+        _LARGEST_REYNOLDS,
+        "1",
+        _INERTIA,
+        "flow-reynolds-number",
+    )
+
+
+def calibration_warnings(robot: Robot, model: str) -> list[str]:
+    """What to be careful about in a robot's calibration for a model: none, or fitted to another geometry.
+
+    A model that computes the walls takes none.
+    """
+    if find_swimmer_model(model).placed:
+        return []
+    entry = robot.calibration.get(model)
+    if entry is None:
+        if robot.channel is None:  # nothing to stand for
+            return []
+        return [
+            f"no calibration for model '{model}': body drag factors are 1, and nothing stands for the channel's walls"
+        ]
+    fitted = entry.fitted_to
+    channel = robot.channel.diameter if robot.channel else None
+    pairs = (
+        ("channel.diameter", channel, fitted.channel_diameter),
+        ("body.diameter", robot.body.diameter, fitted.body_diameter),
+        ("body.length", robot.body.length, fitted.body_length),
+    )
+    differing = [
+        f"{name} = {'none' if value is None else show(value, 'mm')} (fitted to {show(fit, 'mm')})"
+        for name, value, fit in pairs
+        if value is None or not np.isclose(value, fit, rtol=1e-6)
+    ]
+    if not differing:
+        return []
+    return [f"calibration.{model} ({entry.source}) is used outside its geometry: {', '.join(differing)}"]
+
+
+def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[str]:
+    """What an answer at one place of several lacks, and how to get it; nothing where its place is known."""
+    over = left_open(batch.placement, model)
+    if not over:
+        return []
+    more = "a band over them takes minutes (--band)"
+    if not has_table(batch):
+        more = "`spirillum prepare` makes the robot's table, once, in minutes; with it a band over them takes a second"
+    return [f"{' and '.join(over)} are not known, and this is the answer at one place: {more}"]

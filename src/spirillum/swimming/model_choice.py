@@ -1,0 +1,127 @@
+"""Which hydrodynamic model answers where nobody names one.
+
+One robot has one answer. What a calibration or a posterior was fitted with answers for what it has fitted. Else a robot
+with a channel is predicted in its channel, by `tube`, and a robot without one by `slender`, which resolves the same
+robot in unbounded fluid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import read_calibration
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.steady import requirements
+
+__all__ = ["AUTO", "UNBOUNDED", "WALLED", "ModelChoice", "choose_model", "fitted_models", "has_table"]
+
+AUTO = "auto"
+"""Name that leaves the choice of the model to `choose_model`."""
+WALLED, UNBOUNDED = "tube", "slender"
+"""What answers for a robot in a channel, and for one without."""
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """A hydrodynamic model, and why it was taken."""
+
+    model: str
+    """Name of the model."""
+    reason: str = ""
+    """Why it was taken, in half a sentence; empty where it was asked for."""
+    caution: str = ""
+    """What to be careful about: a sentence where the robot has a channel that the model does not know, else empty."""
+    fitted: bool = False
+    """Whether it is the model of a calibration or a posterior."""
+
+
+def choose_model(
+    asked: str,
+    robot: Robot,
+    *,
+    placement: Placement | None = None,
+    calibration: str | Path | None = None,
+    posterior: PosteriorFile | None = None,
+    tables_only: bool = False,
+    motion: str = "held",
+) -> ModelChoice:
+    """The model that is asked for, or with `auto` the one that knows most about the robot.
+
+    Args:
+        asked: name of a model, or `auto`.
+        robot: the robot.
+        placement: where it lies in its channel, which only a model with walls can answer for.
+        calibration: calibration file whose values are used; None without one.
+        posterior: posterior whose values are used; None without one.
+        tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
+        motion: of a steady state, `held` or `free`; the free one in a tube takes a table, too.
+
+    Raises:
+        InputError: for an unknown model, or a calibration that was fitted with several.
+    """
+    if asked != AUTO:
+        return ModelChoice(find_swimmer_model(asked, AUTO).name)
+    fitted = _fitted_choice(calibration, posterior)
+    if fitted is not None:
+        return fitted
+    if robot.channel is None:
+        return ModelChoice(UNBOUNDED, "the robot has no channel")
+    why = _why_without_walls(robot, placement or Placement(), tables_only=tables_only, motion=motion)
+    if not why:
+        return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
+    caution = f"the channel's walls are left out, which makes a robot faster than it is (model '{UNBOUNDED}'): {why}"
+    return ModelChoice(UNBOUNDED, why.partition(":")[0], caution)
+
+
+def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool, motion: str) -> str:
+    """Why a robot in a channel is answered for without its walls; empty where it is not."""
+    batch = RobotBatch.of(robot, placement)
+    outside = broken(requirements(batch, find_swimmer_model(WALLED)))
+    if outside:  # a place that was asked for is refused by the model that knows places
+        return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
+    if (tables_only or motion == "free") and not has_table(batch):
+        return (
+            "the robot has no table for its tube yet: `spirillum prepare` makes one in minutes, and so does the first "
+            f"run with --model {WALLED}"
+        )
+    return ""
+
+
+def has_table(batch: RobotBatch) -> bool:
+    """Whether the first robot of a batch, which has a channel, has a table for its tube."""
+    return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])) is not None
+
+
+def fitted_models(calibration: str | Path | None, posterior: PosteriorFile | None) -> list[str]:
+    """Models with which a posterior or a calibration file was fitted; none where neither names one.
+
+    Args:
+        calibration: calibration file; None without one.
+        posterior: posterior; None without one.
+
+    Raises:
+        InputError: if the calibration file is wrong.
+    """
+    if posterior is not None:
+        return [posterior.model]
+    if calibration is None:
+        return []
+    file = read_calibration(calibration)
+    return [file.provenance.model] if file.provenance.model else list(file.calibration)
+
+
+def _fitted_choice(calibration: str | Path | None, posterior: PosteriorFile | None) -> ModelChoice | None:
+    names = fitted_models(calibration, posterior)
+    source = calibration if posterior is None else posterior.source
+    if len(names) > 1:
+        raise InputError(f"{source} holds factors for models {', '.join(names)}; allowed: --model with one of them")
+    return ModelChoice(names[0], f"{source} was fitted with it", fitted=True) if names else None

@@ -1,0 +1,115 @@
+"""What the other models would say of a robot, and why: the paper's models and the unbounded fluid beside the answer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.robot import Robot
+from spirillum.swimming.freedom import Motion
+from spirillum.swimming.steady import requirements, swim
+
+__all__ = ["OtherModel", "OtherModels", "other_models"]
+
+
+@dataclass(frozen=True)
+class OtherModel:
+    """Speed of a robot by another model."""
+
+    model: str
+    """Name of the model."""
+    calibrated: bool
+    """Whether the robot's calibration factors, which stand for the walls, were applied."""
+    forward_velocity: float
+    """U, m/s."""
+    ratio: float
+    """U over that of the answer beside which it stands."""
+
+
+@dataclass(frozen=True)
+class OtherModels:
+    """What simpler models say to the same question."""
+
+    answers: tuple[OtherModel, ...]
+    """One for each model, and one more for each that has calibration factors."""
+    statement: str
+    """All in one line, and why they differ."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in JSON."""
+        answers = [
+            {
+                "model": item.model,
+                "calibrated": item.calibrated,
+                "forward_velocity": quantity(item.forward_velocity, "m/s"),
+                "ratio": quantity(item.ratio, "1"),
+            }
+            for item in self.answers
+        ]
+        return {"statement": self.statement, "answers": answers}
+
+
+def other_models(
+    robot: Robot,
+    model: SwimmerModel,
+    speed: float,
+    *,
+    tail_rate: float | None,
+    friction: FrictionReading,
+    motion: Motion,
+    flow: float | None,
+) -> OtherModels | None:
+    """What models say that leave out what the answering one knows; None where none can be held against it.
+
+    Args:
+        robot: the robot, with the resolution of the answer.
+        model: the model that has answered.
+        speed: its forward velocity, m/s.
+        tail_rate: lab rate of the tail that was asked for, rad/s; None: the robot's drive.
+        friction: reading of the friction.
+        motion: lateral motion and tilt held, or free.
+        flow: imposed mean flow, m/s, of which models without walls know nothing; None without one.
+    """
+    if model.closed_form or flow is not None or not math.isfinite(speed) or speed == 0:
+        return None
+    simpler = [
+        other
+        for other in SWIMMER_MODELS.values()
+        if other.name != model.name and not other.placed and (model.placed or other.closed_form)
+    ]
+    batch = RobotBatch.of(robot)
+    rates = None if tail_rate is None else np.array([tail_rate])
+    found = []
+    for other in simpler:
+        if (motion == "free" and other.axial_only) or broken(requirements(batch, other)):
+            continue
+        for calibrated in (False, True) if other.name in robot.calibration else (False,):
+            result = swim(batch, other, tail_rate=rates, friction=friction, calibrated=calibrated, motion=motion)
+            own = float(result.forward_velocity[0])
+            if result.valid[0] and own / speed > 0:
+                found.append(OtherModel(other.name, calibrated, own, own / speed))
+    return OtherModels(tuple(found), _statement(found, model)) if found else None
+
+
+def _statement(found: list[OtherModel], model: SwimmerModel) -> str:
+    bare = _times([item for item in found if not item.calibrated])
+    if not model.placed:
+        return f"closed forms say {bare}: they leave out the flow between body and tail"
+    fitted = [item for item in found if item.calibrated]
+    more = f"; with calibration factors, which stand for the walls, {_times(fitted)}" if fitted else ""
+    apart = " (sbt and rft leave out the flow between body and tail, too)"
+    return f"models without walls say {bare}{apart}{more}"
+
+
+def _times(items: list[OtherModel]) -> str:
+    names = ", ".join(f"{item.model} {item.ratio:.2g}" for item in items)
+    return f"{names} times this speed"

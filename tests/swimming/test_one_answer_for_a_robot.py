@@ -1,0 +1,142 @@
+"""Who answers where nobody names a model: `tube` in a channel, `slender` without, and a calibration by its own."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import spirillum as sp
+from spirillum.papers.biorob2012.study import paper_study
+from spirillum.robot.placement import Placement
+from spirillum.studies.spec import load_study
+from spirillum.swimming import model_choice
+from spirillum.swimming.model_choice import choose_model
+
+WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
+FITTED_TO = (
+    'source = "test"\nfitted_to = {channel_diameter = "40 mm", body_diameter = "18 mm", body_length = "35 mm"}\n'
+)
+
+
+def factors(model: str) -> str:
+    return f"[calibration.{model}]\nbody_drag = 1.5\n{FITTED_TO}"
+
+
+@pytest.fixture(scope="module")
+def answer() -> Any:
+    return sp.predict(WIDE, tail_rate="1.2 Hz")
+
+
+def test_a_robot_in_a_channel_is_predicted_in_it_and_another_without(answer: Any) -> None:
+    said = answer.to_dict(others=False)
+    assert (said["model"], said["form"], said["calibrated"]) == ("tube", "table", False)
+    assert "channel" in said["model_reason"]
+    assert said["forward_velocity"]["kind"] == "band"
+    swimmer = sp.predict(sp.load(WIDE, channel="none"), tail_rate="1.2 Hz")
+    assert swimmer.answered_by == {"model": "slender", "model_reason": "the robot has no channel"}
+    for preset in ("ecoli", "magnetic-helix"):
+        assert choose_model("auto", sp.load(preset)).model == "slender"
+
+
+def test_a_model_that_is_asked_for_has_no_reason() -> None:
+    assert sp.predict(WIDE, model="sbt").answered_by == {"model": "sbt"}
+
+
+def test_a_robot_that_the_tube_does_not_know_is_answered_without_walls_and_says_why() -> None:
+    tight = sp.load(WIDE, **{"channel.diameter": "18.5 mm"})
+    found = sp.predict(tight, tail_rate="1.2 Hz")
+    assert found.model.name == "slender"
+    assert found.warnings[0].startswith("the channel's walls are left out")
+    assert "channel.diameter = 18.5 mm" in found.warnings[0]
+    with pytest.raises(sp.InputError, match=r"model 'tube'.*channel\.diameter"):
+        sp.predict(tight, tail_rate="1.2 Hz", placement={"gap": "0.1 mm"})  # a place needs walls
+
+
+def test_what_would_take_minutes_without_a_table_is_answered_without_walls(monkeypatch: Any) -> None:
+    robot = sp.load(WIDE)
+    assert choose_model("auto", robot, tables_only=True).model == "tube"
+    monkeypatch.setattr(model_choice, "find_table", lambda *_: None)
+    found = choose_model("auto", robot, placement=Placement(), tables_only=True)
+    assert found.model == "slender"
+    assert "`spirillum prepare` makes one" in found.caution
+    assert choose_model("auto", robot).model == "tube"
+
+
+def test_one_place_without_a_table_says_what_a_table_adds() -> None:
+    """On the paper's body with a short, thick tail, which takes a fraction of a second."""
+    small = {"coupling.diameter": "0 mm", "tail.length": "20 mm", "tail.wire_diameter": "1.5 mm"}
+    robot = sp.load(WIDE, **small, **{"model.tube.tolerance": 0.04, "model.tube.phases": 1})
+    found = sp.predict(robot, tail_rate="1.2 Hz", placement={"gap": "4 mm"})
+    assert found.answered_by["form"] == "direct"
+    assert found.band is None
+    assert any(said.startswith("pitch") and "`spirillum prepare`" in said for said in found.warnings)
+
+
+def test_other_models_say_what_they_say_alone(answer: Any) -> None:
+    beside = answer.other_models
+    said = {(item.model, item.calibrated): item for item in beside.answers}
+    assert set(said) == {("sbt", False), ("sbt", True), ("rft", False), ("rft", True), ("slender", False)}
+    for (model, calibrated), item in said.items():
+        alone = sp.predict(WIDE, model=model, tail_rate="1.2 Hz", calibrated=calibrated).forward_velocity
+        assert item.forward_velocity == pytest.approx(alone, rel=1e-12)
+        assert item.ratio == pytest.approx(alone / answer.forward_velocity, rel=1e-12)
+        assert f"{model} {item.ratio:.2g}" in beside.statement
+    assert beside.to_dict()["answers"][0]["forward_velocity"]["unit"] == "m/s"
+
+
+def test_other_models_are_left_out_where_they_answer_another_question() -> None:
+    carried = sp.predict(WIDE, tail_rate="1.2 Hz", placement={"flow": "1 mm/s"}, band=False)
+    assert carried.other_models is None
+    assert sp.predict(WIDE, model="rft").other_models is None
+    afloat = sp.predict(sp.load(WIDE, channel="none"), tail_rate="1.2 Hz").other_models
+    assert afloat is not None
+    assert [item.model for item in afloat.answers] == ["sbt", "sbt", "rft", "rft"]
+
+
+@pytest.mark.parametrize("model", ["sbt", "rft", "slender"])
+def test_a_calibration_is_answered_by_the_model_that_it_was_fitted_with(tmp_path: Path, model: str) -> None:
+    file = tmp_path / "calibration.toml"
+    file.write_text(factors(model))
+    found = sp.predict(WIDE, tail_rate="1.2 Hz", calibration=file)
+    assert (found.model.name, found.calibrated) == (model, True)
+    assert str(file) in found.answered_by["model_reason"]
+    run = sp.simulate(WIDE, motion="held", calibration=file, timing={"turns": 0.1})
+    assert (run.attrs["model"], run.attrs["calibrated"]) == (model, 1)
+    assert load_study({"robots": [WIDE]}, calibration=file).study.models == (model,)
+
+
+def test_a_calibration_of_several_models_asks_for_one(tmp_path: Path) -> None:
+    file = tmp_path / "both.toml"
+    file.write_text(factors("sbt") + factors("rft"))
+    with pytest.raises(sp.InputError, match="holds factors for models sbt, rft; allowed: --model with one of them"):
+        sp.predict(WIDE, calibration=file)
+    assert sp.predict(WIDE, model="rft", calibration=file).calibrated
+
+
+def test_studies_take_one_model_for_all_robots() -> None:
+    def models(**study: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        loaded = load_study({"friction": ["rotor"], **study})
+        return loaded.study.models, loaded.cautions
+
+    assert models(robots=[WIDE, NARROW]) == (("tube",), ())
+    assert models(robots=[WIDE, "ecoli"]) == (("slender",), ())
+    assert models(robots=[WIDE], models=["sbt", "auto", "tube"]) == (("sbt", "tube"), ())
+    tails = {"wavelengths": ["25 mm", "24.3 mm"], "amplitudes": ["2.5 mm"], "channels": {"wide": WIDE}}
+    found, cautions = models(grid=tails)
+    assert found == ("slender",)
+    assert "`spirillum prepare`" in cautions[0]
+    assert load_study(paper_study()).study.models == ("sbt", "rft")
+
+
+def test_predictions_and_runs_agree_at_the_same_place() -> None:
+    """The robot with its motor, lying level at the reference place of its tube."""
+    held = sp.simulate(WIDE, motion="held", timing={"turns": 3.0})
+    assert held.attrs["model"] == "tube"
+    steady = sp.predict(WIDE, band=False)
+    for name in ("forward_velocity", "body_rotation_rate", "tail_rotation_rate"):
+        assert float(held[name][-1]) == pytest.approx(getattr(steady, name), rel=1e-3)
+
+
+def test_unknown_names_are_refused_with_all_that_is_allowed() -> None:
+    with pytest.raises(sp.InputError, match=r"did you mean auto\?.*allowed: auto, sbt, rft, slender, tube"):
+        sp.predict(WIDE, model="atuo")
