@@ -31,10 +31,11 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
         if asked.get("motion") != "free" or model not in ("tube", AUTO):
             return steady(*args, **kwargs)
         choice = ModelChoice("tube")
-        if model == AUTO and asked.get("posterior") is None:
-            where = Placement.of(asked.get("placement"))
-            known = asked.get("calibration")
-            choice = choose_model(AUTO, load(asked["robot"]), placement=where, calibration=known, motion="free")
+        if model == AUTO:
+            if asked.get("posterior") is not None:  # its model decides
+                return steady(*args, **kwargs)
+            where, fitted = Placement.of(asked.get("placement")), asked.get("calibration")
+            choice = choose_model(AUTO, load(asked["robot"]), placement=where, calibration=fitted, motion="free")
         if choice.model != "tube":
             return steady(*args, **kwargs)
         if asked.get("posterior") is not None:

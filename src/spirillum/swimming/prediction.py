@@ -294,8 +294,8 @@ def predict(
         over,
         motion_of(motion),
         _interval_statement(drawn, ready, whose),
-        choice,
-        rate,
+        choice=choice,
+        tail_rate=rate,
     )
 
 
