@@ -164,7 +164,7 @@ def test_what_a_design_says_of_itself_holds(unsure: sp.Design) -> None:
     assert (today.name, today.keeps) == ("today", True)
     assert today.objective < unsure.objective
     assert today.beaten_low < today.beaten < today.beaten_high
-    assert sp.predict(unsure.robot).forward_velocity > 0
+    assert sp.predict(unsure.robot, model="sbt").forward_velocity > 0
 
 
 def test_whole_turns_and_windings() -> None:
