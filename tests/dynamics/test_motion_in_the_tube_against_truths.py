@@ -387,6 +387,20 @@ def test_tail_touches_at_its_crests_and_tip(made: Any) -> None:
         assert smallest < 1.5e-3
 
 
+def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:
+    """A robot of nearly no weight stands on them as one of none does, a heavy one by its weight."""
+    density = 985.0
+    robot = sp.load("biorob2012-wide")
+    heavy = made()[1]
+    weight = float(heavy.weight[: rigid_links.MOMENT_BODY].sum())
+    assert heavy.tube[kernel.LOAD] == pytest.approx(weight, rel=1e-9)
+    floating = {"body.mass": f"{robot.body.mass - weight / 9.80665!r} kg", "fluid.density": f"{density} kg/m^3"}
+    light, none = made(overrides=floating)[1], made(weight=False)[1]
+    assert abs(float(light.weight[: rigid_links.MOMENT_BODY].sum())) < 1e-4 * weight
+    assert light.tube[kernel.LOAD] == pytest.approx(none.tube[kernel.LOAD], rel=1e-9)
+    assert none.tube[kernel.LOAD] > 0.1 * weight
+
+
 def test_robot_on_the_axis_goes_on_smoothly(made: Any) -> None:
     """Where the azimuth is nothing, path and attitude do not depend on it."""
     _, _, run = made(weight=False)
