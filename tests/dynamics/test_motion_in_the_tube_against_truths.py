@@ -401,6 +401,20 @@ def test_asperities_do_not_vanish_with_the_weight(made: Any) -> None:
     assert none.tube[kernel.LOAD] > 0.1 * weight
 
 
+def test_rates_forget_a_trial_inside_the_wall(made: Any, stand_in: Any) -> None:
+    """A step that is tried too far leaves no number behind with which the next one begins."""
+    steady, links, _ = made()
+    state, data = laid_down(steady.robot, links, StartPlace(gap=3e-4)), links.data
+    before, after, inside = np.empty((3, kernel.STATES))
+    stand_in.motion.rates(before, 0.0, state, data, links.table)
+    beyond = state.copy()
+    beyond[rigid_links.POSITION + 2] = np.nan
+    stand_in.motion.rates(inside, 0.0, beyond, data, links.table)
+    assert np.isnan(inside).any()
+    stand_in.motion.rates(after, 0.0, state, data, links.table)
+    np.testing.assert_allclose(after, before, rtol=1e-9, atol=1e-15)
+
+
 def test_robot_on_the_axis_goes_on_smoothly(made: Any) -> None:
     """Where the azimuth is nothing, path and attitude do not depend on it."""
     _, _, run = made(weight=False)

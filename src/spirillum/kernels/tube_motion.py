@@ -309,6 +309,13 @@ def _driven(y: Samples, drive: Samples, slow: float, loads: Samples, work: Sampl
     rows = work[_ROWS:_WORK].reshape(_MOST, 2, 7)
     fixed, prescribed = drive[FIXED] != 0.0, drive[KIND] == RATE and drive[DUTY] > 0.0
     along = ROTATION if fixed else JOINT
+    begin = 1.0
+    for i in range(7):
+        if not math.isfinite(q[i]):
+            begin = 0.0
+    if begin == 0.0:  # a trial inside the wall has no rates; the next one must not begin with them
+        for i in range(7):
+            q[i] = 0.0
     torque = 0.0 if prescribed else drive_torque(y, drive, 0.0, 1.0)
     force[along] += torque
     if fixed:
