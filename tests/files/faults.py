@@ -182,7 +182,8 @@ class Faults:
         whole, _ = self.whole(name)
         folder = self.folder()
         before = files_of(folder)
-        size = int(np.exp(self.rng.uniform(np.log(32_000.0), np.log(600_000.0))))
+        inputs = sum(4096 * (path.stat().st_size // 4096 + 1) for path in folder.iterdir())
+        size = inputs + int(np.exp(self.rng.uniform(np.log(8_000.0), np.log(600_000.0))))
         source = self.home / "source"
         shutil.rmtree(source, ignore_errors=True)
         shutil.copytree(folder, source)
