@@ -84,7 +84,7 @@ class Readings:
         count, total = int(np.nansum(holds)), int(known.sum())
         lacking = f"; {self.missing}" if of_all and self.missing else ""
         if total == 0:
-            return Judgement("depends", f"no table: {self.missing or 'no run reaches so far'}")
+            return Judgement("depends", self._nothing)
         if count == 0:
             return Judgement("predicted-disagrees", f"it holds in none of {total} readings{lacking}")
         if count == total:
@@ -108,7 +108,7 @@ class Readings:
         """
         known = values[np.isfinite(values)]
         if not known.size:
-            return Judgement("depends", f"no table: {self.missing or 'no run reaches so far'}")
+            return Judgement("depends", self._nothing)
         low, high = float(known.min()), float(known.max())
         if np.all(np.abs(known / stated - 1.0) < _CLOSE):
             return Judgement("predicted-agrees", f"all {known.size} readings lie within {100 * _CLOSE:.0f} %")
@@ -126,6 +126,13 @@ class Readings:
     def claim(self, statement: str, paper: str, computed: str, judgement: Judgement) -> Claim:
         """A statement with its verdict."""
         return Claim(statement, paper, computed, judgement.verdict, judgement.reason)
+
+    @property
+    def _nothing(self) -> str:
+        """Why no reading tells, in words."""
+        if self.missing:
+            return f"no table: {self.missing}"
+        return "the study's tails: they do not show it, or no run reaches so far"
 
     def _movers(self, values: Values) -> list[str]:
         """The factors that move an answer most."""
