@@ -14,8 +14,8 @@ PLACE = {"gap": "5 mm", "pitch": "2 deg"}
 
 @pytest.fixture(scope="module")
 def robot() -> sp.Robot:
-    """The paper's robot with one turn of its tail, seen at one phase: what is claimed does not depend on them."""
-    return sp.load(WIDE, **{"tail.length": "25 mm", "model.tube.phases": 1})
+    """One turn of a thick tail, seen at one phase: what is claimed does not depend on them."""
+    return sp.load(WIDE, **{"tail.length": "25 mm", "tail.wire_diameter": "1.5 mm", "model.tube.phases": 1})
 
 
 @pytest.fixture(scope="module")
@@ -104,10 +104,10 @@ def test_boxes_show_a_tube_whole_unless_it_is_wide_or_an_extent_is_given() -> No
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"model": "sbt"}, "model = 'sbt'.*allowed: slender, tube"),
+        ({"model": "sbt"}, "model = 'sbt'.*allowed: auto, slender, tube"),
         ({"model": "tubes"}, "model = 'tubes' .did you mean tube"),
-        ({"placement": {"gap": "0.5 mm"}}, "placement"),
-        ({"resolution": {"tolerance": 0.01}}, "tolerance = 0.01 with model 'slender'"),
+        ({"model": "slender", "placement": {"gap": "0.5 mm"}}, "placement"),
+        ({"model": "slender", "resolution": {"tolerance": 0.01}}, "tolerance = 0.01 with model 'slender'"),
         ({"model": "tube", "placement": {"gap": "5 cm"}}, "placement.gap"),
         ({"model": "tube", "placement": {"height": "5 cm"}}, "height"),
         ({"model": "tube", "resolution": {"tolerance": 1.0}}, "tolerance = 1.0; allowed"),
