@@ -277,3 +277,15 @@ def test_marks_do_not_disturb_readers(tmp_path: Path) -> None:
         with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as found:
             assert found.identical(dataset)
     assert (tmp_path / "a.nc").read_bytes().endswith(f"\n{MARK}\n".encode())
+
+
+def test_frames_are_drawn_again_and_those_of_others_stay(tmp_path: Path) -> None:
+    options = {"trial": {"duration": 0.4}, "camera": {"size": "64x64", "fps": 5.0}}
+    sp.render(WIDE, tmp_path / "r", **options)
+    first = {path.name: path.read_bytes() for path in (tmp_path / "r").iterdir()}
+    sp.render(WIDE, tmp_path / "r", **options)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "r").iterdir()} == first
+    (tmp_path / "r" / "00000.png").write_bytes(b"mine")
+    with pytest.raises(InputError, match="not empty"):
+        sp.render(WIDE, tmp_path / "r", **options)
+    assert (tmp_path / "r" / "00000.png").read_bytes() == b"mine"

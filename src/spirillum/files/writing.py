@@ -25,6 +25,7 @@ __all__ = [
     "PICTURES",
     "Replace",
     "check_replaceable",
+    "holds_own_only",
     "is_own",
     "netcdf_target",
     "new_file",
@@ -195,12 +196,20 @@ def whole_files(
                 _sync(folder)
 
 
+def holds_own_only(folder: Path) -> bool:
+    """Whether all that a folder holds are files of this program, or nothing."""
+    return all(
+        path.is_file() and not path.is_symlink() and path.stat().st_size > 0 and is_own(path)
+        for path in folder.iterdir()
+    )
+
+
 @contextmanager
 def whole_folder(path: Path) -> Iterator[Path]:
     """Give a temporary folder; when the block ends well it takes the place of `path`, with all that is in it.
 
     Args:
-        path: a new folder, or an empty one.
+        path: a new folder, or one that holds files of this program only, which go.
 
     Raises:
         InputError: if the folder above cannot be written to, or something has come to stand there meanwhile.
@@ -215,8 +224,8 @@ def whole_folder(path: Path) -> Iterator[Path]:
             yield part
             for made in part.iterdir():
                 _finish(made, sync=True)
-            if path.is_dir() and not path.is_symlink():
-                path.rmdir()
+            if path.is_dir() and not path.is_symlink() and holds_own_only(path):
+                path.rename(hidden / f"{path.name}.before")
             elif path.exists() or path.is_symlink():
                 raise FileExistsError(errno.EEXIST, "something of this name is there", str(path))
             part.rename(parent / path.name)

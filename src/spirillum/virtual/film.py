@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from spirillum.errors import InputError
-from spirillum.files import check_replaceable, output_target, whole_file, whole_folder
+from spirillum.files import MARK, check_replaceable, holds_own_only, output_target, whole_file, whole_folder
 from spirillum.formats.h264 import h264_writer
 
 __all__ = ["FrameWriter", "video_target", "video_writer"]
@@ -42,7 +42,7 @@ def video_target(path: str | Path) -> Path:
         raise InputError(f"{path} cannot be written (no such folder); allowed: a folder you may write to")
     if not path.is_dir():
         check_replaceable(path)
-    if path.exists() and (not path.is_dir() or any(path.iterdir())):
+    if path.exists() and not (path.is_dir() and holds_own_only(path)):
         raise InputError(f"{path} is there and not empty; allowed: a new folder for the frames, or a .mp4")
     return path
 
@@ -95,6 +95,7 @@ class _Pngs:
         from PIL import Image, PngImagePlugin
 
         info = PngImagePlugin.PngInfo()
+        info.add_text("Software", MARK)
         for name, text in self._tags.items():
             info.add_itxt(name.capitalize(), text)
         Image.fromarray(image).save(self._folder / f"{number:05d}.png", compress_level=1, pnginfo=info)
