@@ -47,7 +47,7 @@ def test_files_that_are_no_runs(sentence: Callable[..., str], tmp_path: Path, ru
     text.write_text("time,position\n0,0\n")
     before = sorted(entry.name for entry in tmp_path.iterdir())
     assert "does not exist" in sentence("film", str(tmp_path / "none.nc"), "-o", target)
-    assert "is not a regular file" in sentence("film", str(tmp_path), "-o", target)
+    assert "is a folder" in sentence("film", str(tmp_path), "-o", target)
     assert "is not a NetCDF-4 file" in sentence("film", str(text), "-o", target)
     assert "cut.nc cannot be read" in sentence("film", str(cut), "-o", target)
     assert "does not end in .mp4 or .gif" in sentence("film", str(whole), "-o", str(tmp_path / "run.avi"))
