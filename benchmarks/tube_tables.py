@@ -8,7 +8,7 @@ film that a table adds is the better truth (`tests/fluid/test_film_and_rest_of_a
     OMP_NUM_THREADS=1 python benchmarks/tube_tables.py [--places 40] [--yawed 0.25] [--rows ROWS.jsonl] ROBOT...
     OMP_NUM_THREADS=1 python benchmarks/tube_tables.py --grid ROBOT...
 
-The grid has no yaw and lies in the upper part of the tube; it takes a minute of the processor. Places that stand in
+The grid lies in the upper part of the tube; it takes two minutes of the processor for each robot. Places that stand in
 ROWS are not solved again. Robots need tables (`spirillum prepare`).
 """
 
@@ -37,12 +37,13 @@ from spirillum.robot.seat import Seat
 Row = dict[str, Any]
 _MOST_PITCH = 0.97  # of the largest
 _GRID = (
-    *((0.4, f) for f in (0.45, -0.5)),
-    *((0.66, f) for f in (0.0, 0.45, 0.73, -0.45, -0.85)),
-    *((0.9, f) for f in (0.0, 0.45, -0.5)),
-    *((1.0, f) for f in (0.15, 0.45, 0.73, 0.93)),
+    *((0.4, f, 0.0) for f in (0.45, -0.5)),
+    *((0.66, f, 0.0) for f in (0.0, 0.45, 0.73, -0.45, -0.85)),
+    *((0.9, f, 0.0) for f in (0.0, 0.45, -0.5)),
+    *((1.0, f, 0.0) for f in (0.15, 0.45, 0.73, 0.93)),
+    *((0.66, 0.3, 0.7), (0.9, -0.4, -0.7), (0.4, 0.3, -0.7), (1.0, 0.5, 0.5), (0.4, -0.4, 0.9)),
 )
-"""Distance from the floor over that of the axis, and pitch over the largest."""
+"""Distance from the floor over that of the axis, pitch over the largest, yaw over that of the nodes."""
 _GRID_PHASE, _GRID_TOLERANCE = 0.8, 0.005
 
 
@@ -118,7 +119,7 @@ def main() -> None:
         table, batch = sp.prepare(robot).table, RobotBatch.of(robot)
         places = Places(RobotGeometry.of(batch), table.radius)
         if arguments.grid:
-            seats = [(places.seat_between(t, f), _GRID_PHASE) for t, f in _GRID]
+            seats = [(places.seat_between(t, f, yaw * places.yaw), _GRID_PHASE) for t, f, yaw in _GRID]
         else:
             seats = drawn(places, arguments.places, arguments.yawed, 1e-3 * arguments.gap, arguments.seed)
         asked.append([(name, number, table, places, *seat, batch) for number, seat in enumerate(seats)])
