@@ -44,4 +44,9 @@ def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
 
 def test_one_prediction_draws_no_picture() -> None:
     code = "from spirillum.cli import main; main(['predict', 'biorob2012-wide', '--json'])"
-    assert not loaded_after(code) & {"matplotlib", "xarray", "h5py", "jinja2", "pandas", "numba"}
+    assert not loaded_after(code) & {"matplotlib", "xarray", "h5py", "jinja2", "pandas"}
+
+
+def test_model_in_closed_form_loads_nothing_compiled() -> None:
+    code = "from spirillum.cli import main; main(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])"
+    assert "numba" not in loaded_after(code)

@@ -20,7 +20,6 @@ import numpy as np
 from spirillum.arrays import Axial, AxialLoad, AxialWhole, MeanFlow, PerRobot, Samples, Values
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
-from spirillum.kernels.held_contact import contact_drag
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.robot.links import links_of
@@ -58,6 +57,8 @@ def with_dry_friction(r: AxialWhole, force: Values, radius: Values, tail_rate: V
         radius: a, m, (...).
         tail_rate: omega, rad/s, (...).
     """
+    from spirillum.kernels.held_contact import contact_drag  # compiled: loaded where there is dry friction
+
     shape = np.broadcast_shapes(r.shape[:-2], *(np.shape(item) for item in (force, radius, tail_rate)))
     full = np.ascontiguousarray(np.broadcast_to(r, (*shape, 3, 3))).reshape(-1, 3, 3)
     pressed, radii, rates = (

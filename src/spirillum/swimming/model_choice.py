@@ -14,7 +14,6 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -98,6 +97,8 @@ def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool,
 
 def has_table(batch: RobotBatch) -> bool:
     """Whether the first robot of a batch, which has a channel, has a table for its tube."""
+    from spirillum.fluid.tube.library import find_table  # loads compiled loops, which few models need
+
     return find_table(RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])) is not None
 
 
