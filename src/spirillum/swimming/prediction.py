@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
-from spirillum.swimming.intervals import Intervals, intervals_of
 from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.other_models import OtherModels, other_models
@@ -43,6 +42,9 @@ from spirillum.swimming.steady import (
     speed_difference,
 )
 from spirillum.units import KINDS, parse_option, show
+
+if TYPE_CHECKING:
+    from spirillum.swimming.intervals import Intervals
 
 __all__ = ["Prediction", "checked_batch", "predict", "prepared"]
 
@@ -247,6 +249,8 @@ def predict(
     whose = posterior_for_of(posterior_for, drawn, ready)
     known = None
     if drawn is not None:
+        from spirillum.swimming.intervals import intervals_of  # loads compiled loops
+
         known = intervals_of(
             ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
         )
