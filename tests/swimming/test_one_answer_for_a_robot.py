@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.placement import Placement
 from spirillum.studies.spec import load_study
-from spirillum.swimming import model_choice
 from spirillum.swimming.model_choice import choose_model
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
@@ -55,7 +55,7 @@ def test_a_robot_that_the_tube_does_not_know_is_answered_without_walls_and_says_
 def test_what_would_take_minutes_without_a_table_is_answered_without_walls(monkeypatch: Any) -> None:
     robot = sp.load(WIDE)
     assert choose_model("auto", robot, tables_only=True).model == "tube"
-    monkeypatch.setattr(model_choice, "find_table", lambda *_: None)
+    monkeypatch.setattr(library, "find_table", lambda *_: None)
     found = choose_model("auto", robot, placement=Placement(), tables_only=True)
     assert found.model == "slender"
     assert "`spirillum prepare` makes one" in found.caution
