@@ -80,6 +80,27 @@ def test_an_interrupt_while_modules_are_imported_is_one_too() -> None:
     assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; what was done is kept\n")
 
 
+def test_an_interrupt_while_an_object_is_removed_is_not_lost() -> None:
+    script = (
+        "import os, signal, sys, time\n"
+        "class Removed:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "        [None for _ in range(1000)]\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, *_):\n"
+        "        if name == 'spirillum.cli.app':\n"
+        "            Removed()\n"
+        "            time.sleep(5.0)\n"
+        "sys.meta_path.insert(0, Finder())\n"
+        "from spirillum.cli import main\n"
+        "sys.argv = ['spirillum', '--help']\n"
+        "main()\n"
+    )
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (found.returncode, found.stderr) == (130, "spirillum: interrupted; what was done is kept\n")
+
+
 SETTINGS = "text.usetex: True\nfont.family: nowhere\nbackend: nonsense\nlines.nonsense: 1\nfigure.facecolor: red\n"
 
 

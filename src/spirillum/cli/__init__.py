@@ -7,11 +7,13 @@ import gc
 import os
 import signal
 import sys
+from _thread import interrupt_main
 from collections.abc import Sequence
 from contextlib import suppress
 from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
+from threading import Timer
 from typing import TextIO
 
 __all__ = ["main"]
@@ -20,6 +22,8 @@ _NAMING = ("measure", "setup", "virtual-experiment")
 """Commands whose arguments name files and folders."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """What is wrong with a name or place, not with the program."""
+_AGAIN = 0.02
+"""After this time an interrupt that was dropped comes again, s."""
 _OBJECTS = 50_000
 """New objects between two looks for garbage: imports make many that stay. The last look, at the end, is left out."""
 
@@ -46,6 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _prepare() -> None:
     """What only a process of its own may set."""
     gc.set_threshold(_OBJECTS)
+    sys.unraisablehook = _not_lost
     # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
     os.environ["MPLBACKEND"] = "agg"
@@ -58,6 +63,16 @@ def _prepare() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+
+
+def _not_lost(found: sys.UnraisableHookArgs) -> None:
+    """An interrupt that came while an object was being removed, where Python drops it, comes again."""
+    if isinstance(found.exc_value, KeyboardInterrupt):
+        again = Timer(_AGAIN, interrupt_main)  # at once it would come in here, and be dropped too
+        again.daemon = True
+        again.start()
+    else:
+        sys.__unraisablehook__(found)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
