@@ -128,7 +128,7 @@ class Design:
             return None
         axes = []
         for item in variables:
-            whole = [item.share(value) for value in np.arange(item.low, item.high + 1.0)] if item.whole else None
+            whole = [item.share(value) for value in np.arange(item.low, item.high + 1.0)] if item.is_whole else None
             axes.append(np.linspace(0.0, 1.0, _LANDSCAPE_POINTS) if whole is None else np.array(whole))
         x, y = np.meshgrid(*axes)
         values = self.searched.scores(np.stack([x.ravel(), y.ravel()], axis=-1)).values[0]

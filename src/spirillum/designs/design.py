@@ -294,7 +294,7 @@ def _profile(searched: Evaluation, best: Samples, number: int) -> Profile:
     """The objective along one variable through the best design."""
     space, objective = searched.space, searched.objectives[0]
     variable = space.variables[number]
-    if variable.whole:
+    if variable.is_whole:
         along = np.array([variable.share(value) for value in np.arange(variable.low, variable.high + 1.0)])
     else:
         along = np.union1d(np.linspace(0.0, 1.0, _PROFILE_POINTS), best[number])

@@ -133,7 +133,7 @@ def best_design(
         vectorized=True,
     )
     best, cost = np.clip(np.asarray(found.x), 0.0, 1.0), float(found.fun)
-    free = [n for n, variable in enumerate(evaluation.space.variables) if not variable.whole]
+    free = [n for n, variable in enumerate(evaluation.space.variables) if not variable.is_whole]
     if free and cost < REFUSED:
         whole = best.copy()
 

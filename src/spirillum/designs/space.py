@@ -35,13 +35,13 @@ class Variable(NamedTuple):
     high: float
 
     @property
-    def whole(self) -> bool:
+    def is_whole(self) -> bool:
         """Whether it is a whole number."""
         return self.path == TURNS
 
     def at(self, share: Samples) -> Samples:
         """Values at shares of the range, 0 to 1; whole numbers are equally likely."""
-        if self.whole:
+        if self.is_whole:
             count = self.high - self.low + 1.0
             return self.low + np.minimum(np.floor(share * count), count - 1.0)
         found: Samples = self.low + share * (self.high - self.low)
@@ -49,7 +49,7 @@ class Variable(NamedTuple):
 
     def share(self, value: float) -> float:
         """Where in the range a value lies; of a whole number the middle of its part."""
-        if self.whole:
+        if self.is_whole:
             return (value - self.low + 0.5) / (self.high - self.low + 1.0)
         return (value - self.low) / (self.high - self.low)
 
@@ -75,7 +75,7 @@ class Space:
         values = self.values(shares)
         found = shares.copy()
         for n, variable in enumerate(self.variables):
-            if variable.whole:
+            if variable.is_whole:
                 found[:, n] = (values[:, n] - variable.low + 0.5) / (variable.high - variable.low + 1.0)
         return found
 

@@ -102,7 +102,7 @@ def _landscape(axes: Axes, design: Design) -> None:
     y, y_unit = _field(second, two.unit)
     values, label = _objective(design.objectives[0], grid)
     axes.set_facecolor(_REFUSED)
-    if any(item.whole for item in design.searched.space.variables):
+    if any(item.is_whole for item in design.searched.space.variables):
         found: ScalarMappable = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="cividis", shading="nearest")
     else:
         found = axes.contourf(x, y, values, levels=12, cmap="cividis")
