@@ -51,7 +51,10 @@ COMMANDS = _commands(typer.main.get_command(app))
 
 
 def _options(path: str) -> set[str]:
-    return {name for parameter in COMMANDS[path].params for name in parameter.opts} | {"--help", "-h"}
+    return {name for parameter in COMMANDS[path].params for name in (*parameter.opts, *parameter.secondary_opts)} | {
+        "--help",
+        "-h",
+    }
 
 
 def _compare(page: Path, *, slow: bool) -> None:

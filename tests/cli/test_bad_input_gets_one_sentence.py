@@ -165,7 +165,7 @@ def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, m
 def test_our_own_errors_are_not_hidden(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """A defect of ours must not look like bad input."""
     from spirillum.cli import main
-    from spirillum.swimming import prediction
+    from spirillum.dynamics import prediction
 
     def broken(*_: object, **__: object) -> None:
         raise ZeroDivisionError

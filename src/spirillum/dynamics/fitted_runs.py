@@ -15,8 +15,8 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.answer import LEVEL
 from spirillum.swimming.discrepancy import drawn_discrepancy
-from spirillum.swimming.intervals import LEVEL
 from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
 
 if TYPE_CHECKING:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
 
 from spirillum.arrays import Flags, PerRobot
 from spirillum.quantities import QUANTITIES, Quantity
 
-__all__ = ["STEADY", "Swimming"]
+__all__ = ["LEVEL", "STEADY", "Intervals", "Swimming"]
+
+LEVEL = 0.95
+"""Level of the intervals."""
 
 
 @dataclass(frozen=True)
@@ -49,3 +56,19 @@ class Swimming:
 
 STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.name != "valid")
 """The quantities of steady swimming, in their order."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Limits of the intervals of every quantity of one robot."""
+
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    middle: Mapping[str, float]
+    """Medians of the draws."""
+
+    def of(self, name: str) -> dict[str, Any]:
+        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
+        if not np.isfinite(self.low[name]):
+            return {}
+        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}

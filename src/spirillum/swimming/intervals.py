@@ -11,8 +11,7 @@ robot's own motion, not of a single measured trial.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.robot.batch import CalibrationFactors, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.answer import LEVEL, STEADY, Intervals, Swimming
 from spirillum.swimming.balance import friction_torques
 from spirillum.swimming.discrepancy import PosteriorFor, drawn_discrepancy
 from spirillum.swimming.drawn_resistance import AxialTable, TubeResistance, chebyshev_points
@@ -32,28 +31,10 @@ from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.steady import friction_reading
 
-__all__ = ["LEVEL", "Intervals", "drawn_kinematics", "intervals_of"]
+__all__ = ["drawn_kinematics", "intervals_of"]
 
-LEVEL = 0.95
-"""Level of the intervals."""
 _ELECTRIC = ("torque_constant", "back_emf_constant")
 _WIRE_POINTS = 7
-
-
-@dataclass(frozen=True)
-class Intervals:
-    """Limits of the intervals of every quantity of one robot."""
-
-    low: Mapping[str, float]
-    high: Mapping[str, float]
-    middle: Mapping[str, float]
-    """Medians of the draws."""
-
-    def of(self, name: str) -> dict[str, Any]:
-        """Entries `low`, `high`, `kind` and `level` of a quantity's JSON; none for one that does not apply."""
-        if not np.isfinite(self.low[name]):
-            return {}
-        return {"low": self.low[name], "high": self.high[name], "kind": "interval", "level": LEVEL}
 
 
 def intervals_of(

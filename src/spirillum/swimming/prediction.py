@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import GAP_SHARE
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.answer import STEADY, Intervals, Swimming
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, no_band_warnings
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
@@ -42,9 +42,6 @@ from spirillum.swimming.steady import (
     speed_difference,
 )
 from spirillum.units import KINDS, parse_option, show
-
-if TYPE_CHECKING:
-    from spirillum.swimming.intervals import Intervals
 
 __all__ = ["Prediction", "checked_batch", "predict", "prepared"]
 

@@ -183,7 +183,8 @@ def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study:
 @pytest.mark.usefixtures("unplaced")
 def test_unanswered_robots_leave_gaps_and_are_counted() -> None:
     study = {
-        "grid": {"channels": {"one": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["2 mm", "25 mm"]}
+        "models": ["sbt", "rft"],
+        "grid": {"channels": {"one": "biorob2012-wide"}, "wavelengths": ["25 mm"], "amplitudes": ["2 mm", "25 mm"]},
     }
     picture = figures_of(sp.study(study))["channel-one"]
     assert "2 of 4 results" in picture.caption
@@ -248,7 +249,7 @@ def robot_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str],
 @pytest.mark.usefixtures("unplaced")
 def test_listed_robots_have_a_point_each(robot_file: Callable[[str, str], str]) -> None:
     robots = [robot_file(f"r{number}", f"{number} mm") for number in (1, 2, 3)]
-    dataset = sp.study({"robots": robots, "title": "three"})
+    dataset = sp.study({"robots": robots, "title": "three", "models": ["sbt", "rft"]})
     figures = figures_of(dataset)
     assert list(figures) == ["robots"]
     figure = figures["robots"].figure()
