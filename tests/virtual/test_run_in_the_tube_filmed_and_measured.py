@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import spirillum as sp
 
@@ -10,6 +11,7 @@ RADIUS, START, LENGTH = 0.009, 4.0, 9.8
 """Of the body, m; begin and length of the film in the run, s."""
 
 
+@pytest.mark.slow
 def test_run_in_the_tube_is_measured_within_the_stated_intervals(tmp_path: Path) -> None:
     """From above one sees the top of the body, which a nose that rises moves back by the radius (known limit L50)."""
     run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})

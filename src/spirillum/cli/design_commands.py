@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.inputs import loaded_robot, pairs_of
-from spirillum.cli.options import Json, Model, Posterior, RobotArgument, Settings, TailRate
+from spirillum.cli.options import Json, Posterior, RobotArgument, Settings, TailRate
 
 __all__ = ["design"]
 
@@ -47,7 +47,7 @@ def design(
         typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
     ] = None,
     posterior: Posterior = None,
-    model: Model = "sbt",
+    model: Annotated[str, typer.Option(help="Hydrodynamic model: sbt, rft or slender.")] = "sbt",
     tail_rate: TailRate = None,
     statistic: Annotated[
         str, typer.Option(metavar="mean|quantile", help="Of the objective over what is not known.")

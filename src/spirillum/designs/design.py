@@ -9,35 +9,35 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
-from spirillum.designs.answer import LEVEL, Alternative, Design, Profile, Uncertainty
+from spirillum.designs.answer import LEVEL, Alternative, Design, Uncertainty
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.options import Judged
+from spirillum.designs.profiles import bound_by_of, profile_of
 from spirillum.designs.reading import condition_of, quantity_of
 from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
 from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
-from spirillum.errors import InputError
+from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.robot.text import with_numbers
-from spirillum.swimming.answer import STEADY
+from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.drive_warnings import drive_warnings
+from spirillum.swimming.steady import friction_reading
 from spirillum.units import KINDS, display_unit, in_unit, parse_option
 
 __all__ = ["design"]
 
+_MODELS = ("sbt", "rft", "slender")
+"""Models that answer for many tails at once."""
 _MORE_DRAWS = 4
 """Draws of what is stated over those of the search."""
-_PROFILE_POINTS = 41
 _NEAR = 0.1
 """The runner-up differs from the best design by at least this share of a range."""
-_FLAT = 0.01
-"""Loss of the objective up to which a variable is free, relative."""
 _FRONT_POINTS = 13
-_TOUCHES = 1e-3
-"""Share of a range, or relative excess of a condition, within which the best design lies at it."""
 _STATED_SEED = 7919
 """Added to the seed for the draws of what is stated."""
 
@@ -84,10 +84,11 @@ def design(
     Raises:
         InputError: for wrong input, or where no design can be wound and keeps all conditions.
     """
-    given = load(robot)
-    options, chosen = Judged.of(judged), find_swimmer_model(model)
-    if chosen.placed:
-        raise InputError(f"model = '{model}' solves for one tail at a time; allowed: sbt, rft or slender")
+    given, options = load(robot), Judged.of(judged)
+    if model not in _MODELS:
+        why = " (tube solves for one tail at a time)" if model == "tube" else ""
+        raise InputError(f"model = {model!r}{why}{did_you_mean(model, _MODELS)}; allowed: {', '.join(_MODELS)}")
+    chosen = find_swimmer_model(model)
     unknowns = unknowns_of(given, unknown, posterior, model)
     if not chosen.closed_form and not unknowns.known:
         raise InputError(
@@ -99,6 +100,8 @@ def design(
     if twice:
         raise InputError(f"{twice.pop()} is varied and unknown; allowed: one of them")
     rate = None if tail_rate is None else parse_option("tail_rate", tail_rate, KINDS["rate"])
+    if rate == 0:
+        raise InputError("tail_rate = 0: a tail at rest drives nothing; allowed: a rate above or below 0")
     if rate is None and given.drive is None:
         raise InputError(f"{given.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
     objectives = _objectives(maximise, minimise, options)
@@ -134,6 +137,8 @@ def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], op
                 found.append(Objective(target.quantity, 1.0, "probability", target=target))
             else:
                 found.append(Objective(quantity_of(name, option), sign, options.statistic, options.level))
+    if len({item.name for item in found}) < len(found):
+        raise InputError(f"{found[0].name} is twice an objective; allowed: two different ones")
     if not 1 <= len(found) <= 2:
         raise InputError(f"{len(found)} objectives; allowed: one or two, by maximise and minimise")
     return tuple(found)
@@ -201,8 +206,8 @@ def _answer(
     if second is not None:
         alternatives.append(_alternative("runner_up", second, stated, own[0], unknowns))
     value = float(objective.of(own)[0])
-    profiles = tuple(_profile(searched, best, number) for number in range(space.size))
-    bound_by = _bound_by(stated, best, profiles)
+    profiles = tuple(profile_of(searched, best, number) for number in range(space.size))
+    bound_by = bound_by_of(stated, best, profiles)
     return Design(
         robot=_built(given, space, best),
         today=given,
@@ -222,7 +227,7 @@ def _answer(
         swum=archive.count,
         refused=archive.refused,
         breaking=archive.breaking,
-        warnings=_warnings(given, stated, best, bound_by),
+        warnings=_warnings(given, stated, best, swum, bound_by, list(stated.drawn.values)),
     )
 
 
@@ -290,62 +295,6 @@ def _alternative(
     )
 
 
-def _profile(searched: Evaluation, best: Samples, number: int) -> Profile:
-    """The objective along one variable through the best design."""
-    space, objective = searched.space, searched.objectives[0]
-    variable = space.variables[number]
-    if variable.is_whole:
-        along = np.array([variable.share(value) for value in np.arange(variable.low, variable.high + 1.0)])
-    else:
-        along = np.union1d(np.linspace(0.0, 1.0, _PROFILE_POINTS), best[number])
-    values = variable.at(along)
-    shares = np.tile(best, (len(along), 1))
-    shares[:, number] = along
-    found = searched.scores(shares).values[0]
-    own = int(np.argmin(np.abs(values - variable.at(best[None, number])[0])))
-    sign = 1.0 if objective.target is not None else objective.sign
-    near = np.where(np.isfinite(found), sign * (found[own] - found), np.inf) <= _FLAT * abs(found[own])
-    first, last = own, own
-    while first > 0 and near[first - 1]:
-        first -= 1
-    while last < len(near) - 1 and near[last + 1]:
-        last += 1
-    return Profile(
-        variable.path,
-        variable.unit,
-        values,
-        found,
-        float(values[first]),
-        float(values[last]),
-        _binds(searched, shares, found, own),
-    )
-
-
-def _binds(searched: Evaluation, shares: Samples, found: Samples, own: int) -> str:
-    """What refuses the designs next to the best one along a variable; empty where none is refused."""
-    words = []
-    for side in (own - 1, own + 1):
-        if 0 <= side < len(found) and not np.isfinite(found[side]):
-            outside = broken(searched.limits(shares[side][None]))
-            if outside:
-                words.append(outside[0].why)
-                continue
-            swum = searched.swum(shares[side][None])
-            words += [item.words for item in searched.conditions if searched.excess(item, swum)[0] > 0]
-    return "; ".join(dict.fromkeys(words))
-
-
-def _bound_by(stated: Evaluation, best: Samples, profiles: Sequence[Profile]) -> tuple[str, ...]:
-    """What the best design touches: ends of ranges, and what refuses its neighbours."""
-    found = []
-    for variable, share in zip(stated.space.variables, best, strict=True):
-        value = float(variable.at(np.array([share]))[0])
-        for end, where in ((variable.low, "low"), (variable.high, "high")):
-            if abs(value - end) <= _TOUCHES * (variable.high - variable.low):
-                found.append(f"{variable.path} at the {where} end of its range")
-    return (*found, *dict.fromkeys(item.binds for item in profiles if item.binds))
-
-
 def _columns_of(searched: Evaluation, shares: Samples) -> dict[str, Samples]:
     """Fields and both objectives of designs."""
     values = searched.scores(shares).values
@@ -359,10 +308,20 @@ def _built(given: Robot, space: Space, best: Samples) -> Robot:
     return found.model_copy(update={"name": f"{given.name}-design"})
 
 
-def _warnings(given: Robot, stated: Evaluation, best: Samples, bound_by: Sequence[str]) -> tuple[str, ...]:
+def _warnings(
+    given: Robot, stated: Evaluation, best: Samples, swum: Swimming, bound_by: Sequence[str], unknown: Sequence[str]
+) -> tuple[str, ...]:
+    """What to be careful about, a sentence each."""
     found = list(given.warnings)
-    batch = stated.space.batch(best[None])
-    found += [limit.sentence() for limit in broken(stated.model.cautions(batch))]
-    if bound_by and any("end of its range" in words for words in bound_by):
+    if given.channel is not None:
+        found.append(
+            f"the channel's walls are left out, which makes a robot faster than it is (model '{stated.model.name}'): "
+            "let `spirillum predict` with model tube answer for the best design"
+        )
+    if not {"friction.effective", "friction", "shared_friction"} & set(unknown):
+        reading = friction_reading(given.friction.reading)
+        found += drive_warnings(stated.space.robot, stated.model, reading, swum, stated.tail_rate)
+    found += [limit.sentence() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
+    if any("end of its range" in words for words in bound_by):
         found.append("the best design lies at the end of a range: a wider one may hold a better design")
     return tuple(dict.fromkeys(found))

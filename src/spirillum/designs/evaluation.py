@@ -163,7 +163,8 @@ class Evaluation:
     def limits(self, shares: Samples | None) -> list[Limit]:
         """What bench, tube and model ask of designs; None: of the robot as it is."""
         batch = RobotBatch.of(self.space.robot) if shares is None else self.space.batch(shares)
-        return [*requirements(batch, self.model), *self.bench.limits(batch)]
+        with np.errstate(all="ignore"):  # what is out of all proportion is refused by a limit
+            return [*requirements(batch, self.model), *self.bench.limits(batch)]
 
     def excess(self, condition: Condition, swum: Swimming) -> Samples:
         """By how much designs break a condition in the draws that have to keep it, (designs,)."""

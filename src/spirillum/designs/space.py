@@ -22,6 +22,7 @@ TURNS = "tail.turns"
 """Whole turns of the tail: its length over its wavelength, a field of designs only."""
 _MOST_TURNS = 100
 _MOST_VARIABLES = 8
+_MAY_BE_UNSET = "friction.effective"
 
 
 class Variable(NamedTuple):
@@ -135,7 +136,10 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
         if low != round(low) or high != round(high) or not 1 <= low <= high <= _MOST_TURNS:
             raise InputError(f"{option} {path} = {low:g}:{high:g}; allowed: whole numbers from 1 to {_MOST_TURNS}")
         return Variable(path, "1", low, high)
-    units = {item.path: item.unit for item in field_values(robot)}
+    # A field that is unset belongs to another drive or shape; friction alone may be unset and still act.
+    units = {
+        item.path: item.unit for item in field_values(robot) if item.value is not None or item.path == _MAY_BE_UNSET
+    }
     known = sorted(set(units) & set(RobotBatch.numbers()))
     if path not in known:
         hint = did_you_mean(path, [*known, TURNS])
@@ -143,6 +147,11 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
     unit = units[path] or "1"
     low, high = range_of(f"{option} {path}", given, unit)
     if not low < high:
-        raise InputError(f"{option} {path}: the range ends before it begins; allowed: LOW:HIGH with LOW below HIGH")
-    RobotBatch.of(robot).with_values({path: [low, high]})
+        raise InputError(f"{option} {path} = {low:g}:{high:g} {unit}; allowed: LOW:HIGH with LOW below HIGH")
+    try:
+        RobotBatch.of(robot).with_values({path: [low, high]})
+    except InputError as error:
+        raise InputError(
+            f"{option} {path} = {low:g}:{high:g} {unit}; allowed: numbers that the field of a robot file may have"
+        ) from error
     return Variable(path, unit, low, high)

@@ -24,6 +24,7 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.load import load
@@ -77,7 +78,7 @@ def free_motion(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a channel.
         tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
         friction: reading of the friction; None: the robot's own.
-        calibration: calibration file whose effective friction replaces the robot's.
+        calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
         placement: where it is laid down, the ends of the channel, and a constant flow.
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
@@ -91,6 +92,10 @@ def free_motion(
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     _check(asked)
+    contact = calibrated_contact(calibration)
+    height = contact.roughness if height is None else height
+    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
+        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
     ready, _, batch = prepared(load(robot), "tube", calibration=calibration, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(

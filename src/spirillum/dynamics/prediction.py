@@ -9,7 +9,7 @@ from inspect import signature
 from typing import ParamSpec
 
 from spirillum.errors import InputError
-from spirillum.robot.load import load
+from spirillum.robot.load import load, with_resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming import prediction
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
@@ -40,6 +40,7 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
             return steady(*args, **kwargs)
         if asked.get("posterior") is not None:
             raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
+        with_resolution(load(asked["robot"]), asked.get("resolution"), "tube")  # refused as for a held motion
         from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
         found = free_motion(

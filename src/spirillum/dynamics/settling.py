@@ -184,7 +184,7 @@ def settle(
         tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; without it
             the robot's drive decides.
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
-        calibration: calibration file whose effective friction replaces the robot's.
+        calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
         placement: where it is laid down: `gap` or `eccentricity`, `pitch`, `yaw`; `ends` of the channel, or a `flow`.
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.

@@ -20,6 +20,7 @@ from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
@@ -121,7 +122,7 @@ def simulate(
     held, asked = motion_of(motion) == "held", InTube.of(in_tube)
     walled = model == "tube" and not held
     if held:
-        _check_held(placed, roughness, known, weight=weight)
+        _check_held(placed, roughness, known, calibration, weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled)
@@ -129,6 +130,8 @@ def simulate(
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None
         there, rough, touching = _fitted_place(one, drawn, draw, placed, height, asked)
+        if walled and known is None:
+            rough, touching = _fitted_contact(calibration, rough, touching)
         table = _table(one, there, touching, rough, tell) if walled else None
         steady = predict(
             one,
@@ -174,6 +177,16 @@ def _fitted_place(
     if asked.friction_coefficient is None:
         asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
     return known.placed(robot, placed, draw), contact.roughness if roughness is None else roughness, asked
+
+
+def _fitted_contact(
+    calibration: str | Path | None, roughness: float | None, asked: InTube
+) -> tuple[float | None, InTube]:
+    """Asperities and settings of a run in a tube, with what a calibration file says of what is not given."""
+    contact = calibrated_contact(calibration)
+    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
+        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    return contact.roughness if roughness is None else roughness, asked
 
 
 def _table(
@@ -265,16 +278,23 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
 
 
 def _check_held(
-    placement: Placement, roughness: str | float | None, known: PosteriorFile | None, *, weight: bool
+    placement: Placement,
+    roughness: str | float | None,
+    known: PosteriorFile | None,
+    calibration: str | Path | None,
+    *,
+    weight: bool,
 ) -> None:
     """Refuse what only a free run knows.
 
     Raises:
         InputError: if there is something.
     """
-    if known is not None and known.contact().friction_coefficient:
+    contact = calibrated_contact(calibration) if known is None else known.contact()
+    if contact.friction_coefficient:
+        source = calibration if known is None else known.source
         raise InputError(
-            f"{known.source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
+            f"{source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
             "'tube' with motion 'free'"
         )
     given = [

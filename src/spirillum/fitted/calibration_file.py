@@ -34,6 +34,7 @@ __all__ = [
     "FittedPlace",
     "FittedValues",
     "Provenance",
+    "calibrated_contact",
     "calibrated_placement",
     "calibrated_robot",
     "friction_of_tails",
@@ -246,6 +247,15 @@ def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
         InputError: as `read_calibration`.
     """
     return placement_in(read_calibration(path), robot)
+
+
+def calibrated_contact(path: str | Path | None) -> FittedContact:
+    """Roughness and dry friction of a calibration file; nothing without one.
+
+    Raises:
+        InputError: as `read_calibration`.
+    """
+    return FittedContact() if path is None else read_calibration(path).contact
 
 
 def placement_in(file: CalibrationFile, robot: Robot) -> Placement | None:

@@ -174,7 +174,9 @@ def _motor_rates(readings: Readings) -> Iterator[Claim]:
 def _effective_friction(readings: Readings) -> Iterator[Claim]:
     found = readings.of("effective_friction", "rft")
     motor = readings.evidence.robot.motor
-    if readings.known.all():
+    if min(found.shape[1:3]) == 1:
+        computed, judgement = "not computed", Judgement("depends", "a grid of several wavelengths and amplitudes")
+    elif readings.known.all():
         by_wavelength = np.std(found.mean(axis=2), axis=1).mean(axis=0)
         by_amplitude = np.std(found.mean(axis=1), axis=1).mean(axis=0)
         spreads = f"over amplitudes {_range(by_amplitude, '')}, over wavelengths {_range(by_wavelength, '')}"

@@ -230,7 +230,7 @@ def trends(evidence: Evidence) -> Iterator[Claim]:
         ", ".join(
             f"{label(m)}: torque per rate rises in {_share(np.diff(load, axis=2))} steps" for m, load in loads.items()
         ),
-        "agrees" if all(np.all(steps > 0) for steps in rising) else "disagrees",
+        _always(np.concatenate([steps.ravel() for steps in rising])),
         "torque per rate does not depend on the rate",
     )
 
@@ -245,6 +245,9 @@ def _share(steps: Values) -> str:
 
 
 def _always(steps: Values) -> Verdict:
+    """Whether a trend holds in every step of the grid; a grid without steps does not tell."""
+    if steps.size == 0:
+        return "undecidable"
     return "agrees" if bool(np.all(steps > 0)) else "disagrees"
 
 

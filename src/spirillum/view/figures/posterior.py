@@ -125,7 +125,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     synthetic = " (synthetic)" if found.experiment.synthetic else ""
     with styled():
         sheet = Sheet(
-            "LikelihoodProfile likelihood",
+            "Profile likelihood",
             f"{plain(found.experiment.source, 40)}{synthetic}, model {found.problem.model.name}: least chi squared "
             "above the best fit",
             width=width_of(columns, 1.72),
