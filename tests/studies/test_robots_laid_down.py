@@ -7,7 +7,15 @@ import spirillum as sp
 from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.biorob2012.readings import Readings
 from spirillum.papers.registry import claims_of, predictions_of
-from spirillum.studies.laid_down import FACTORS, INFERRED_BY, READ, laid_down_runs, levels, levels_of_readings
+from spirillum.studies.laid_down import (
+    FACTORS,
+    INFERRED_BY,
+    READ,
+    laid_down_runs,
+    levels,
+    levels_of_readings,
+    without_answer,
+)
 from spirillum.studies.spec import LaidDown
 
 SHORT = {
@@ -129,11 +137,19 @@ def test_a_stated_number_is_met_missed_or_straddled(readings: Readings) -> None:
         ({"gap": ["1 mm", "0.1 mm"]}, "gap goes from 0.001 to 0.0001"),
         ({"roughness": ["1 um", "0.5 mm"]}, "asperities would carry"),
         ({"pitch": [0.0, 2.0]}, "laid_down.pitch"),
+        ({"duration": "0 s"}, "duration = 0 s; allowed: 1 s to 600 s"),
+        ({"wait": ["0 s", "1e6 s"]}, r"wait = 1e\+06 s; allowed"),
     ],
 )
 def test_wrong_ranges_are_refused(table, words: str) -> None:
     with pytest.raises(sp.InputError, match=words):
         sp.study(SHORT | {"laid_down": table})
+
+
+def test_runs_that_tell_nothing_are_counted() -> None:
+    speeds = np.array([[[np.nan, np.nan], [1e-3, np.nan]]])
+    assert without_answer([{"forward_velocity": speeds}])[0].startswith("1 of 2 runs of laid-down robots")
+    assert without_answer([{"forward_velocity": speeds[:, 1:]}]) == []
 
 
 def test_a_calibration_is_refused(tmp_path) -> None:

@@ -48,6 +48,7 @@ __all__ = [
     "laid_down_tasks",
     "levels",
     "levels_of_readings",
+    "without_answer",
     "without_table",
 ]
 
@@ -274,4 +275,16 @@ def without_table(loaded: LoadedStudy, tasks: Iterable[LaidDownTask]) -> list[st
         f"{len(missing)} of {loaded.count} robots have no table of their tube and were not laid down, the first: "
         f"{first.name} with a tail of {1e3 * first.tail.wavelength:g} x {1e3 * first.tail.amplitude:g} mm; "
         "`spirillum prepare` makes one"
+    ]
+
+
+def without_answer(parts: Iterable[Part]) -> list[str]:
+    """A sentence on the runs of laid-down robots that tell nothing; none where all tell something."""
+    found = [np.isfinite(part["forward_velocity"]).any(axis=-1) for part in parts]
+    known = np.concatenate([part.ravel() for part in found]) if found else np.ones(0, dtype=bool)
+    if known.all():
+        return []
+    return [
+        f"{np.count_nonzero(~known)} of {known.size} runs of laid-down robots have no answer: a robot cannot be laid "
+        "down so, or leaves its table before its tail has made three turns; allowed: other ranges in [laid_down]"
     ]

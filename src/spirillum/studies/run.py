@@ -12,7 +12,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.processes import as_they_come
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
-from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_table
+from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_answer, without_table
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
@@ -93,6 +93,7 @@ def computed_study(
     warnings += summed(found, loaded.count)
     warnings += left_out(band)
     warnings += without_table(loaded, runs)
+    warnings += without_answer(part for _, part in laid_down)
     for robot in loaded.robots:
         for name in loaded.study.models:
             warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]

@@ -82,6 +82,10 @@ class LaidDown(Section):
             if low >= high:
                 words = f"{name} goes from {low:g} to {high:g}; allowed: a low level below the high one"
                 raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
+        for name, value, low, high in (("duration", self.duration, 1.0, 600.0), ("wait", self.wait[1], 0.0, 3600.0)):
+            if not low <= value <= high:
+                words = f"{name} = {value:g} s; allowed: {low:g} s to {high:g} s"
+                raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
         if self.roughness[1] >= 2.0 * self.gap[0]:
             words = (
                 f"roughness of up to {self.roughness[1]:g} m with a gap of {self.gap[0]:g} m: asperities would carry "
