@@ -21,7 +21,7 @@ _Answer = TypeVar("_Answer")
 
 
 def as_they_come(
-    work: Callable[[_Task], _Answer], tasks: Sequence[_Task], workers: int
+    work: Callable[[_Task], _Answer], tasks: Sequence[_Task], workers: int, *, besides: str = ""
 ) -> Iterator[tuple[_Task, _Answer]]:
     """Tasks with their answers: in order from this process, in any order from several.
 
@@ -29,6 +29,7 @@ def as_they_come(
         work: what is done; a function of a module of this package.
         tasks: what it is done to; they can be pickled.
         workers: number of processes; 1: this one.
+        besides: what the sentence of an error says at its end, such as what is kept.
 
     Raises:
         InputError: if a process was ended from outside.
@@ -46,7 +47,7 @@ def as_they_come(
     except BrokenProcessPool as error:
         raise InputError(
             f"a process of {workers} was ended from outside, as for want of memory; allowed: workers = 1, or more "
-            "memory"
+            f"memory{besides}"
         ) from error
     except BaseException:
         for process in multiprocessing.active_children():

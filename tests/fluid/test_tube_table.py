@@ -326,14 +326,9 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
 
 
 _UNGUARDED = """
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
-from spirillum.fluid.tube.rest import _no_main
+from spirillum.processes import as_they_come
 print("once")
-with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-    with _no_main():
-        answer = pool.submit(abs, -1)
-    print(answer.result())
+print(min(answer for _, answer in as_they_come(abs, [-1, -2], workers=2)))
 """
 
 

@@ -13,12 +13,10 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import STEADY
+from spirillum.swimming.answer import LEVEL, STEADY
 
-__all__ = ["LEVEL", "Alternative", "Design", "Profile", "Uncertainty"]
+__all__ = ["Alternative", "Design", "Profile", "Uncertainty"]
 
-LEVEL = 0.95
-"""Level of the intervals."""
 _LANDSCAPE_POINTS = 41
 
 
@@ -112,12 +110,11 @@ class Design:
     def winding(self) -> dict[str, float]:
         """How to wind the tail: mandrel, pitch, turns and length of wire, m."""
         tail = self.robot.tail
-        turn = float(np.hypot(tail.wavelength, 2.0 * np.pi * tail.amplitude))
         return {
             "mandrel_diameter": 2.0 * tail.amplitude - tail.wire_diameter,
             "pitch": tail.wavelength,
             "turns": tail.length / tail.wavelength,
-            "wire_length": turn * tail.length / tail.wavelength,
+            "wire_length": self.robot.derived()["arc_length"].value,
         }
 
     @cached_property

@@ -10,6 +10,7 @@ from pydantic import Field
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import LengthOrZero
+from spirillum.robot.geometry import coil_curvature
 from spirillum.robot.limits import Limit
 
 __all__ = ["Bench"]
@@ -30,8 +31,7 @@ class Bench(Options):
     def limits(self, batch: RobotBatch) -> list[Limit]:
         """The conditions, for every robot of a batch."""
         wire = batch.wire_diameter
-        wavenumber = 2.0 * np.pi / batch.wavelength
-        curvature = batch.amplitude * wavenumber**2 * batch.arc_fraction**2
+        curvature = coil_curvature(batch.wavelength, batch.amplitude)
         clearance = wire if self.clearance is None else np.full(1, self.clearance)
         return [
             Limit.of(

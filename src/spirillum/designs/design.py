@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Flags, Samples
-from spirillum.designs.answer import LEVEL, Alternative, Design, Uncertainty
+from spirillum.designs.answer import Alternative, Design, Uncertainty
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.designs.options import Judged
 from spirillum.designs.profiles import bound_by_of, profile_of
-from spirillum.designs.reading import condition_of, quantity_of
+from spirillum.designs.reading import condition_of, quantity_of, with_unit
 from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
 from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
@@ -24,10 +24,10 @@ from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.robot.text import with_numbers
-from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.answer import LEVEL, STEADY, Swimming
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.steady import friction_reading
-from spirillum.units import KINDS, display_unit, in_unit, parse_option
+from spirillum.units import KINDS, parse_option
 
 __all__ = ["design"]
 
@@ -155,7 +155,7 @@ def _none_is_possible(searched: Evaluation, shares: Samples, archive: Archive) -
         worst = {item.words: float(searched.excess(item, swum)[0]) for item in searched.conditions}
         kept = [words for words, excess in worst.items() if excess > 0]
         why = f"{', '.join(kept)} is not kept" if kept else "it finds no steady motion"
-    words = ", ".join(f"{path} = {_shown(value, _unit(searched.space, path))}" for path, value in values.items())
+    words = ", ".join(f"{path} = {with_unit(value, _unit(searched.space, path))}" for path, value in values.items())
     return (
         f"no design keeps all conditions ({archive.count} tried, {archive.refused} cannot be built or swum, "
         f"{archive.breaking} break a condition); the nearest, {words}: {why}; allowed: wider ranges or looser "
@@ -170,11 +170,6 @@ def _named(space: Space, shares: Samples) -> dict[str, float]:
 
 def _unit(space: Space, path: str) -> str:
     return next(variable.unit for variable in space.variables if variable.path == path)
-
-
-def _shown(value: float, unit: str) -> str:
-    shown = display_unit(value, unit)
-    return in_unit(value, unit, shown) + ("" if shown == "1" else f" {shown}")
 
 
 def _answer(

@@ -15,7 +15,7 @@ from spirillum.quantities import Quantity
 from spirillum.swimming.answer import STEADY
 from spirillum.units import Kind, display_unit, in_unit, parse_option
 
-__all__ = ["Condition", "condition_of", "quantity_of", "range_of"]
+__all__ = ["Condition", "condition_of", "quantity_of", "range_of", "with_unit"]
 
 _CONDITION = re.compile(r"\s*([A-Za-z_]+)\s*(<=|>=)\s*(\S.*)", re.S)
 _LONGEST = 200
@@ -37,9 +37,13 @@ class Condition(NamedTuple):
     @property
     def words(self) -> str:
         """The condition as text."""
-        unit = display_unit(self.bound, self.quantity.unit)
-        shown = in_unit(self.bound, self.quantity.unit, unit)
-        return f"{self.quantity.name} {self.relation} {shown}{'' if unit == '1' else ' ' + unit}"
+        return f"{self.quantity.name} {self.relation} {with_unit(self.bound, self.quantity.unit)}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """An SI value as people read it, with its unit."""
+    shown = display_unit(value, unit)
+    return in_unit(value, unit, shown) + ("" if shown == "1" else f" {shown}")
 
 
 def quantity_of(name: str, option: str) -> Quantity:

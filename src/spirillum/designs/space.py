@@ -77,7 +77,7 @@ class Space:
         found = shares.copy()
         for n, variable in enumerate(self.variables):
             if variable.is_whole:
-                found[:, n] = (values[:, n] - variable.low + 0.5) / (variable.high - variable.low + 1.0)
+                found[:, n] = [variable.share(value) for value in values[:, n]]
         return found
 
     def columns(self, shares: Samples) -> dict[str, Samples]:

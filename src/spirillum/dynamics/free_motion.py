@@ -19,7 +19,7 @@ from spirillum.dynamics.long_run import LongRun, long_run
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
-from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import check_in_table, check_roughness, laid_down
@@ -92,10 +92,7 @@ def free_motion(
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     _check(asked)
-    contact = calibrated_contact(calibration)
-    height = contact.roughness if height is None else height
-    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
-        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    height, asked = with_contact(calibrated_contact(calibration), height, asked)
     ready, _, batch = prepared(load(robot), "tube", calibration=calibration, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(

@@ -16,12 +16,12 @@ from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, 
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.start import reach_of, start_state, turning_rate
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_contact
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
+from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
@@ -121,17 +121,18 @@ def simulate(
     model = choice.model
     held, asked = motion_of(motion) == "held", InTube.of(in_tube)
     walled = model == "tube" and not held
+    contact = calibrated_contact(calibration) if known is None else known.contact()
     if held:
-        _check_held(placed, roughness, known, calibration, weight=weight)
+        source = calibration if known is None else known.source
+        _check_held(placed, roughness, contact, str(source), weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled)
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None
-        there, rough, touching = _fitted_place(one, drawn, draw, placed, height, asked)
-        if walled and known is None:
-            rough, touching = _fitted_contact(calibration, rough, touching)
+        there = placed if drawn is None else drawn.placed(one, placed, draw)
+        rough, touching = with_contact(contact if drawn is None else drawn.contact(draw), height, asked)
         table = _table(one, there, touching, rough, tell) if walled else None
         steady = predict(
             one,
@@ -160,33 +161,6 @@ def simulate(
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     reason = {"model_reason": choice.reason} if choice.reason else {}
     return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **reason)
-
-
-def _fitted_place(
-    robot: Robot,
-    known: PosteriorFile | None,
-    draw: int | None,
-    placed: Placement,
-    roughness: float | None,
-    asked: InTube,
-) -> tuple[Placement, float | None, InTube]:
-    """Where a run begins, on which asperities, and its settings, with what a posterior says of what is not given."""
-    if known is None:
-        return placed, roughness, asked
-    contact = known.contact(draw)
-    if asked.friction_coefficient is None:
-        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
-    return known.placed(robot, placed, draw), contact.roughness if roughness is None else roughness, asked
-
-
-def _fitted_contact(
-    calibration: str | Path | None, roughness: float | None, asked: InTube
-) -> tuple[float | None, InTube]:
-    """Asperities and settings of a run in a tube, with what a calibration file says of what is not given."""
-    contact = calibrated_contact(calibration)
-    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
-        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
-    return contact.roughness if roughness is None else roughness, asked
 
 
 def _table(
@@ -280,8 +254,8 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
 def _check_held(
     placement: Placement,
     roughness: str | float | None,
-    known: PosteriorFile | None,
-    calibration: str | Path | None,
+    contact: FittedContact,
+    source: str,
     *,
     weight: bool,
 ) -> None:
@@ -290,9 +264,7 @@ def _check_held(
     Raises:
         InputError: if there is something.
     """
-    contact = calibrated_contact(calibration) if known is None else known.contact()
     if contact.friction_coefficient:
-        source = calibration if known is None else known.source
         raise InputError(
             f"{source} has a friction_coefficient, and motion = 'held' knows no dry friction; allowed: model "
             "'tube' with motion 'free'"

@@ -10,11 +10,12 @@ from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import FittedContact
 from spirillum.formats.tables import number_in, read_table
 from spirillum.robot.arguments import Options, in_range, refusal
 from spirillum.robot.fields import Angle, Time
 
-__all__ = ["FLOW_COLUMNS", "InTube", "read_flow"]
+__all__ = ["FLOW_COLUMNS", "InTube", "read_flow", "with_contact"]
 
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
@@ -43,6 +44,19 @@ class InTube(Options):
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
     flow: Annotated[str | Path | None, BeforeValidator(_file)] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
+
+
+def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:
+    """Roughness and settings of a run, with what was fitted in place of what is not given.
+
+    Args:
+        contact: roughness and dry friction of a calibration or of a draw.
+        roughness: height of the asperities that is asked for, m; None: it is not.
+        asked: settings that are asked for.
+    """
+    if asked.friction_coefficient is None and contact.friction_coefficient is not None:
+        asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
+    return contact.roughness if roughness is None else roughness, asked
 
 
 def read_flow(path: str | Path) -> Samples:

@@ -49,7 +49,7 @@ def claims_of(dataset: xr.Dataset) -> list[Claim]:
 
 
 def predictions_of(dataset: xr.Dataset) -> list[Claim]:
-    """The same statements with verdicts from robots that were laid down and let go; empty where none were."""
+    """Statements of the paper with verdicts from robots that were laid down and let go; empty where none were."""
     paper = _paper_of(dataset)
     return paper.predictions(dataset) if paper else []
 

@@ -27,6 +27,11 @@ def arc_fraction(wavelength: Values, amplitude: Values) -> Values:
     return 1.0 / np.sqrt(1.0 + (2.0 * np.pi * amplitude / wavelength) ** 2)
 
 
+def coil_curvature(wavelength: Values, amplitude: Values) -> Values:
+    """Curvature of a plain helix, B_o k^2 alpha^2 with k = 2 pi/lambda, 1/m."""
+    return amplitude * (2.0 * np.pi / wavelength) ** 2 * arc_fraction(wavelength, amplitude) ** 2
+
+
 def pitch_angle(wavelength: Values, amplitude: Values) -> Values:
     """Angle between the wire and the tail's axis, rad; its cosine is alpha."""
     return np.arctan(2.0 * np.pi * amplitude / wavelength)

@@ -10,7 +10,7 @@ import numpy as np
 
 from spirillum.arrays import Flags, PerRobot
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.geometry import coil_spacing, shortest_body
+from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
 from spirillum.units import show
 
 __all__ = ["Limit", "all_hold", "assembly_limits", "broken", "within"]
@@ -170,7 +170,7 @@ def _body_limits(b: RobotBatch) -> list[Limit]:
 
 
 def _tail_limits(b: RobotBatch) -> list[Limit]:
-    curvature = b.amplitude * (2 * np.pi / b.wavelength) ** 2 * b.arc_fraction**2
+    curvature = coil_curvature(b.wavelength, b.amplitude)
     return [
         Limit.of(
             "tail.wire_diameter",

@@ -6,14 +6,7 @@ to contact, is kept as a Cholesky factor with logarithms on the diagonal.
 
 from __future__ import annotations
 
-import multiprocessing
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from multiprocessing import get_context
-from types import ModuleType
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +18,7 @@ from spirillum.fluid.tube.tube import solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import MIRROR, cut_of_film
 from spirillum.kernels.tube_table import MOTIONS as RATES
+from spirillum.processes import as_they_come
 from spirillum.robot.seat import Seat
 from spirillum.units import show
 
@@ -73,6 +67,10 @@ def _solve(place: Solution) -> list[Samples]:
     return [matrix_of(full) for full in solved_together(place.tails, place.seat, place.fineness)]
 
 
+def _solve_numbered(numbered: tuple[int, Solution]) -> list[Samples]:
+    return _solve(numbered[1])
+
+
 def solutions(
     places: Sequence[Solution], what: str, progress: Progress | None = None, workers: int = 2
 ) -> list[list[Samples]]:
@@ -107,41 +105,11 @@ def _solutions(places: Sequence[Solution], what: str, progress: Progress | None,
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
-    if workers == 1:
-        for done, place in enumerate(places, start=1):
-            found[done - 1] = _solve(place)
-            tell(what, done, len(places))
-        return found
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
-    try:
-        with _no_main():
-            waiting = {pool.submit(_solve, place): n for n, place in enumerate(places)}
-        for done, future in enumerate(as_completed(waiting), start=1):
-            found[waiting[future]] = future.result()
-            tell(what, done, len(places))
-    except BrokenProcessPool as error:
-        raise InputError(
-            f"a process of {workers} that solve for the flow was ended from outside, as for want of memory; allowed: "
-            "workers = 1, or more memory; what was solved is kept"
-        ) from error
-    except BaseException:
-        for process in multiprocessing.active_children():
-            process.terminate()  # what they were at is lost, what they have done is kept
-        raise
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    answers = as_they_come(_solve_numbered, list(enumerate(places)), workers, besides="; what was solved is kept")
+    for done, ((number, _), answer) in enumerate(answers, start=1):
+        found[number] = answer
+        tell(what, done, len(places))
     return found
-
-
-@contextmanager
-def _no_main() -> Iterator[None]:
-    """Processes that are started here do not run the caller's script again: what they do is in this package."""
-    own = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = own
 
 
 _LOWER = np.tril_indices(RATES)

@@ -60,7 +60,7 @@ class RobotGeometry(NamedTuple):
 
     @property
     def without_tail(self) -> RobotGeometry:
-        """The same for all robots that differ in their tails, made of the same wire; 0 in place of the tail's sizes."""
+        """Body, coupling and wire, with 0 in place of the tail's sizes: equal for robots that differ in these alone."""
         return self._replace(wavelength=0.0, amplitude=0.0, tail_length=0.0, taper=0.0, hand=0.0)
 
     @property
