@@ -38,7 +38,7 @@ COMMANDS: dict[str, list[str]] = {
     "new": ["robot", "new", "out.toml"],
 }
 _ROWS = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"
-_VARIES = re.compile(rb"/tmp/[\w./-]+|[\d.]+ s\b")
+_VARIES = re.compile(re.escape(os.fsencode(tempfile.gettempdir())) + rb"/[\w./-]+|[\d.]+ s\b")
 
 
 class Ended(NamedTuple):

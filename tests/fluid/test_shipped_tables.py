@@ -17,7 +17,7 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import INSIDE
+from spirillum.kernels.tube_table import INSIDE, YAW_SLACK
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
 
@@ -63,7 +63,7 @@ def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None
     for _ in range(300):
         seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
         deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - seat.offset) if seat.pitch == 0 else 0.0
-        yaw, phase = draw.uniform(-1, 1) * places.largest_yaw, draw.uniform(0, 2 * np.pi)
+        yaw, phase = draw.uniform(-1, 1) * YAW_SLACK * places.yaw, draw.uniform(0, 2 * np.pi)
         matrix, left = table.at(seat.offset + deeper, seat.pitch, yaw, phase)
         scale = np.sqrt(np.diag(matrix))
         assert left == INSIDE

@@ -139,8 +139,8 @@ def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
     assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
     turned = packed(places, film, smooth, lambda t, f: np.zeros((2, 5, 36)))
-    assert at(turned, 0.0, 0.0, 1.1 * places.largest_yaw)[1] == kernel.TOO_FAR_YAWED
-    assert at(turned, 0.0, 0.0, 0.9 * places.largest_yaw)[1] == kernel.INSIDE
+    assert at(turned, 0.0, 0.0, 1.1 * kernel.YAW_SLACK * places.yaw)[1] == kernel.TOO_FAR_YAWED
+    assert at(turned, 0.0, 0.0, 0.9 * kernel.YAW_SLACK * places.yaw)[1] == kernel.INSIDE
 
 
 def test_yaw_enters_by_its_derivatives(places: Places, film: np.ndarray) -> None:

@@ -30,21 +30,21 @@ def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Predict
         model = asked.get("model", AUTO)
         if asked.get("motion") != "free" or model not in ("tube", AUTO):
             return steady(*args, **kwargs)
-        choice = ModelChoice("tube")
+        if model == AUTO and asked.get("posterior") is not None:  # its model decides
+            return steady(*args, **kwargs)
+        robot, choice = load(asked["robot"]), ModelChoice("tube")
         if model == AUTO:
-            if asked.get("posterior") is not None:  # its model decides
-                return steady(*args, **kwargs)
             where, fitted = Placement.of(asked.get("placement")), asked.get("calibration")
-            choice = choose_model(AUTO, load(asked["robot"]), placement=where, calibration=fitted, motion="free")
+            choice = choose_model(AUTO, robot, placement=where, calibration=fitted, motion="free")
         if choice.model != "tube":
             return steady(*args, **kwargs)
         if asked.get("posterior") is not None:
             raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
-        with_resolution(load(asked["robot"]), asked.get("resolution"), "tube")  # refused as for a held motion
+        with_resolution(robot, asked.get("resolution"), "tube")  # refused as for a held motion
         from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
         found = free_motion(
-            asked["robot"],
+            robot,
             tail_rate=asked.get("tail_rate"),
             friction=asked.get("friction"),
             calibration=asked.get("calibration"),

@@ -16,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import YAW_SLACK, contact_offset
+from spirillum.kernels.tube_table import contact_offset
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
@@ -158,11 +158,6 @@ class Places:
         row = max(int(np.searchsorted(self.gaps, t, side="right")) - 1, 0)
         pitch = f * (self.most[row, 0] if f >= 0 else self.most[row, 1])
         return self._seat(t, pitch, yaw)
-
-    @property
-    def largest_yaw(self) -> float:
-        """Yaw up to which the table is used, rad."""
-        return YAW_SLACK * self.yaw
 
     @cached_property
     def thinnest(self) -> float:
