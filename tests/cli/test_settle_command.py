@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from spirillum.dynamics import long_run
+
 WIDE = "biorob2012-wide"
 QUICK = ("--roughness", "100um", "--set", "friction.effective=1.1e-5 N m s/rad")
 
@@ -40,6 +42,40 @@ def test_prediction_says_where_it_lies(run: Callable[..., Any]) -> None:
     assert answer["lying"]["state"] == "steady"
     assert 0 < answer["forward_velocity"]["value"] < 4e-4
     assert answer["placement"]["gap"]["value"] == pytest.approx(5e-4)
+
+
+def test_first_line_says_that_no_steady_motion_was_reached(
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without an error of numbers that are steady nowhere, and with roughness and friction as they were asked for."""
+    monkeypatch.setattr(long_run, "_MOST_TURNS", 2)
+    asked = ("predict", WIDE, "--motion", "free", "--roughness", "50um", "--friction-coefficient", "0")
+    tables = run(*asked)
+    first = tables.out.partition("\n")[0]
+    assert first.startswith("no steady motion was reached: the motion still changes after 1.")
+    assert "error estimate" not in tables.out
+    assert "times this speed" not in tables.out
+    answer = json.loads(run(*asked, "--json").out)
+    assert answer["lying"]["statement"] == first
+    assert answer["error_estimate"]["value"] is None
+    assert run("settle", WIDE, *asked[4:]).out.startswith(first)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--motion", "free", "--phases", "3"], "phases = 3 with model 'tube' and motion 'free'"),
+        (["--motion", "free", "--accuracy", "high"], "accuracy = 'high' with model 'tube' and motion 'free'"),
+        (["--motion", "free", "--band"], "band = True with motion 'free' in the tube"),
+        (["--roughness", "20um"], "roughness = 20um is of free motion in the tube"),
+        (["--friction-coefficient", "0.2"], "in_tube.friction_coefficient = 0.2 is of free motion in the tube"),
+    ],
+)
+def test_what_a_motion_does_not_read_is_refused(run: Callable[..., Any], arguments: list[str], words: str) -> None:
+    outcome = run("predict", WIDE, *arguments)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+    assert outcome.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(

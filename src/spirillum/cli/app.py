@@ -113,6 +113,16 @@ def predict(
         ),
     ] = None,
     motion: Motion = "held",
+    roughness: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="Model tube, free: height of the asperities, else 1e-4 of the body's radius."
+        ),
+    ] = None,
+    friction_coefficient: Annotated[
+        float | None,
+        typer.Option(help="Model tube, free: coefficient of dry friction where asperities touch; else 0.1."),
+    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -137,6 +147,8 @@ def predict(
             placement=placement_from(gap, eccentricity, pitch, tail_drop, ends, flow, yaw),
             band=band,
             motion=motion,
+            roughness=roughness,
+            in_tube={"friction_coefficient": friction_coefficient},
             progress=progress,
         )
     renderer.show(result.to_dict(), json=json)

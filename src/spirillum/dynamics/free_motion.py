@@ -40,7 +40,8 @@ from spirillum.units import KINDS, parse_option, show
 __all__ = ["FreeMotion", "free_motion"]
 
 _SAMPLES = 240
-"""Samples of the turn over which means are taken."""
+"""Samples of a turn over which means are taken."""
+_MOST_SAMPLES = 20_000
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _LIGHT = 1e-9
 """Weight in the fluid, over the forces that act, below which a robot has none."""
@@ -117,7 +118,8 @@ def free_motion(
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = _means(held, links, run, prescribed=tail_rate is not None)
     warnings = (*held.warnings, *_said(run, links, weight=weight))
-    found = replace(held, swimming=swimming, warnings=warnings, motion="free", lying=run.lying)
+    error = held.error_estimate if run.lying.state in ("steady", "orbits") else float("nan")
+    found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
     return FreeMotion(found, run, links, gap)
 
 
@@ -147,11 +149,9 @@ def _driven(links: TubeRobot, held: Prediction, *, prescribed: bool) -> TubeRobo
 
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     """What to be careful about, a sentence each."""
-    found = [run.ended] if run.ended else []
+    found = []
     if weight and not links.weight.any():
         found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
-    if run.lying.state == "goes around":
-        found.append("its weight does not hold the robot: it goes around the tube")
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
         found.append(
@@ -162,9 +162,9 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
 
 
 def _means(held: Prediction, links: TubeRobot, run: LongRun, *, prescribed: bool) -> Swimming:
-    """Means over the last turn (going around: over the last circuit, of speeds and rates alone)."""
-    turn = run.turn
-    time = np.linspace(0.0, turn.time, _SAMPLES + 1)
+    """Means over the last turn, or going around, over the last circuit."""
+    samples = min(int(np.ceil(run.time / run.turn.time)) * _SAMPLES, _MOST_SAMPLES)
+    time = np.linspace(0.0, run.time, samples + 1)
     duty = float(links.drive[rigid_links.DUTY])
     start = run.start.copy()
     start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0

@@ -83,11 +83,11 @@ class LongRun(NamedTuple):
     turn: Turn
     """The last turn: of the motion that it leads to, where one was found."""
     start: Samples
-    """The state at its start, (19,)."""
+    """The state at the start of `time`, (19,)."""
+    time: float
+    """Time from then on over which means are taken, s: that turn; around the tube, the last circuit."""
     lying: Lying
-    """Where it lies over that turn."""
-    ended: str
-    """Why it was not followed on, a sentence; empty where nothing ended it."""
+    """Where it lies over that time."""
 
 
 def long_run(
@@ -107,7 +107,7 @@ def long_run(
         InputError: where not even the first turn can be followed.
     """
     turns, path = TurnMap(robot, sign), Path()
-    before, ended = state, ""
+    states, ended = [state], ""
     while path.turns < _MOST_TURNS:
         progress("free motion in the tube: turns of the tail", path.turns, _MOST_TURNS)
         try:
@@ -115,12 +115,13 @@ def long_run(
         except InputError as error:
             if not path.turns:
                 raise
-            ended = f"the motion was followed for {path.of('time')[-1]:.4g} s: {str(error).partition(';')[0]}"
+            ended = f"after {path.of('time')[-1]:.4g} s {str(error).partition(';')[0]}"
             break
         path.add(turn)
-        before, state = state, turn.state
+        state = turn.state
+        states.append(state)
         if abs(path.of("azimuth")[-1] - path.of("azimuth")[0]) > 4.0 * np.pi and heavy:
-            return _around(path, turn, before)
+            return _around(path, turn, states)
         waiting = until is not None and path.of("gap").min() > until
         if path.turns % _BLOCK == 0 and not waiting:
             progress("free motion in the tube: its steady place", path.turns, _MOST_TURNS)
@@ -130,13 +131,13 @@ def long_run(
                 largest = float(np.abs(found.multipliers[0]))
                 slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - _STABLE else float("nan")
                 name: State = "steady" if heavy else "orbits"
-                return LongRun(path, found.turn, found.state, _lying(name, found.turn, path, slow), "")
+                return LongRun(path, found.turn, found.state, found.turn.time, _lying(name, found.turn, path, slow))
     if not ended:
         ended = f"the motion still changes after {path.of('time')[-1]:.4g} s, and was not followed on"
-    return LongRun(path, turn, before, _lying("changing", turn, path, float("nan")), ended)
+    return LongRun(path, turn, states[-2], turn.time, _lying("changing", turn, path, float("nan"), ended))
 
 
-def _lying(state: State, turn: Turn, path: Path, approach: float) -> Lying:
+def _lying(state: State, turn: Turn, path: Path, approach: float, ended: str = "") -> Lying:
     steps = {name: turn.steps[:, place] for name, place in _PLACES.items()}
     azimuth = np.unwrap(steps["azimuth"])
     time = np.append(steps["time"], turn.time)
@@ -157,11 +158,12 @@ def _lying(state: State, turn: Turn, path: Path, approach: float) -> Lying:
         contact_force=mean(steps["contact_force"]),
         time=float(path.of("time")[-1]),
         approach_time=approach,
+        ended=ended,
     )
 
 
-def _around(path: Path, turn: Turn, start: Samples) -> LongRun:
-    """A robot that its weight does not hold: over the last circuit."""
+def _around(path: Path, turn: Turn, states: list[Samples]) -> LongRun:
+    """A robot that its weight does not hold: over the last circuit; `states` are those at the ends of all turns."""
     values = {name: path.of(name) for name in STEPS}
     azimuth, time = values["azimuth"], values["time"]
     begin = int(np.argmin(np.abs(azimuth - azimuth[-1] + np.sign(azimuth[-1] - azimuth[0]) * 2.0 * np.pi)))
@@ -183,4 +185,7 @@ def _around(path: Path, turn: Turn, start: Samples) -> LongRun:
         time=float(time[-1]),
         approach_time=np.nan,
     )
-    return LongRun(path, turn, start, lying, "")
+    circuit = float(time[-1] - time[begin])
+    ends = np.cumsum([0.0, *(steps.shape[0] for steps in path.steps)]).astype(int)
+    first = int(np.searchsorted(ends, begin, side="right")) - 1  # the turn in which the circuit begins
+    return LongRun(path, turn, states[first], circuit, lying)

@@ -2,58 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import wraps
-from inspect import signature
-from typing import ParamSpec
+from pathlib import Path
+from typing import Any
 
+from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
-from spirillum.robot.load import load, with_resolution
+from spirillum.robot.load import load
+from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction
 
 __all__ = ["predict"]
 
-_P = ParamSpec("_P")
 
+def predict(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = AUTO,
+    tail_rate: str | float | None = None,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    posterior_for: str = "new",
+    resolution: Resolution | Mapping[str, Any] | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+    band: bool | None = None,
+    motion: str = "held",
+    roughness: str | float | None = None,
+    in_tube: InTube | Mapping[str, Any] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Prediction:
+    """Predict the steady swimming of one robot.
 
-def _also_free_in_tube(steady: Callable[_P, Prediction]) -> Callable[_P, Prediction]:
-    """A prediction that follows the robot where model and motion ask for free motion in the tube."""
-    known = signature(steady)
+    With `motion="free"` and the model `tube` the robot is followed in its tube from the placement to its steady motion,
+    with weight, film and contact (`spirillum.settle` has the way there). Where it reaches none, `lying.statement` says
+    why. Everything else is `spirillum.swimming.prediction.predict`, whose docstring says more of each argument.
 
-    @wraps(steady)
-    def predicted(*args: _P.args, **kwargs: _P.kwargs) -> Prediction:
-        asked = known.bind(*args, **kwargs).arguments
-        model = asked.get("model", AUTO)
-        if asked.get("motion") != "free" or model not in ("tube", AUTO):
-            return steady(*args, **kwargs)
-        if model == AUTO and asked.get("posterior") is not None:  # its model decides
-            return steady(*args, **kwargs)
-        robot, choice = load(asked["robot"]), ModelChoice("tube")
-        if model == AUTO:
-            where, fitted = Placement.of(asked.get("placement")), asked.get("calibration")
-            choice = choose_model(AUTO, robot, placement=where, calibration=fitted, motion="free")
-        if choice.model != "tube":
-            return steady(*args, **kwargs)
-        if asked.get("posterior") is not None:
-            raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
-        with_resolution(robot, asked.get("resolution"), "tube")  # refused as for a held motion
-        from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        model: `sbt`, `rft`, `slender`, `tube`, or `auto`.
+        tail_rate: lab rotation rate of the tail, with its unit (``"1.2 Hz"``) or a float in rad/s; None: the robot's
+            drive decides.
+        friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose values replace the robot's.
+        posterior: file of a calibration's posterior, for intervals.
+        posterior_for: whose intervals: `new` or `measured`.
+        resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
+        placement: where in the channel the robot lies, or is laid down.
+        band: with or without the band over what the placement leaves open; not of free motion in the tube.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`.
+        roughness: of free motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4 of
+            the body's radius.
+        in_tube: of free motion in the tube: `azimuth` of the start and `friction_coefficient`, see `InTube`.
+        progress: told what is being computed, how much is done, and of how much.
 
-        found = free_motion(
+    Raises:
+        InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a
+            turn.
+    """
+    choice = _free_in_tube(robot, model, motion, placement, calibration, posterior)
+    if choice is None:
+        asked = InTube.of(in_tube)
+        given = {
+            "roughness": roughness,
+            **{f"in_tube.{name}": asked.model_dump()[name] for name in asked.model_fields_set},
+        }
+        for name, value in given.items():
+            if value is not None:
+                raise InputError(
+                    f"{name} = {str(value)[:40]} is of free motion in the tube; allowed: with model 'tube' and motion "
+                    "'free'"
+                )
+        return prediction.predict(
             robot,
-            tail_rate=asked.get("tail_rate"),
-            friction=asked.get("friction"),
-            calibration=asked.get("calibration"),
-            placement=asked.get("placement"),
-            progress=asked.get("progress"),
+            model=model,
+            tail_rate=tail_rate,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            posterior=posterior,
+            posterior_for=posterior_for,
+            resolution=resolution,
+            placement=placement,
+            band=band,
+            motion=motion,
+            progress=progress,
         )
-        return replace(found.prediction, choice=choice)
+    if posterior is not None:
+        raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
+    check_not_resolved(load(robot), resolution)
+    if band:
+        raise InputError(
+            "band = True with motion 'free' in the tube, where the robot finds its own place; allowed: motion 'held'"
+        )
+    from spirillum.dynamics.free_motion import free_motion  # its equations are compiled
 
-    return predicted
+    found = free_motion(
+        robot,
+        tail_rate=tail_rate,
+        friction=friction,
+        calibration=calibration,
+        placement=placement,
+        roughness=roughness,
+        in_tube=in_tube,
+        progress=progress,
+    )
+    return replace(found.prediction, choice=choice)
 
 
-predict = _also_free_in_tube(prediction.predict)
+def _free_in_tube(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    model: str,
+    motion: str,
+    placement: Placement | Mapping[str, Any] | None,
+    calibration: str | Path | None,
+    posterior: str | Path | None,
+) -> ModelChoice | None:
+    """Why the robot is followed in its tube; None where model and motion ask for something else."""
+    if motion != "free" or model not in ("tube", AUTO):
+        return None
+    if model == "tube":
+        return ModelChoice("tube")
+    if posterior is not None:  # its model decides
+        return None
+    where = Placement.of(placement)
+    choice = choose_model(AUTO, load(robot), placement=where, calibration=calibration, motion="free")
+    return choice if choice.model == "tube" else None

@@ -16,7 +16,7 @@ from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, 
 from spirillum.dynamics.record import dataset_of, free_attributes
 from spirillum.dynamics.start import reach_of, start_state, turning_rate
 from spirillum.dynamics.timing import Timing
-from spirillum.dynamics.tube_options import InTube, with_contact
+from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks, two_links
 from spirillum.errors import InputError
@@ -87,7 +87,7 @@ def simulate(
         draws: how many draws of the posterior are run for these, 20 to 1000.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, on throughout.
-        resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`, `phases`; None: the robot's own.
+        resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
             starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
         weight: let weight and buoyancy act on the free robot, if its masses are known.
@@ -128,6 +128,8 @@ def simulate(
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled)
+    if walled:
+        check_not_resolved(own, resolution)
 
     def run(one: Robot, timing: Timing, tell: Progress | None = None, draw: int | None = None) -> xr.Dataset:
         drawn = known if model == "tube" else None

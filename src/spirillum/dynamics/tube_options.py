@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -14,8 +15,11 @@ from spirillum.fitted.calibration_file import FittedContact
 from spirillum.formats.tables import number_in, read_table
 from spirillum.robot.arguments import Options, in_range, refusal
 from spirillum.robot.fields import Angle, Time
+from spirillum.robot.load import with_resolution
+from spirillum.robot.options import Resolution
+from spirillum.robot.robot import Robot
 
-__all__ = ["FLOW_COLUMNS", "InTube", "read_flow", "with_contact"]
+__all__ = ["FLOW_COLUMNS", "InTube", "check_not_resolved", "read_flow", "with_contact"]
 
 FLOW_COLUMNS = ("time_s", "flow_mm_s")
 """Columns of a flow file; between its rows the flow changes evenly, before and after them it is constant."""
@@ -57,6 +61,25 @@ def with_contact(contact: FittedContact, roughness: float | None, asked: InTube)
     if asked.friction_coefficient is None and contact.friction_coefficient is not None:
         asked = asked.model_copy(update={"friction_coefficient": contact.friction_coefficient})
     return contact.roughness if roughness is None else roughness, asked
+
+
+def check_not_resolved(robot: Robot, resolution: Resolution | Mapping[str, Any] | None) -> None:
+    """Refuse a resolution of free motion in the tube, which reads the robot's table at every phase.
+
+    Args:
+        robot: the robot.
+        resolution: what is asked for; that the answer comes from the `table` may be.
+
+    Raises:
+        InputError: if something else is given.
+    """
+    with_resolution(robot, resolution, "tube")  # a wrong value has a sentence of its own
+    for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
+        if (name, value) not in (("form", "auto"), ("form", "table")):
+            raise InputError(
+                f"{name} = {value!r} with model 'tube' and motion 'free', which reads the robot's table at every phase "
+                "of the tail; allowed: motion 'held'"
+            )
 
 
 def read_flow(path: str | Path) -> Samples:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -41,12 +42,31 @@ class Lying:
     """For how long the motion was followed from where it was laid down, s."""
     approach_time: float
     """Time in which a small distance from the steady motion falls by e, s; NaN where there is none."""
+    ended: str = ""
+    """Why the motion was not followed to a steady one, in half a sentence; empty where it was."""
+
+    @property
+    def statement(self) -> str:
+        """Whether a steady motion was reached, and what the means are over, a sentence."""
+        if self.state == "steady":
+            return "a steady motion was reached: every turn of the tail brings back this place"
+        if self.state == "changing":
+            return f"no steady motion was reached: {self.ended}; all values are means over the last turn of the tail"
+        circuit = abs(2.0 * math.pi / self.orbit_rate) if self.orbit_rate else math.inf
+        if self.state == "orbits":
+            around = f"orbits the tube's axis in {circuit:.3g} s" if math.isfinite(circuit) else "keeps any azimuth"
+            return f"no steady place was reached: nothing tells one azimuth from another, and the robot {around}"
+        return (
+            f"no steady motion was reached: its weight does not hold the robot, which goes around the tube in "
+            f"{circuit:.3g} s; all values are means over a circuit"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The object `lying` of an answer."""
         low, high = self.gap_range
         return {
             "state": self.state,
+            "statement": self.statement,
             "azimuth": quantity(self.azimuth, "rad"),
             "gap": quantity(self.gap, "m", low=low, high=high, kind="range", over="a turn of the tail"),
             "wall_pitch": quantity(self.pitch, "rad"),

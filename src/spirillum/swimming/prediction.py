@@ -115,6 +115,8 @@ class Prediction:
     @cached_property
     def other_models(self) -> OtherModels | None:
         """What models say that leave out what this one knows; None where none can be held against it."""
+        if self.lying is not None and self.lying.state == "changing":
+            return None
         return other_models(
             self.robot,
             self.model,
@@ -209,10 +211,9 @@ def predict(
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
         band: answer with the band over what the placement leaves open, or at the reference place alone; None: with it
             where the robot has a table, without which it takes minutes.
-        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `tube`, the
-            robot is followed in its tube from the placement to its steady motion, with weight, film and contact
-            (`spirillum.settle` has the way there and more options). Free with `rft` or `slender` it has neither weight
-            nor walls; the forward velocity is then that along the axis of the screw on which the robot moves.
+        motion: `held` (lateral motion and tilt held, as the channel's floor does) or `free`. Free with `rft` or
+            `slender` the robot has neither weight nor walls; the forward velocity is then that along the axis of the
+            screw on which it moves. (Free with `tube` is `spirillum.dynamics.prediction`, above this room.)
         progress: told what is being computed, how many places are done, and of how many.
 
     Raises:

@@ -22,6 +22,7 @@ __all__ = [
     "show_lying",
     "show_placement",
     "show_reason",
+    "show_unsteady",
 ]
 
 
@@ -76,6 +77,12 @@ def show_placement(placement: Answer, console: Console) -> None:
     console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
 
 
+def show_unsteady(answer: Answer, console: Console) -> None:
+    """Before all numbers, why a free robot has reached no steady motion; nothing where it has."""
+    if "lying" in answer and answer["lying"]["state"] != "steady":
+        console.print(escape(answer["lying"]["statement"]), style="bold", highlight=False, soft_wrap=True)
+
+
 def show_lying(lying: Answer, console: Console) -> None:
     """Where a free robot comes to lie."""
     said = [_STATES[lying["state"]]]
@@ -113,7 +120,8 @@ def show_error(error: Answer, console: Console) -> None:
     if error["value"] is not None:
         share = f"{100 * error['value']:.2g} %"
         against = error.get("against", "another resolution")
-        console.print(f"error estimate: {share} of the forward velocity, against {against}", highlight=False)
+        said = f"error estimate: {share} of the forward velocity, against {against}"
+        console.print(said, highlight=False, soft_wrap=True)
     console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
 
 

@@ -14,6 +14,7 @@ from spirillum.cli.tables.parts import (
     show_lying,
     show_placement,
     show_reason,
+    show_unsteady,
 )
 
 __all__ = ["table"]
@@ -21,6 +22,7 @@ __all__ = ["table"]
 
 def table(answer: Answer, console: Console) -> None:
     """Table of `predict`."""
+    show_unsteady(answer, console)
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"

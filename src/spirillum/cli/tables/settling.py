@@ -5,7 +5,15 @@ from __future__ import annotations
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, add_quantities, grid, show_error, show_lying, show_placement
+from spirillum.cli.tables.parts import (
+    Answer,
+    add_quantities,
+    grid,
+    show_error,
+    show_lying,
+    show_placement,
+    show_unsteady,
+)
 from spirillum.quantities import QUANTITIES
 from spirillum.units import in_unit
 
@@ -18,6 +26,7 @@ _COLUMNS = ("gap", "normal_resistance", "over_lubrication", "sideways_force")
 
 def table(answer: Answer, console: Console) -> None:
     """Tables of `settle`: the steady motion, where the robot lies, and the film on the way."""
+    show_unsteady(answer, console)
     rows = grid(f"{answer['robot']}: settling in its tube", "quantity", "value", "unit", "SI")
     add_quantities(rows, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(rows)
