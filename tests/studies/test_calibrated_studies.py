@@ -90,3 +90,42 @@ def test_another_calibration_is_another_study(fitted: Path, tmp_path: Path) -> N
     sp.study(STUDY, output=tmp_path / "study")
     with pytest.raises(InputError, match="holds another study"):
         sp.study(STUDY, calibration=fitted / "calibration.toml", output=tmp_path / "study")
+
+
+def test_robots_lie_where_the_calibration_places_those_of_their_channel(tmp_path: Path) -> None:
+    """Each as `predict` places it; a place of the study's own goes before."""
+    path = tmp_path / "calibration.toml"
+    path.write_text(
+        "".join(
+            f'[[placement]]\nchannel_diameter = "{diameter} mm"\n[placement.placement]\n'
+            f'gap = "{gap} mm"\npitch = "1 deg"\n'
+            for diameter, gap in ((40, 0.4), (30, 0.7))
+        )
+    )
+    study = {"title": "placed", "models": ["rft", "tube"], "friction": ["rotor"]}
+    grid = {"channels": {"wide": WIDE, "narrow": NARROW}, "wavelengths": ["20 mm"], "amplitudes": ["2.5 mm"]}
+    gridded = sp.study({**study, "grid": grid}, calibration=path)["forward_velocity"].sel(model="tube").values.ravel()
+    listed = sp.study({**study, "robots": [NARROW, WIDE]}, calibration=path)
+    backwards = listed["forward_velocity"].sel(model="tube").values.ravel()[::-1]
+    robots = [load(name, **{"tail.wavelength": "20 mm", "tail.amplitude": "2.5 mm"}) for name in (WIDE, NARROW)]
+    alone = [sp.predict(robot, model="tube", calibration=path, band=False).forward_velocity for robot in robots]
+    assert gridded == pytest.approx(alone, rel=1e-12)
+    presets = [sp.predict(name, model="tube", calibration=path, band=False).forward_velocity for name in (WIDE, NARROW)]
+    assert backwards == pytest.approx(presets, rel=1e-12)
+    own = sp.study({**study, "models": ["tube"], "robots": [WIDE], "placement": {"gap": "1 mm"}}, calibration=path)
+    placed = sp.predict(WIDE, model="tube", placement={"gap": "1 mm"}, band=False)
+    assert float(own["forward_velocity"].squeeze()) == pytest.approx(placed.forward_velocity, rel=1e-12)
+    with pytest.raises(InputError, match="says where the robots lie; allowed: the study without a band"):
+        sp.study({**study, "models": ["tube"], "robots": [WIDE], "band": True}, calibration=path)
+
+
+def test_dry_friction_that_a_study_does_not_know_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "calibration.toml"
+    path.write_text('[contact]\nroughness = "20 um"\nfriction_coefficient = 0.2\n')
+    with pytest.raises(InputError, match="has a friction_coefficient, and a study knows no dry friction"):
+        sp.study({"models": ["tube"], "robots": [WIDE]}, calibration=path)
+
+
+def test_what_a_grid_varies_cannot_be_set() -> None:
+    with pytest.raises(InputError, match=r"tail.amplitude is set and varied by grid.amplitudes of the study"):
+        sp.study(STUDY, overrides={"tail.amplitude": "2 mm"})

@@ -134,9 +134,11 @@ def test_a_stated_number_is_met_missed_or_straddled(readings: Readings) -> None:
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"gap": ["1 mm", "0.1 mm"]}, "gap goes from 0.001 to 0.0001"),
+        ({"gap": ["1 mm", "0.1 mm"]}, "laid_down.gap goes from 1 mm to 0.1 mm"),
+        ({"gap": ["1 mm"]}, "laid_down.gap has too few entries"),
+        ({"gap": "1 mm"}, r"laid_down.gap = '1 mm' is not allowed; allowed: a list"),
         ({"roughness": ["1 um", "0.5 mm"]}, "asperities would carry"),
-        ({"pitch": [0.0, 2.0]}, "laid_down.pitch"),
+        ({"pitch": [0.0, 2.0]}, r"laid_down.pitch.1 = 2.0; allowed: 0 to 1"),
         ({"duration": "0 s"}, "duration = 0 s; allowed: 1 s to 600 s"),
         ({"wait": ["0 s", "1e6 s"]}, r"wait = 1e\+06 s; allowed"),
     ],

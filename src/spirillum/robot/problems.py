@@ -48,23 +48,39 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
     if kind == "quantity":
         return [f"{field} {context['sentence']}"]
     if kind == "missing":
-        return [f"{field} is missing; it has to be given"]
+        entry = isinstance(problem["loc"][-1], int)
+        return [
+            f"{field.rpartition('.')[0]} has too few entries" if entry else f"{field} is missing; it has to be given"
+        ]
     if kind == "extra_forbidden":
         allowed = list(_fields_at(model, names[:-1]))
         hint = did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
-    shown = clipped(problem.get("input"))
+    shown, words = clipped(problem.get("input")), _allowed(problem, field)
     hint = ""
     if kind == "literal_error":
-        allowed_words = str(context["expected"])
-        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", allowed_words))
-    elif kind == "value_error":
-        allowed_words = str(context["error"])
-    elif kind == "model_type":
-        allowed_words = f"a [{field}] table"
-    else:
-        allowed_words = str(problem["msg"]).removeprefix("Input should be ")
-    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {allowed_words}"]
+        hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", words))
+    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {words}"]
+
+
+def _allowed(problem: Mapping[str, Any], field: str) -> str:
+    """What is allowed in place of a value, for the kinds of findings that name no fields."""
+    kind, context = problem["type"], problem.get("ctx", {})
+    words = {
+        "model_type": f"a [{field}] table",
+        "tuple_type": "a list, [...]",
+        "list_type": "a list, [...]",
+        "too_long": f"at most {_entries(context.get('max_length'))}",
+        "too_short": f"at least {_entries(context.get('min_length'))}",
+    }
+    if kind in words:
+        return words[kind]
+    own = {"literal_error": "expected", "value_error": "error"}
+    return str(context[own[kind]]) if kind in own else str(problem["msg"]).removeprefix("Input should be ")
+
+
+def _entries(count: Any) -> str:
+    return "one entry" if count == 1 else f"{count} entries"
 
 
 def _fields_at(model: type[BaseModel], names: Iterable[str]) -> tuple[str, ...]:

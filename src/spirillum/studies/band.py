@@ -134,6 +134,8 @@ def reference_place(settings: Mapping[str, Any]) -> str:
     Args:
         settings: the study's settings, as the attribute `settings` of its dataset holds them.
     """
+    if settings.get("placements"):
+        return "where the calibration places them"
     placement = settings.get("study", {}).get("placement") or {}
     if placement.get("eccentricity") is not None:
         return f"level, eccentricity {placement['eccentricity']:g}"

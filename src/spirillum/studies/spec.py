@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError
@@ -18,12 +18,14 @@ from spirillum.fitted.calibration_file import (
     CalibrationFile,
     FittedFriction,
     calibrated_robot,
+    placement_in,
     read_calibration,
 )
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.arguments import in_range
 from spirillum.robot.fields import Length, Rate, Section, Text, Time
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
@@ -31,7 +33,7 @@ from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
-from spirillum.units import Hz
+from spirillum.units import Hz, show
 
 __all__ = ["Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
 
@@ -55,8 +57,8 @@ class Grid(Section):
     """Amplitudes of the tails."""
 
 
-_Share = Annotated[float, Field(ge=0.0, le=1.0)]
-_Coefficient = Annotated[float, Field(ge=0.0, le=10.0)]
+_Share = Annotated[float, BeforeValidator(in_range(0.0, 1.0)), Field(ge=0.0, le=1.0)]
+_Coefficient = Annotated[float, BeforeValidator(in_range(0.0, 10.0)), Field(ge=0.0, le=10.0)]
 
 
 class LaidDown(Section):
@@ -77,21 +79,24 @@ class LaidDown(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        problems = []
+        units = {"gap": "mm", "wait": "s", "roughness": "um"}
         for name in ("gap", "pitch", "wait", "roughness", "friction_coefficient"):
             low, high = getattr(self, name)
             if low >= high:
-                words = f"{name} goes from {low:g} to {high:g}; allowed: a low level below the high one"
-                raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
-        for name, value, low, high in (("duration", self.duration, 1.0, 600.0), ("wait", self.wait[1], 0.0, 3600.0)):
-            if not low <= value <= high:
-                words = f"{name} = {value:g} s; allowed: {low:g} s to {high:g} s"
-                raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
+                words = " to ".join(show(value, units.get(name, "1")) for value in (low, high))
+                problems.append(f"laid_down.{name} goes from {words}; allowed: a low level below the high one")
+        for name, value, least, most in (("duration", self.duration, 1.0, 600.0), ("wait", self.wait[1], 0.0, 3600.0)):
+            if not least <= value <= most:
+                problems.append(f"laid_down.{name} = {value:g} s; allowed: {least:g} s to {most:g} s")
         if self.roughness[1] >= 2.0 * self.gap[0]:
-            words = (
-                f"roughness of up to {self.roughness[1]:g} m with a gap of {self.gap[0]:g} m: asperities would carry "
-                "more than the weight; allowed: a roughness below twice the gap"
+            problems.append(
+                f"laid_down.roughness goes up to {show(self.roughness[1], 'um')} with a gap from "
+                f"{show(self.gap[0], 'um')}: asperities would carry more than the weight; allowed: a roughness below "
+                "twice the gap"
             )
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": words})
+        if problems:
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
 
 
@@ -193,6 +198,12 @@ class LoadedStudy:
     """Draws over which answers have intervals."""
     cautions: tuple[str, ...] = ()
     """What to be careful about in the choice of the models, a sentence each."""
+    placements: tuple[Placement, ...] = ()
+    """Where each of `robots` lies by a calibration; none where the study says it."""
+
+    def placement_of(self, number: int) -> Placement:
+        """Where one of `robots` lies."""
+        return self.placements[number] if self.placements else self.study.placement
 
     @property
     def friction(self) -> tuple[FittedFriction, ...]:
@@ -275,19 +286,23 @@ def load_study(
         )
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
+    _check_varied(study, overrides or {}, name)
     study, cautions = _with_models(study, robots, calibration, drawn)
     try:
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    placements = _fitted_places(study, robots, fitted, str(calibration))
     known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
     friction = known.friction
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
     if friction:
         question["friction"] = [item.model_dump() for item in friction]
+    if placements:
+        question["placements"] = [place.model_dump() for place in placements]
     if drawn:
         question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
-    loaded = LoadedStudy(study, robots, question, known, drawn, cautions)
+    loaded = LoadedStudy(study, robots, question, known, drawn, cautions, placements)
     if drawn and loaded.count > LARGEST_WITH_INTERVALS:
         raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {LARGEST_WITH_INTERVALS}")
     return loaded
@@ -307,6 +322,51 @@ def _fitted(
             "`predict` of each robot with it, or the study without"
         )
     return file, drawn
+
+
+_VARIED = ("tail.wavelength", "tail.amplitude")
+"""Fields of a robot that a grid sets."""
+
+
+def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None:
+    """Refuse to set what the grid varies.
+
+    Raises:
+        InputError: if that is asked for.
+    """
+    both = [path for path in _VARIED if path in overrides] if study.grid is not None else []
+    if both:
+        own = f"grid.{both[0].removeprefix('tail.')}s"
+        raise InputError(
+            f"{both[0]} is set and varied by {own} of {name}, which would win; allowed: other fields, or another {own}"
+        )
+
+
+def _fitted_places(
+    study: Study, robots: Sequence[Robot], file: CalibrationFile | None, source: str
+) -> tuple[Placement, ...]:
+    """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks.
+
+    Raises:
+        InputError: for a fitted place or dry friction that the study cannot take.
+    """
+    if file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
+        return ()
+    if file.contact.friction_coefficient:
+        raise InputError(
+            f"{source} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each robot "
+            "with it"
+        )
+    if study.placement.is_given:
+        return ()
+    found = [placement_in(file, robot) for robot in robots]
+    if not any(found):
+        return ()
+    placements = tuple(place or Placement() for place in found)
+    walled = next(SWIMMER_MODELS[model] for model in study.models if SWIMMER_MODELS[model].placed)
+    if study.band and not all(left_open(place, walled) for place in placements):
+        raise InputError(f"band = true, but {source} says where the robots lie; allowed: the study without a band")
+    return placements
 
 
 def _with_models(

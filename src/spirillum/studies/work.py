@@ -18,6 +18,7 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
+from spirillum.robot.placement import Placement
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
 from spirillum.swimming.answer import STEADY, Swimming
@@ -160,8 +161,12 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:
     """Batches of robots with their indices in the study: one a channel of the grid, or one a kind of listed robots."""
     grid = loaded.study.grid
     if grid is None:
-        for indices, batch in batches(loaded.robots, loaded.study.placement):
-            yield np.array(indices, dtype=np.intp), batch
+        alike: dict[Placement, list[int]] = {}
+        for number in range(len(loaded.robots)):
+            alike.setdefault(loaded.placement_of(number), []).append(number)
+        for placement, numbers in alike.items():
+            for indices, batch in batches([loaded.robots[number] for number in numbers], placement):
+                yield np.array(numbers, dtype=np.intp)[indices], batch
         return
     wavelength, amplitude = (column.ravel() for column in np.meshgrid(grid.wavelengths, grid.amplitudes, indexing="ij"))
     for index, robot in enumerate(loaded.robots):
@@ -171,7 +176,7 @@ def groups(loaded: LoadedStudy) -> Iterator[tuple[Indices, RobotBatch]]:
             tails["friction.effective"] = np.array([_friction_at(loaded, tail) for tail in every])
         yield (
             index * wavelength.size + np.arange(wavelength.size),
-            RobotBatch.of(robot, loaded.study.placement).with_values(tails),
+            RobotBatch.of(robot, loaded.placement_of(index)).with_values(tails),
         )
 
 
