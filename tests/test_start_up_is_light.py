@@ -23,6 +23,9 @@ HEAVY = (
     "av",
     "PIL",
     "trimesh",
+    "starlette",
+    "uvicorn",
+    "websockets",
 )
 
 
@@ -37,7 +40,7 @@ def test_importing_the_package_loads_no_library() -> None:
     assert not loaded_after("import spirillum") & {*HEAVY, "numpy", "pydantic", "typer", "rich"}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["--version"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["page", "--help"], ["--version"]])
 def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
     assert not loaded_after(f"from spirillum.cli import main; main({arguments!r})") & {*HEAVY, "numpy"}
 

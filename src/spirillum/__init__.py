@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
     from spirillum.measurement.measure import Measurement as Measurement
+    from spirillum.pages.launch import page as page
     from spirillum.results.calibration import calibrate as calibrate
     from spirillum.results.measurement import measure as measure
     from spirillum.results.study import study as study
@@ -86,6 +87,7 @@ _HOME = {
     "load": "spirillum.robot.load",
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",
+    "page": "spirillum.pages.launch",
     "predict": "spirillum.dynamics.prediction",
     "prepare": "spirillum.swimming.preparation",
     "prepare_all": "spirillum.swimming.preparation",

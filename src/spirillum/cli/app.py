@@ -44,6 +44,7 @@ from spirillum.cli.options import (
     complete_resistance_models,
     complete_schemas,
 )
+from spirillum.cli.page_commands import page
 from spirillum.cli.prepare_commands import prepare
 from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
@@ -356,6 +357,7 @@ for _command in (
     magnetic_sweep,
     show,
     film,
+    page,
     export,
     render,
     virtual_experiment,

@@ -21,7 +21,7 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dataset_of", "free_attributes"]
+__all__ = ["dataset_of", "free_attributes", "series_of"]
 
 _AXES, _QUATERNION = ("x", "y", "z"), ("w", "x", "y", "z")
 _MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
@@ -53,12 +53,7 @@ def dataset_of(
     import xarray as xr
 
     rotation = _rotations(run.states)
-    series = {**_motion(run, rotation), **_powers(links, run, rotation)}
-    if prediction.batch.drive == "dc-motor":
-        series |= _electrics(prediction, run)
-    if prediction.batch.drive == "magnetic":
-        series |= _magnetics(links, run, rotation)
-    series |= more
+    series = {**series_of(prediction, links, run), **more}
     stored = _potential(links, run, rotation) + run.observed[:, rigid_links.PRESSED]
     series["potential_energy"] = stored
     attitude = run.states[:, rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
@@ -88,6 +83,23 @@ def dataset_of(
         attrs=dict(attrs),
     )
     return dataset.assign(_averages(dataset, on))
+
+
+def series_of(prediction: Prediction, links: Acting, run: Trajectory) -> dict[str, Samples]:
+    """Angles, rates, torques, powers and energies of a free robot's run by name, each (n,); SI.
+
+    Args:
+        prediction: the robot with model, friction and calibration.
+        links: what acts on its two links.
+        run: its motion.
+    """
+    rotation = _rotations(run.states)
+    found = {**_motion(run, rotation), **_powers(links, run, rotation)}
+    if prediction.batch.drive == "dc-motor":
+        found |= _electrics(prediction, run)
+    if prediction.batch.drive == "magnetic":
+        found |= _magnetics(links, run, rotation)
+    return found
 
 
 def free_attributes(

@@ -33,7 +33,7 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["tube_run"]
+__all__ = ["series_in_tube", "tube_run"]
 
 _FEWEST = 2
 """Moments of the shortest run."""
@@ -161,17 +161,13 @@ def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Ma
     }
 
 
-def _in_the_tube(run: TubeTrajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
-    """What a run in a tube has beside that of any free run."""
+def series_in_tube(run: TubeTrajectory) -> dict[str, Samples]:
+    """What a run in a tube has beside that of any free run, by name, each (n,); SI."""
     seen, states = run.observed, run.states
-    azimuth = np.unwrap(seen[:, kernel.AZIMUTH])
-    if not isinstance(start, StartPlace):
-        turns = np.round((float(start["azimuth"][-1]) - azimuth[0]) / (2.0 * np.pi))
-        azimuth = azimuth + 2.0 * np.pi * turns
     tail = seen[:, kernel.TAIL_GAP]
     return {
         "offset": seen[:, kernel.OFFSET],
-        "azimuth": azimuth,
+        "azimuth": np.unwrap(seen[:, kernel.AZIMUTH]),
         "wall_pitch": seen[:, kernel.WALL_PITCH],
         "wall_yaw": seen[:, kernel.WALL_YAW],
         "wall_gap": seen[:, rigid_links.FILM],
@@ -183,3 +179,12 @@ def _in_the_tube(run: TubeTrajectory, start: StartPlace | xr.Dataset) -> dict[st
         "mean_flow": seen[:, kernel.MEAN_FLOW],
         "flow_energy": states[:, kernel.FLOW],
     }
+
+
+def _in_the_tube(run: TubeTrajectory, start: StartPlace | xr.Dataset) -> dict[str, Samples]:
+    """These, the azimuth counted on from the run that is continued."""
+    found = series_in_tube(run)
+    if not isinstance(start, StartPlace):
+        turns = np.round((float(start["azimuth"][-1]) - found["azimuth"][0]) / (2.0 * np.pi))
+        found["azimuth"] = found["azimuth"] + 2.0 * np.pi * turns
+    return found

@@ -1,0 +1,1 @@
+"""The page: a robot in its tube, alive in the browser; `spirillum page`."""

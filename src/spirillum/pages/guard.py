@@ -1,0 +1,112 @@
+"""Who may talk to the page: the one who has its key, from its own address, not too much and not too often.
+
+The server listens on the loopback unless it is told otherwise, but every web page that a browser shows can send
+requests there. So each request needs the key (in the address that is printed, then in a cookie that only this site is
+sent), a `Host` that is an address and not a name of somebody else's (against DNS rebinding), and, where a browser says
+from which page it comes, this page (`Origin`).
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import secrets
+import socket
+import time
+from collections.abc import Mapping
+from http.cookies import CookieError, SimpleCookie
+
+__all__ = ["HEADERS", "LARGEST_MESSAGE", "Guard", "Rate"]
+
+HEADERS: Mapping[str, str] = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+"""Headers of every answer."""
+LARGEST_MESSAGE = 4096
+"""Bytes of a message from a client."""
+_KEY_BYTES = 24
+
+
+class Guard:
+    """What a request has to show."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """A new key.
+
+        Args:
+            host: address on which the server listens.
+            port: its port.
+        """
+        self.key = secrets.token_urlsafe(_KEY_BYTES)
+        self.cookie = f"spirillum-{port}"
+        self._port = port
+        self._names = {"localhost", host.lower()}
+        self._loopback = is_loopback(host)
+        if not self._loopback:
+            self._names.add(socket.gethostname().lower())
+
+    def own_host(self, host: str) -> bool:
+        """Whether a `Host` header names this server: by its port, and an address or a name that is its own."""
+        name, colon, port = host.rpartition(":")
+        if not colon or port != str(self._port):
+            return False
+        name = name.strip("[]").lower()
+        if name in self._names:
+            return True
+        try:
+            address = ipaddress.ip_address(name)
+        except ValueError:
+            return False
+        return address.is_loopback if self._loopback else True
+
+    def own_origin(self, origin: str, host: str) -> bool:
+        """Whether an `Origin` header names the page that this server shows under that `Host`."""
+        return origin == f"http://{host}"
+
+    def right_key(self, key: str) -> bool:
+        """Whether it is the key, in constant time."""
+        return secrets.compare_digest(key.encode(), self.key.encode())
+
+    def knows(self, cookies: str) -> bool:
+        """Whether a `Cookie` header holds the key."""
+        try:
+            found = SimpleCookie(cookies).get(self.cookie)
+        except CookieError:
+            return False
+        return found is not None and self.right_key(found.value)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is reached from this machine alone."""
+    if host.lower() == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Rate:
+    """So many messages a second, and some more at once."""
+
+    def __init__(self, each_second: float, at_once: float) -> None:
+        """Full at first."""
+        self._rate, self._most = each_second, at_once
+        self._left, self._last = at_once, time.monotonic()
+
+    def allowed(self) -> bool:
+        """Count one message; False if it is too many."""
+        now = time.monotonic()
+        self._left = min(self._most, self._left + (now - self._last) * self._rate)
+        self._last = now
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True

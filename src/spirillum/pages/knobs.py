@@ -1,0 +1,223 @@
+"""The knobs of the page: fields of the robot and of its run, with their ranges, and what stands in them now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.units import KINDS, parse_option, parse_quantity
+
+__all__ = ["KNOBS", "Knob", "Settings"]
+
+_LONGEST = 80
+"""Characters of a value that is typed."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One knob."""
+
+    field: str
+    """Dotted field of the robot file, or of the run (`run.gap`)."""
+    label: str
+    """In words."""
+    group: str
+    """Heading under which it stands."""
+    unit: str = ""
+    """Unit in which it is shown; empty for a choice."""
+    low: float = 0.0
+    """Ends of its slider, in that unit; a value outside them can be typed."""
+    high: float = 1.0
+    choices: tuple[str, ...] = ()
+    """What can be chosen, for a choice."""
+    note: str = ""
+    """What it means, in a sentence."""
+    logarithmic: bool = False
+    """Whether its slider has equal steps of ratio."""
+    unset: str = ""
+    """What an empty field means; empty: it has to have a value."""
+    needs: str = ""
+    """Table of the robot without which it is not shown."""
+
+
+KNOBS: tuple[Knob, ...] = (
+    Knob("tail.wavelength", "Wavelength", "Tail", "mm", 5.0, 60.0, note="Axial length of one turn of the helix."),
+    Knob("tail.amplitude", "Amplitude", "Tail", "mm", 0.5, 6.0, note="Radius of the helix about its axis."),
+    Knob("tail.length", "Length", "Tail", "mm", 10.0, 120.0, note="Axial length of the tail."),
+    Knob("tail.wire_diameter", "Wire", "Tail", "mm", 0.2, 2.5, note="Diameter of the wire."),
+    Knob(
+        "tail.handedness",
+        "Handedness",
+        "Tail",
+        choices=("left", "right"),
+        note="A right-handed tail is a common corkscrew.",
+    ),
+    Knob(
+        "channel.diameter",
+        "Tube",
+        "Surroundings",
+        "mm",
+        20.0,
+        60.0,
+        note="Inner diameter of the tube.",
+        needs="channel",
+    ),
+    Knob(
+        "fluid.viscosity",
+        "Viscosity",
+        "Surroundings",
+        "Pa s",
+        0.05,
+        20.0,
+        note="Of the fluid; silicone oil here.",
+        logarithmic=True,
+    ),
+    Knob("run.flow", "Flow", "Surroundings", "mm/s", -3.0, 3.0, unset="none", needs="channel",
+         note="Mean flow imposed through the tube, along +x. Changes while the robot swims."),
+    Knob("run.gap", "Gap", "Start", "mm", 0.05, 5.0, unset="reference", logarithmic=True, needs="channel",
+         note="Distance of body and glass where the robot is laid down."),
+    Knob("run.pitch", "Pitch", "Start", "deg", -3.0, 3.0, unset="level",
+         note="Angle by which the nose is raised where it is laid down."),
+    Knob("magnetic.field", "Field", "Drive", "mT", 0.1, 10.0, needs="magnetic", logarithmic=True,
+         note="Flux density of the rotating field."),
+    Knob("magnetic.rotation_rate", "Field rate", "Drive", "Hz", 0.1, 10.0, needs="magnetic", logarithmic=True,
+         note="Rate at which the field turns."),
+)  # fmt: skip
+"""All knobs, in their order; the model, the remote and the duty stand apart."""
+
+MODELS = ("auto", "tube", "slender", "rft")
+"""Models that can move a free robot."""
+_BY_FIELD = {knob.field: knob for knob in KNOBS}
+_RUN_KINDS = {"run.gap": "length", "run.pitch": "pitch", "run.flow": "velocity"}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is set on one robot of the page; frozen, so that undo is a list of them."""
+
+    source: Any
+    """Preset's name, file or checked robot that it starts from."""
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    """Fields of the robot that were changed, with their unit."""
+    run: Mapping[str, str] = field(default_factory=dict)
+    """`gap`, `pitch`, `flow` where they are set, with their unit."""
+    model: str = "auto"
+    """Model that was asked for."""
+
+    def robot(self) -> Robot:
+        """The robot, checked.
+
+        Raises:
+            InputError: where a field is wrong.
+        """
+        return load(self.source, **self.overrides)
+
+    def placement(self) -> Placement:
+        """Where it is laid down.
+
+        Raises:
+            InputError: where a field is wrong.
+        """
+        return Placement.of(dict(self.run))
+
+    def changed(self, name: str, value: str) -> Settings:
+        """With another value of one knob.
+
+        Args:
+            name: field of the knob, or `run.model`.
+            value: with its unit, a word, or nothing: back to what an empty field means.
+
+        Raises:
+            InputError: for a field that is no knob, or a value that it does not take.
+        """
+        if len(value) > _LONGEST:
+            raise InputError(f"a value of {len(value)} characters; allowed: at most {_LONGEST}")
+        value = value.strip()
+        if name == "run.model":
+            if value not in MODELS:
+                raise InputError(f"model = {value[:40]!r}; allowed: {', '.join(MODELS)}")
+            return replace(self, model=value)
+        knob = _BY_FIELD.get(name)
+        if knob is None:
+            raise InputError(f"{name[:60]!r} is no knob; allowed: {', '.join(_BY_FIELD)}")
+        if not value and not knob.unset:
+            raise InputError(f"{knob.label.lower()} is empty; allowed: a value such as '{knob.high:g} {knob.unit}'")
+        if name.startswith("run."):
+            short = name.removeprefix("run.")
+            kept = {key: item for key, item in self.run.items() if key != short}
+            if value:
+                parse_option(short, value, KINDS[_RUN_KINDS[name]])
+                kept[short] = value
+            return replace(self, run=kept)
+        return replace(self, overrides={**self.overrides, name: value})
+
+    def shown(self, robot: Robot) -> list[dict[str, Any]]:
+        """The knobs of this robot with their values, in their units.
+
+        Args:
+            robot: what `robot` has returned.
+        """
+        return [_shown(knob, self, robot) for knob in KNOBS if not knob.needs or getattr(robot, knob.needs) is not None]
+
+
+def _shown(knob: Knob, settings: Settings, robot: Robot) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "field": knob.field,
+        "label": knob.label,
+        "group": knob.group,
+        "unit": knob.unit,
+        "choices": list(knob.choices),
+        "note": knob.note,
+        "logarithmic": knob.logarithmic,
+        "unset": knob.unset,
+        "changed": knob.field in settings.overrides or knob.field.removeprefix("run.") in settings.run,
+    }
+    if knob.field.startswith("run."):
+        short = knob.field.removeprefix("run.")
+        given = settings.run.get(short)
+        si = None if given is None else parse_option(short, given, KINDS[_RUN_KINDS[knob.field]])
+    else:
+        table, name = knob.field.split(".")
+        si = getattr(getattr(robot, table), name)
+    if knob.choices:
+        return found | {"value": si}
+    if si is None:
+        return found | {"value": None, "low": knob.low, "high": knob.high}
+    unit = _unit_of(knob.unit, abs(float(si)))
+    value = float(si) / parse_quantity(f"1 {unit}", KINDS[_UNIT_KINDS.get(unit, "length")])
+    low, high = _range(knob, value) if unit == knob.unit else _around(value)
+    return found | {"unit": unit, "value": float(f"{value:.12g}"), "low": low, "high": high}
+
+
+_UNIT_KINDS = {
+    "Pa s": "viscosity",
+    "mPa s": "viscosity",
+    "mm/s": "velocity",
+    "deg": "pitch",
+    "mT": "magnetic field",
+    "Hz": "rate",
+}
+_SMALL = {"mm": (2e-5, "um"), "Pa s": (0.02, "mPa s")}
+"""Unit of a knob to the SI size below which it is shown in another, as a bacterium's."""
+
+
+def _unit_of(unit: str, si: float) -> str:
+    limit, smaller = _SMALL.get(unit, (0.0, unit))
+    return smaller if si < limit else unit
+
+
+def _range(knob: Knob, value: float) -> tuple[float, float]:
+    """Ends of the slider: the knob's own, or those around a value that is near or beyond them."""
+    if value <= 0 or 1.5 * knob.low <= value <= knob.high:
+        return knob.low, knob.high
+    return _around(value)
+
+
+def _around(value: float) -> tuple[float, float]:
+    """From a quarter of a value to three times it."""
+    return float(f"{0.25 * value:.2g}"), float(f"{3.0 * value:.2g}")

@@ -1,0 +1,232 @@
+"""One robot of the page: what is set on it, how it came there, and how it swims."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.pages.knobs import MODELS, Settings
+from spirillum.pages.motion import Moment, Motion
+from spirillum.pages.numbers import SERIES
+from spirillum.pages.recording import Recording, finite
+from spirillum.pages.shapes import shape_of
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load, preset_names
+from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import choose_model, has_table
+
+__all__ = ["Built", "Lane", "build"]
+
+_ONE_TURN = 1.0
+"""Changes of one knob within this time are one step of undo, s."""
+_MOST_UNDO = 200
+
+
+@dataclass(frozen=True)
+class Built:
+    """A robot laid down, by which model, and what to be careful about."""
+
+    motion: Motion
+    model: str
+    reason: str
+    caution: str
+    needs_table: bool
+    """Whether a table would let it swim in its tube."""
+
+
+def build(settings: Settings) -> Built:
+    """Lay a robot down; without a table for its tube it swims by a model without walls.
+
+    Raises:
+        InputError: for a robot or a place that the model does not know.
+    """
+    robot, placed = settings.robot(), settings.placement()
+    if robot.drive is None:
+        raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
+    asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
+    choice = choose_model(asked, robot, placement=placed, tables_only=True)
+    preparable = asked == "auto" and choice.model != "tube" and robot.channel is not None
+    needs = preparable and not has_table(RobotBatch.of(robot, placed))
+    walled = choice.model == "tube"
+    if not walled:
+        placed = placed.model_copy(update={"flow": None})
+    motion = Motion(robot, model=choice.model, placement=placed)
+    caution = choice.caution
+    if settings.run.get("flow") and not walled:
+        caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"
+    return Built(motion, choice.model, choice.reason, caution, needs)
+
+
+@dataclass
+class Lane:
+    """One robot; only the thread of the simulation writes to it."""
+
+    settings: Settings
+    robot: Robot
+    remote: bool = True
+    duty: float = 1.0
+    built: Built | None = None
+    moment: Moment | None = None
+    numbers: dict[str, Any] | None = None
+    """The prediction, as the page shows it."""
+    trouble: str = ""
+    """Why it does not swim, in a sentence."""
+    generation: int = 0
+    """Counts what was set; what is built for an older one is dropped."""
+    recording: Recording = field(default_factory=Recording)
+    preparing: dict[str, Any] | None = None
+    """Progress of a table that is being made."""
+    _undo: list[Settings] = field(default_factory=list)
+    _redo: list[Settings] = field(default_factory=list)
+    _last: tuple[str, float] = ("", 0.0)
+    _shape: tuple[Robot, dict[str, Any]] | None = None
+
+    @classmethod
+    def of(cls, source: Any) -> Lane:
+        """A lane that starts from a preset, a file or a robot.
+
+        Raises:
+            InputError: where it cannot be loaded.
+        """
+        robot = load(source)
+        own = robot.drive.duty if robot.drive is not None else 1.0
+        return cls(Settings(source), robot, duty=own)
+
+    def set(self, name: str, value: str) -> None:
+        """Turn one knob.
+
+        Raises:
+            InputError: for a value that it does not take; nothing has then changed.
+        """
+        self._become(self.settings.changed(name, value), name)
+
+    def preset(self, name: str, own: Any) -> None:
+        """Start from another robot: a preset, or `own`, the one that the page was started with.
+
+        Raises:
+            InputError: if there is none of that name.
+        """
+        if name != "own" and name not in preset_names():
+            raise InputError(f"preset {name[:60]!r}; allowed: {', '.join(preset_names())}")
+        self._become(Settings(own if name == "own" else name), "")
+
+    def undo(self, *, forward: bool = False) -> None:
+        """Go one change back, or forward again."""
+        source, target = (self._redo, self._undo) if forward else (self._undo, self._redo)
+        if source:
+            target.append(self.settings)
+            self.settings = source.pop()
+            self.robot = self.settings.robot()
+            self._last = ("", 0.0)
+            self.start_anew()
+
+    def start_anew(self) -> None:
+        """Forget the run; the robot is laid down again once it is built."""
+        self.generation += 1
+        self.built = self.moment = None
+        self.trouble = ""
+        self.recording = Recording()
+
+    def take(self, built: Built) -> None:
+        """The robot is laid down."""
+        self.built, self.trouble = built, ""
+        self.moment = built.motion.now()
+        self.recording = Recording()
+        self.recording.add(self.moment, self.duty if self.remote else 0.0)
+
+    def advance(self, dt: float) -> None:
+        """Swim on for a time, s."""
+        if self.built is None or (self.moment is not None and self.moment.ended) or self.trouble:
+            return
+        duty = self.duty if self.remote else 0.0
+        try:
+            self.moment = self.built.motion.step(dt, duty)
+        except InputError as error:
+            self.trouble = str(error)
+            return
+        self.recording.add(self.moment, duty)
+
+    def flow(self, value: str) -> bool:
+        """Another flow while it swims; False where the robot has to be laid down anew for it."""
+        before = self.settings
+        self.settings = self.settings.changed("run.flow", value)
+        if self.built is None or self.built.model != "tube":
+            self.settings = before
+            return False
+        try:
+            self.built.motion.flow(self.settings.placement().flow)
+        except InputError:
+            self.settings = before
+            raise
+        self._remember(before, "run.flow")
+        return True
+
+    def _become(self, settings: Settings, name: str) -> None:
+        robot = settings.robot()
+        settings.placement()
+        self._remember(self.settings, name)
+        self.settings, self.robot = settings, robot
+        self.start_anew()
+
+    def _remember(self, before: Settings, name: str) -> None:
+        now = time.monotonic()
+        if not (name and name == self._last[0] and now - self._last[1] < _ONE_TURN):
+            self._undo.append(before)
+            del self._undo[:-_MOST_UNDO]
+        self._redo.clear()
+        self._last = (name, now)
+
+    def predicted(self) -> Settings:
+        """The settings whose steady swimming is told: at the duty of the remote."""
+        drive = self.robot.drive
+        if drive is None or self.duty == drive.duty:
+            return self.settings
+        return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": repr(self.duty)})
+
+    def scene(self) -> dict[str, Any]:
+        """What changes when something is set: shape, knobs, model, prediction."""
+        if self._shape is None or self._shape[0] is not self.robot:
+            self._shape = (self.robot, shape_of(self.robot))
+        built = self.built
+        return {
+            "robot": self.robot.name,
+            "description": self.robot.description or "",
+            "source": self.settings.source if isinstance(self.settings.source, str) else "own",
+            "shape": self._shape[1],
+            "knobs": self.settings.shown(self.robot),
+            "model": self.settings.model,
+            "models": list(MODELS) if self.robot.channel is not None else [m for m in MODELS if m != "tube"],
+            "drive": self.robot.drive.kind if self.robot.drive is not None else "",
+            "swims_by": built.model if built else "",
+            "reason": built.reason if built else "",
+            "caution": built.caution if built else "",
+            "needs_table": built.needs_table if built else False,
+            "roughness": built.motion.roughness if built else None,
+            "preparing": self.preparing,
+            "trouble": self.trouble,
+            "numbers": self.numbers,
+            "warnings": list(self.robot.warnings),
+            "undo": len(self._undo),
+            "redo": len(self._redo),
+            "generation": self.generation,
+            "remote": self.remote,
+            "duty": self.duty,
+        }
+
+    def frame(self) -> dict[str, Any]:
+        """What changes all the time: where it is, and its numbers; SI."""
+        moment = self.moment
+        if moment is None:
+            return {"generation": self.generation, "ready": False}
+        return {
+            "generation": self.generation,
+            "ready": True,
+            "time": moment.time,
+            "position": moment.pose.position.tolist(),
+            "attitude": moment.pose.attitude.tolist(),
+            "tail_phase": moment.pose.tail_phase,
+            "values": {name: finite(moment.values[name]) for name in SERIES if name in moment.values},
+            "ended": moment.ended,
+        }

@@ -1,0 +1,117 @@
+"""`spirillum.page`: start the server, open the browser, end cleanly."""
+
+from __future__ import annotations
+
+import socket
+import webbrowser
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from threading import Timer
+from typing import TYPE_CHECKING, Any
+
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["page"]
+
+_LARGEST_PORT = 65_535
+
+
+def page(
+    robot: str | Path | Mapping[str, Any] | Robot = "biorob2012-wide",
+    *,
+    run: xr.Dataset | str | Path | None = None,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    browser: bool = True,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Show a robot alive in the browser: it swims, its knobs turn, its numbers follow. Ends with Ctrl-C.
+
+    Needs the extra `page`. Everything stays on this machine: nothing is loaded from elsewhere.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        run: a run of `spirillum.simulate`, or the file with it, to replay.
+        host: address to listen on. Any other than the loopback lets whoever is on the network and has the printed
+            address turn the knobs.
+        port: of that address; 0: a free one.
+        browser: open the page in the browser.
+        tell: what is told the page's address; it holds the key.
+
+    Raises:
+        InputError: for a robot or run that cannot be shown, a port that is taken, or a missing extra.
+    """
+    for name in ("starlette", "uvicorn", "websockets"):
+        required(name, "the page", "page")
+    if not 0 <= port <= _LARGEST_PORT:
+        raise InputError(f"port = {port}; allowed: 0 (a free one) to {_LARGEST_PORT}")
+    import uvicorn
+
+    from spirillum.pages.guard import Guard, is_loopback
+    from spirillum.pages.server import application
+
+    listening = _listening(host, port)
+    with listening:
+        number = int(listening.getsockname()[1])
+        guard = Guard(host, number)
+        app = application(robot, guard, first_run=None if run is None else _replay(run))
+        shown = f"[{host}]" if ":" in host else host
+        if host in ("0.0.0.0", "::"):  # noqa: S104 - it was asked for, and is said
+            shown = socket.gethostname()
+        address = f"http://{shown}:{number}/?key={guard.key}"
+        with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends
+            if not is_loopback(host):
+                tell(
+                    f"listening on {host}, not on this machine alone: whoever can reach it and has the address below "
+                    "can use the page; nothing is encrypted, so that others on the network may read the address"
+                )
+            tell(f"The page is at {address}\nCtrl-C ends it.")
+            if browser:
+                opening = Timer(0.1, webbrowser.open, [address])
+                opening.daemon = True
+                opening.start()
+            config = uvicorn.Config(
+                app,
+                log_level="warning",
+                ws="websockets-sansio",
+                ws_max_size=1 << 16,
+                ws_per_message_deflate=False,
+                limit_concurrency=200,
+                timeout_graceful_shutdown=1,
+                server_header=False,
+                access_log=False,
+            )
+            uvicorn.Server(config).run(sockets=[listening])
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """A socket that listens.
+
+    Raises:
+        InputError: if the address is not this machine's, or the port is taken.
+    """
+    found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        found.bind((host, port))
+        found.listen(128)
+    except (OSError, UnicodeError) as error:
+        found.close()
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"host = {host[:80]!r} with port = {port}: {reason}; allowed: an address of this machine with a free port"
+        ) from error
+    return found
+
+
+def _replay(run: xr.Dataset | str | Path) -> dict[str, Any]:
+    from spirillum.dynamics.run_file import open_run
+    from spirillum.pages.replay import replay_of_run
+
+    return replay_of_run(open_run(run) if isinstance(run, (str, Path)) else run)

@@ -1,0 +1,286 @@
+"""The server: fixed addresses, one websocket, and the guard before both. Nothing that a client sends names a file."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from spirillum.errors import InputError
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, Rate
+from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
+from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
+from spirillum.pages.theatre import Theatre
+
+__all__ = ["application"]
+
+_MOST_CLIENTS = 32
+_MOST_REFUSALS = 20
+_EACH_SECOND, _AT_ONCE = 80.0, 160.0
+_TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
+_OWN = ("index.html", "page.css", "main.js", "knobs.js", "numbers.js", "icon.svg", *MODULES)
+"""The page's files; nothing else is served."""
+
+
+class _Guarded:
+    """The guard around the application."""
+
+    def __init__(self, app: ASGIApp, guard: Guard) -> None:
+        self._app, self._guard = app, guard
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        refused = self._refused(scope)
+        if not refused:
+            await self._app(scope, receive, _with_headers(send))
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008, "reason": refused})
+        else:
+            await PlainTextResponse(f"{refused}\n", status_code=403, headers=dict(HEADERS))(scope, receive, send)
+
+    def _refused(self, scope: Scope) -> str:
+        """Why a request is refused; empty for one that is not."""
+        headers, guard = Headers(scope=scope), self._guard
+        host, origin = headers.get("host", ""), headers.get("origin")
+        if not guard.own_host(host):
+            return "this server is not the host that was asked for"
+        if origin is not None and not guard.own_origin(origin, host):
+            return "another page has no business here"
+        if origin is None and (scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")):
+            return "a request without its origin"
+        if guard.knows(headers.get("cookie", "")):
+            return ""
+        if scope["type"] == "http" and scope["path"] == "/" and scope["method"] == "GET":
+            key = Request(scope).query_params.get("key", "")
+            if guard.right_key(key):
+                return ""
+        return "the key is missing: open the address that `spirillum page` has printed"
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            own = [(name.lower().encode(), value.encode()) for name, value in HEADERS.items()]
+            message = {**message, "headers": [*message.get("headers", []), *own]}
+        await send(message)
+
+    return sending
+
+
+class _Client:
+    """One tab: it is sent the newest state, and what it asked for in vain."""
+
+    def __init__(self) -> None:
+        self.news = asyncio.Event()
+        self.refusals: list[str] = []
+        self.version = -1
+        self.looks = True
+
+
+class _House:
+    """The theatre and those who look."""
+
+    def __init__(self, source: Any, guard: Guard) -> None:
+        self.theatre = Theatre(source, self._publish)
+        self._guard = guard
+        self._clients: set[_Client] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    @asynccontextmanager
+    async def open(self, _app: Starlette) -> AsyncIterator[None]:
+        """From the first request to the last."""
+        self._loop = asyncio.get_running_loop()
+        self.theatre.start()
+        yield
+        self.theatre.stop()
+
+    def _publish(self) -> None:
+        """There is something new; called from the thread of the simulation."""
+        if self._loop is not None and not self._loop.is_closed():
+            with suppress(RuntimeError):  # the loop ends while the thread still tells
+                self._loop.call_soon_threadsafe(self._wake)
+
+    def _wake(self) -> None:
+        for client in self._clients:
+            client.news.set()
+
+    def _count_those_who_look(self) -> None:
+        self.theatre.look(any(client.looks for client in self._clients))
+
+    async def home(self, request: Request) -> Response:
+        """The page; with the key in its address, first the cookie that takes the key's place."""
+        if request.query_params.get("key") is None:
+            return Response(asset("index.html"), media_type="text/html")
+        answer = RedirectResponse("/", status_code=303)
+        answer.set_cookie(self._guard.cookie, self._guard.key, httponly=True, samesite="strict", path="/")
+        return answer
+
+    async def connect(self, socket: WebSocket) -> None:
+        """One tab, as long as it is open."""
+        if len(self._clients) >= _MOST_CLIENTS:
+            await socket.close(1013, "too many tabs")
+            return
+        await socket.accept()
+        client = _Client()
+        self._clients.add(client)
+        self._count_those_who_look()
+        sender = asyncio.create_task(_tell(socket, client, self.theatre))
+        try:
+            await self._listen(socket, client)
+        except (WebSocketDisconnect, KeyError):  # a message of bytes has no text
+            pass
+        finally:
+            sender.cancel()
+            self._clients.discard(client)
+            self._count_those_who_look()
+
+    async def _listen(self, socket: WebSocket, client: _Client) -> None:
+        rate, loop = Rate(_EACH_SECOND, _AT_ONCE), asyncio.get_running_loop()
+        while True:
+            text = await socket.receive_text()
+            if len(text) > LARGEST_MESSAGE or not rate.allowed():
+                await socket.close(1008, "too much at once")
+                return
+            _heard(text, client, self.theatre, loop)
+            self._count_those_who_look()
+
+
+def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None = None) -> ASGIApp:
+    """The page's application.
+
+    Args:
+        source: robot to start with.
+        guard: who may talk to it.
+        first_run: a run to replay at once, see `spirillum.pages.replay`.
+
+    Raises:
+        InputError: if the robot cannot be loaded.
+    """
+    house = _House(source, guard)
+    routes = [
+        Route("/", house.home),
+        *[Route(f"/{name}", _file(name)) for name in _OWN if name != "index.html"],
+        *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
+        Route("/first-run", _first(first_run)),
+        Route("/replay", _replayed, methods=["POST"]),
+        WebSocketRoute("/live", house.connect),
+    ]
+    return _Guarded(Starlette(routes=routes, lifespan=house.open), guard)
+
+
+async def _tell(socket: WebSocket, client: _Client, theatre: Theatre) -> None:
+    """Send the newest state whenever there is one; a slow client misses those between."""
+    with suppress(WebSocketDisconnect, RuntimeError):
+        while True:
+            if client.version < 0:
+                await socket.send_text(theatre.past())
+            if client.version != theatre.version:
+                client.version = theatre.version
+                await socket.send_text(theatre.scene)
+            while client.refusals:
+                await socket.send_text(client.refusals.pop(0))
+            if theatre.frame:
+                await socket.send_text(theatre.frame)
+            await client.news.wait()
+            client.news.clear()
+
+
+def _heard(text: str, client: _Client, theatre: Theatre, loop: asyncio.AbstractEventLoop) -> None:
+    """Hand on what a client asks for, if it is an object of JSON."""
+
+    def refuse(sentence: str) -> None:
+        def note() -> None:
+            client.refusals.append(sentence)
+            del client.refusals[:-_MOST_REFUSALS]
+            client.news.set()
+
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(note)
+
+    try:
+        command = json.loads(text)
+    except (ValueError, RecursionError):
+        command = None
+    if not isinstance(command, dict):
+        refuse(json.dumps({"t": "refused", "field": "", "lane": 0, "sentence": "a message that is no JSON object"}))
+    elif command.get("do") == "look":
+        client.looks = bool(command.get("value"))
+    else:
+        theatre.ask(command, refuse)
+
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+def _file(name: str) -> Handler:
+    async def serve(_request: Request) -> Response:
+        return Response(asset(name), media_type=_TYPES[name.rpartition(".")[2]])
+
+    return serve
+
+
+_KEPT = ("robot.toml", "commands.txt", "robot.py", "run.html", "run.json", "words.json")
+
+
+def _kept(name: str, theatre: Theatre) -> Handler:
+    def made(lane_text: str) -> Response:
+        found = theatre.recording(int(lane_text)) if lane_text in ("0", "1") else None
+        if found is None:
+            raise InputError(f"lane = {lane_text[:20]!r}; allowed: a robot that is there")
+        lane, run = found
+        if name == "words.json":
+            words = {"commands": command_line(lane), "python": python_lines(lane), "robot": robot_file(lane)}
+            return JSONResponse(words)
+        if name.startswith("run.") and len(run["time"]) < 2:
+            raise InputError("the robot has not swum yet; allowed: a run of some steps")
+        if name == "run.json":
+            return JSONResponse(replay_of_lane(lane, run))
+        if name == "run.html":
+            text, media = replay_page(replay_of_lane(lane, run)), "text/html"
+        else:
+            maker = {"robot.toml": robot_file, "commands.txt": command_line, "robot.py": python_lines}[name]
+            text, media = maker(lane), "text/plain"
+        return Response(text, media_type=media, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+    async def serve(request: Request) -> Response:
+        try:
+            return await asyncio.to_thread(made, request.query_params.get("lane", "0"))
+        except InputError as error:
+            return PlainTextResponse(str(error), status_code=400)
+
+    return serve
+
+
+def _first(run: dict[str, Any] | None) -> Handler:
+    text = json.dumps(run)
+
+    async def serve(_request: Request) -> Response:
+        return Response(text, media_type="application/json")
+
+    return serve
+
+
+async def _replayed(request: Request) -> Response:
+    """A run's file is dropped on the page, and comes back as what it replays."""
+    content = bytearray()
+    async for piece in request.stream():
+        content += piece
+        if len(content) > LARGEST_RUN:
+            return PlainTextResponse(f"the file is too large; allowed: {LARGEST_RUN >> 20} MB", status_code=413)
+    try:
+        found = await asyncio.to_thread(replay_of_upload, bytes(content))
+    except InputError as error:
+        return PlainTextResponse(str(error), status_code=400)
+    return JSONResponse(found)

@@ -1,0 +1,363 @@
+// The page: hears the newest state over one websocket, shows it, and sends what is turned and pressed.
+
+import { clock, element, inUnit, unitText } from "./format.js";
+import { Knobs } from "./knobs.js";
+import { Numbers } from "./numbers.js";
+import { Plot } from "./plots.js";
+import { showReplay } from "./replay.js";
+import { Section, sectionWords } from "./section.js";
+import { Stage } from "./stage.js";
+
+const PLOTS = ["forward_velocity", "tail_rotation_rate", "motor_current"];
+const HEADLINE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"];
+const EACH = 110; // ms between two drawings of numbers and plots: faster is not read
+const BEHIND = 0.12; // s; beyond it the page says that it is slower than asked
+const $ = (id) => document.getElementById(id);
+const state = { scene: null, lanes: [], past: null, chosen: 0, tab: "swim", socket: null };
+
+const knobs = new Knobs($("knobs"), (command) => send(command));
+const numbers = new Numbers($("numbers"));
+
+// The wire
+
+function connect() {
+  const socket = new WebSocket(`ws://${location.host}/live`);
+  state.socket = socket;
+  socket.addEventListener("message", (event) => hear(JSON.parse(event.data)));
+  socket.addEventListener("open", () => { $("lost").hidden = true; look(); });
+  socket.addEventListener("close", () => {
+    $("lost").hidden = false;
+    setTimeout(connect, 2000);
+  });
+}
+
+function send(command) {
+  if (state.socket?.readyState === WebSocket.OPEN) state.socket.send(JSON.stringify(command));
+}
+
+function look() {
+  send({ do: "look", value: !document.hidden });
+}
+
+function hear(message) {
+  if (message.t === "past") state.past = message.lanes;
+  else if (message.t === "scene") setScene(message);
+  else if (message.t === "frame") setFrame(message);
+  else if (message.t === "refused") refuse(message);
+}
+
+function refuse({ field, lane, sentence }) {
+  if (lane === state.chosen && knobs.refuse(field, sentence)) return;
+  const note = $("behind");
+  note.textContent = sentence;
+}
+
+// What is seen
+
+class Lane {
+  constructor(index) {
+    this.index = index;
+    this.holder = element("div", { class: "stage" });
+    this.headline = element("dl", { class: "headline" });
+    this.note = element("p", { class: "note", role: "status" });
+    this.name = element("p", { class: "name" });
+    const views = element("div", { class: "views", role: "group", "aria-label": "View from" });
+    this.section = element("canvas", { role: "img", "aria-label": "Cross-section of the tube" });
+    this.sectionWords = element("p", { class: "under" });
+    this.plots = element("div", { class: "plots" });
+    this.element = element("article", { class: "lane" }, this.holder, element("div", { class: "strip" },
+      element("figure", { class: "card section" }, this.section, this.sectionWords), this.plots));
+    this.stage = new Stage(this.holder, "The robot in three dimensions; arrow keys turn, + and \u2212 zoom");
+    for (const [view, name] of [["free", "3D"], ["side", "Side"], ["top", "Top"], ["front", "Front"]]) {
+      views.append(element("button", { class: "quiet wordy", text: name, onclick: () => this.stage.look(view) }));
+    }
+    this.holder.append(this.name, this.headline, this.note, views);
+    this.crossing = new Section(this.section);
+    this.generation = -1;
+    this.stage.setTheme(theme());
+  }
+
+  setScene(lane, quantities) {
+    this.name.textContent = `${lane.robot}${lane.swims_by ? ` \u00b7 ${lane.swims_by}` : ""}`;
+    this.name.title = lane.description;
+    if (lane.generation !== this.generation || !this.shape) {
+      this.generation = lane.generation;
+      const shape = JSON.stringify(lane.shape);
+      if (shape !== this.shapeText) this.stage.setShape(lane.shape);
+      this.shapeText = shape;
+      this.shape = lane.shape;
+      this.crossing.setShape(lane.shape, lane.roughness);
+      this.drawn = PLOTS.map((name) => {
+        const canvas = element("canvas", { role: "img", "aria-label": `${quantities[name].label} over time` });
+        return new Plot(canvas, name, quantities[name]);
+      });
+      this.plots.replaceChildren(...this.drawn.map((plot) => element("figure", { class: "card plot" }, plot.canvas)));
+      this.stage.place({ position: [0, 0, restHeight(lane.shape)], attitude: [1, 0, 0, 0], tail_phase: 0 });
+      const past = state.past?.[this.index];
+      if (past && past.generation === lane.generation) {
+        for (const plot of this.drawn) plot.load(past.time, past.values[plot.name] ?? []);
+        this.crossing.path = past.path;
+      }
+      this.cells = {};
+      this.headline.replaceChildren(...HEADLINE.map((name, k) => {
+        const cell = element("dd", { text: "–" });
+        this.cells[name] = cell;
+        return element("div", { class: k ? "" : "first", "data-headline": name }, element("dt", { text: quantities[name].label }), cell);
+      }));
+    }
+    this.crossing.roughness = lane.roughness;
+    this.quantities = quantities;
+    for (const plot of this.drawn) plot.band = lane.numbers?.rows[plot.name]?.value != null && lane.remote ? lane.numbers.rows[plot.name] : null;
+    this.trouble = lane.trouble;
+    this.quietNote = lane.trouble ? "" : lane.caution ? (lane.needs_table ? "Without walls: no table for this tube yet" : "") : "";
+    this.ready = false;
+    this.say("");
+  }
+
+  setFrame(frame) {
+    if (frame.generation !== this.generation) return;
+    if (!frame.ready) {
+      this.say(this.trouble ? "It cannot swim so; see Numbers." : "Getting ready \u2026");
+      return;
+    }
+    this.stage.show(frame);
+    this.frame = frame;
+    this.crossing.add(frame.position);
+    for (const plot of this.drawn) {
+      const value = frame.values[plot.name];
+      if (value !== undefined) plot.add(frame.time, value);
+    }
+    this.say(frame.ended ? `The run has ended: ${frame.ended}. Restart lays it down again.` : this.quietNote);
+    this.dirty = true;
+  }
+
+  say(text) {
+    if (this.note.textContent !== text) this.note.textContent = text;
+    this.note.hidden = !text;
+  }
+
+  tick(at) {
+    this.stage.tick(at);
+    if (!this.dirty || !this.frame || at - (this.written ?? 0) < EACH) return;
+    this.dirty = false;
+    this.written = at;
+    const values = this.frame.values;
+    for (const [name, cell] of Object.entries(this.cells)) {
+      const quantity = this.quantities[name];
+      cell.parentElement.hidden = values[name] === undefined;
+      cell.replaceChildren(inUnit(values[name], quantity), element("small", { text: ` ${unitText(quantity.unit)}` }));
+    }
+    this.crossing.draw(this.frame, values);
+    this.sectionWords.textContent = sectionWords(this.shape, values);
+    for (const plot of this.drawn) plot.draw();
+  }
+}
+
+function restHeight(shape) {
+  return shape.tube_radius === null ? 0 : -(shape.tube_radius - shape.radius) * 0.95;
+}
+
+function setScene(scene) {
+  state.scene = scene;
+  while (state.lanes.length > scene.lanes.length) state.lanes.pop().element.remove();
+  while (state.lanes.length < scene.lanes.length) {
+    const lane = new Lane(state.lanes.length);
+    state.lanes.push(lane);
+    $("lanes").append(lane.element);
+  }
+  $("lanes").classList.toggle("two", scene.lanes.length > 1);
+  scene.lanes.forEach((lane, k) => state.lanes[k].setScene(lane, scene.quantities));
+  state.chosen = Math.min(state.chosen, scene.lanes.length - 1);
+  showPanel();
+  $("play").innerHTML = scene.playing ? "&#10073;&#10073;" : "&#9654;";
+  $("play").setAttribute("aria-label", scene.playing ? "Pause" : "Play");
+  const pace = scene.pace;
+  $("pace").textContent = `${pace >= 1 ? pace : `1/${Math.round(1 / pace)}`}\u00d7`;
+  select(scene.lanes.length > 1 ? "compare" : state.tab === "compare" ? "swim" : state.tab);
+}
+
+function showPanel() {
+  const { scene, chosen } = state;
+  const lane = scene.lanes[chosen];
+  $("which").hidden = scene.lanes.length < 2;
+  $("which").replaceChildren(...scene.lanes.map((one, k) => element("button", {
+    role: "tab", "aria-selected": String(k === chosen), text: `${"AB"[k]} \u00b7 ${one.robot}`,
+    onclick: () => { state.chosen = k; showPanel(); },
+  })));
+  numbers.show(lane, scene.quantities);
+  knobs.show(lane, chosen, scene);
+  $("undo").disabled = lane.undo === 0;
+  $("redo").disabled = lane.redo === 0;
+}
+
+function setFrame(frame) {
+  state.frame = frame;
+  frame.lanes.forEach((lane, k) => state.lanes[k]?.setFrame(lane));
+  const first = frame.lanes[state.chosen] ?? frame.lanes[0];
+  $("clock").textContent = first.ready ? clock(first.time) : "\u2026";
+  if (first.ready && state.scene && performance.now() - (state.told ?? 0) > EACH && first.generation === state.scene.lanes[state.chosen]?.generation) {
+    state.told = performance.now();
+    numbers.now(first.values);
+  }
+  if (frame.behind > BEHIND) $("behind").textContent = "slower than asked";
+  else if ($("behind").textContent === "slower than asked") $("behind").textContent = "";
+}
+
+// Tabs, time, keys
+
+function select(tab) {
+  state.tab = tab;
+  for (const name of ["swim", "compare", "replay"]) $(`tab-${name}`).setAttribute("aria-selected", String(name === tab));
+  $("live").hidden = tab === "replay";
+  $("replay").hidden = tab !== "replay";
+}
+
+function open(tab) {
+  if (tab === "compare" && state.lanes.length < 2) send({ do: "compare", value: true });
+  if (tab === "swim" && state.lanes.length > 1) send({ do: "compare", value: false });
+  if (tab === "replay" && !state.replay) askForRun();
+  if (tab !== "compare" || state.lanes.length > 1) select(tab);
+}
+
+function setPace(factor) {
+  send({ do: "pace", value: Math.min(64, Math.max(1 / 64, (state.scene?.pace ?? 1) * factor)) });
+}
+
+for (const tab of ["swim", "compare", "replay"]) $(`tab-${tab}`).addEventListener("click", () => open(tab));
+$("play").addEventListener("click", () => send({ do: "play", value: !state.scene?.playing }));
+$("step").addEventListener("click", () => send({ do: "step" }));
+$("restart").addEventListener("click", () => send({ do: "restart" }));
+$("slower").addEventListener("click", () => setPace(0.5));
+$("faster").addEventListener("click", () => setPace(2));
+$("undo").addEventListener("click", () => send({ do: "undo", lane: state.chosen }));
+$("redo").addEventListener("click", () => send({ do: "redo", lane: state.chosen }));
+$("keep").addEventListener("click", () => keep());
+document.addEventListener("visibilitychange", look);
+document.addEventListener("keydown", (event) => {
+  if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
+    if (event.target.matches("input[type=text]") && document.activeElement === event.target) event.target.blur();
+    event.preventDefault();
+    send({ do: event.shiftKey ? "redo" : "undo", lane: state.chosen });
+    return;
+  }
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, select, textarea") || $("keeping").open) return;
+  const keys = {
+    " ": () => (event.target.matches("button") ? null : state.tab === "replay" ? state.replay?.toggle() : $("play").click()),
+    ".": () => $("step").click(), r: () => $("restart").click(), "[": () => setPace(0.5), "]": () => setPace(2),
+    1: () => open("swim"), 2: () => open("compare"), 3: () => open("replay"),
+  };
+  if (!keys[event.key] || (event.key === " " && event.target.matches("button"))) return;
+  event.preventDefault();
+  keys[event.key]();
+});
+
+// Light and dark
+
+function theme() {
+  return document.documentElement.dataset.theme ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+}
+
+function setTheme(name) {
+  if (name) document.documentElement.dataset.theme = name;
+  for (const lane of state.lanes) {
+    lane.stage.setTheme(theme());
+    lane.dirty = true;
+  }
+  state.replay?.setTheme(theme());
+}
+
+$("theme").addEventListener("click", () => setTheme(theme() === "dark" ? "light" : "dark"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTheme());
+
+// Replay
+
+function askForRun() {
+  const input = element("input", { type: "file", accept: ".nc", id: "run-file", onchange: () => input.files[0] && replay(input.files[0]) });
+  const error = element("p", { class: "error", role: "alert", id: "run-error" });
+  const drop = element("div", { class: "drop" },
+    element("h2", { text: "Replay a run" }),
+    element("p", {}, "Drop the file of a run here, as ", element("code", { text: "spirillum simulate \u2026 -o run.nc" }), " writes it, or choose it."),
+    element("label", { class: "plain", for: "run-file" }, "Choose a run"), input,
+    element("button", { class: "plain", text: "Replay what was just seen", onclick: () => replayNow() }), error);
+  $("replay").replaceChildren(drop);
+}
+
+async function replay(file) {
+  const answer = await fetch("/replay", { method: "POST", body: file });
+  const error = $("run-error");
+  if (!answer.ok) {
+    if (error) error.textContent = await answer.text();
+    return;
+  }
+  begin(await answer.json());
+}
+
+async function replayNow() {
+  const answer = await fetch(`/keep/run.json?lane=${state.chosen}`);
+  if (answer.ok) begin(await answer.json());
+  else $("run-error").textContent = await answer.text();
+}
+
+function begin(run) {
+  state.replay?.end();
+  state.replay = showReplay($("replay"), { ...run, quantities: state.scene.quantities }, () => {
+    state.replay.end();
+    state.replay = null;
+    askForRun();
+  });
+  state.replay.setTheme(theme());
+  select("replay");
+}
+
+for (const name of ["dragover", "drop"]) {
+  document.addEventListener(name, (event) => {
+    event.preventDefault();
+    if (name === "drop" && event.dataTransfer?.files[0]) {
+      if (!state.replay) askForRun();
+      select("replay");
+      replay(event.dataTransfer.files[0]);
+    }
+  });
+}
+
+// Keep
+
+async function keep() {
+  const dialog = $("keeping"), lane = state.chosen;
+  const answer = await fetch(`/keep/words.json?lane=${lane}`);
+  const said = answer.ok ? await answer.json() : { commands: "", python: "" };
+  const block = (title, text) => {
+    const copy = element("button", { class: "quiet wordy", text: "Copy", onclick: async () => {
+      await navigator.clipboard?.writeText(text);
+      copy.textContent = "Copied";
+    } });
+    return element("section", {}, element("h3", {}, title, copy), element("pre", { tabindex: "0" }, element("code", { text })));
+  };
+  const file = (name, words) => element("a", { class: "plain", href: `/keep/${name}?lane=${lane}`, download: name, text: words });
+  dialog.replaceChildren(
+    element("h2", { text: "Keep" }),
+    element("p", { class: "soft", text: "Everything that is seen, to take away: the same numbers on the command line and in Python, and the run as one file that replays in any browser with no server." }),
+    element("p", { class: "files" }, file("run.html", "The run, one page (HTML)"), file("robot.toml", "The robot (TOML)"), file("robot.py", "Python")),
+    block("Command line", said.commands), block("Python", said.python),
+    element("form", { method: "dialog" }, element("button", { class: "plain", text: "Close" })),
+  );
+  dialog.showModal();
+}
+
+// Every frame
+
+function tick(at) {
+  for (const lane of state.lanes) {
+    if (state.tab !== "replay") lane.tick(at);
+  }
+  requestAnimationFrame(tick);
+}
+
+new ResizeObserver(() => state.lanes.forEach((lane) => { lane.dirty = true; })).observe($("lanes"));
+window.spirillum = state; // for the console, and for tests
+connect();
+requestAnimationFrame(tick);
+fetch("/first-run").then((answer) => answer.json()).then((run) => {
+  const wait = () => (state.scene ? run && begin(run) : setTimeout(wait, 50));
+  wait();
+});

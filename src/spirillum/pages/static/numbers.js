@@ -1,0 +1,70 @@
+// The table of numbers: now, steady, and the range that is not known better; with the stated error in words.
+
+import { element, figure, inUnit, span, unitText } from "./format.js";
+import { capital } from "./plots.js";
+
+export class Numbers {
+  constructor(holder) {
+    this.holder = holder;
+    this.cells = {};
+    this.built = "";
+  }
+
+  show(lane, quantities) {
+    const told = JSON.stringify([lane.numbers, lane.caution, lane.trouble, lane.warnings, lane.swims_by, lane.needs_table, lane.preparing, lane.generation]);
+    if (told === this.built) return;
+    this.built = told;
+    const numbers = lane.numbers;
+    this.quantities = quantities;
+    this.cells = {};
+    const body = element("tbody");
+    for (const [name, row] of Object.entries(numbers?.rows ?? {})) {
+      const quantity = quantities[name];
+      if (row.value === null) continue;
+      const now = element("td", { class: "now", text: "" });
+      this.cells[name] = now;
+      const ranged = row.low !== null && Math.abs(row.high - row.low) > 1e-9 * Math.abs(row.value || 1);
+      body.append(element("tr", { title: quantity.meaning, "data-quantity": name },
+        element("th", { scope: "row" }, capital(quantity.label), element("small", { text: ` ${unitText(quantity.unit)}` })),
+        now,
+        element("td", { class: "steady", text: inUnit(row.value, quantity), "data-value": row.value }),
+        element("td", { class: "range", text: ranged ? span(row.low * quantity.factor, row.high * quantity.factor) : "" }),
+      ));
+    }
+    const table = element("table", {},
+      element("thead", {}, element("tr", {},
+        element("th", { scope: "col", text: "" }),
+        element("th", { scope: "col", text: "now", title: "at this moment of the run" }),
+        element("th", { scope: "col", text: "steady", title: "steady swimming, lateral motion and tilt held" }),
+        element("th", { scope: "col", text: numbers?.band ? "range" : "", title: "least and largest over the gaps and pitches that are possible" }),
+      )), body);
+    this.holder.replaceChildren(
+      element("h2", {}, "Numbers", element("span", { class: "tag", text: numbers ? `model ${numbers.model}` : "computing \u2026", title: numbers?.reason ?? "" })),
+      ...(lane.trouble ? [element("p", { class: "trouble", role: "alert", text: sentence(lane.trouble) })] : []),
+      ...(numbers ? [table, words(numbers, lane)] : lane.trouble ? [] : [element("p", { class: "soft", text: "Computing. The first time on a machine some loops are compiled, which takes about twenty seconds." })]),
+    );
+  }
+
+  now(values) {
+    for (const [name, cell] of Object.entries(this.cells)) {
+      cell.textContent = values && values[name] !== undefined ? inUnit(values[name], this.quantities[name]) : "";
+    }
+  }
+}
+
+function words(numbers, lane) {
+  const list = element("div", { class: "said" });
+  const error = numbers.error === null ? "" : `Error of the speed ${figure(100 * numbers.error, 2)} %${numbers.against ? `, against ${numbers.against}` : ""}. `;
+  list.append(element("p", {}, element("b", { text: "How sure: " }), error + capital(numbers.statement) + (numbers.statement ? "." : "")));
+  const more = [lane.caution, ...lane.warnings, ...numbers.warnings].filter((text, k, all) => text && all.indexOf(text) === k);
+  if (numbers.others) more.push(numbers.others);
+  if (more.length) {
+    list.append(element("details", {}, element("summary", { text: `To be careful about (${more.length})` }), ...more.map((text) => element("p", { text: sentence(text) }))));
+  }
+  return list;
+}
+
+function sentence(text) {
+  const whole = capital(text.trim());
+  return /[.!?]$/.test(whole) ? whole : `${whole}.`;
+}

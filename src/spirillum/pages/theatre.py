@@ -1,0 +1,390 @@
+"""The one thread that moves the robots, and what it tells: the newest state, as text that clients are sent."""
+
+from __future__ import annotations
+
+import json
+import queue
+import re
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.pages.knobs import Settings
+from spirillum.pages.lane import Built, Lane, build
+from spirillum.pages.numbers import prediction_answer, quantity_list
+from spirillum.pages.preparing import Preparing
+from spirillum.robot.load import load, preset_names
+from spirillum.robot.text import robot_text
+
+__all__ = ["SLOWEST_PACE", "Theatre"]
+
+RATE = 30.0
+"""Frames a second."""
+_LATE = 0.25
+"""Time by which the run may fall behind before it no longer tries to catch up, s."""
+SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
+_MOST_WAITING = 2_000
+
+_SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
+"""What a sentence about a field says of where the robot comes from: here it stands at the knob."""
+
+Command = tuple[Mapping[str, Any], Callable[[str], None]]
+"""What a client asks for, and where to say why not."""
+
+
+class Theatre:
+    """Robots, clock and commands; made in one thread, run in its own."""
+
+    def __init__(self, source: Any, publish: Callable[[], None]) -> None:
+        """Open the page's robots.
+
+        Args:
+            source: preset's name, robot file, or checked robot to start with.
+            publish: called from the thread when there is something new.
+
+        Raises:
+            InputError: if it cannot be loaded.
+        """
+        self._own = source if isinstance(source, str) and source in preset_names() else _tables(source)
+        self._publish = publish
+        self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
+        self._wanted: dict[int, tuple[int, str, Settings, Settings]] = {}
+        self._work = threading.Condition()
+        self._built: queue.Queue[tuple[int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
+        self._lanes = [Lane.of(self._own)]
+        self._preparing: Preparing | None = None
+        self._playing, self._pace, self._looked_at = True, 1.0, False
+        self._ending = threading.Event()
+        self._asked: list[tuple[int, int]] = []
+        self._behind = 0.0
+        self._lock = threading.Lock()
+        self.version, self.scene, self.frame = 0, "", ""
+        self._threads = [
+            threading.Thread(target=self._run, name="page: motion", daemon=True),
+            threading.Thread(target=self._build, name="page: numbers", daemon=True),
+        ]
+
+    def start(self) -> None:
+        """Begin."""
+        self._tell_scene()
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """End both threads, and a table that is being made (what is solved of it is kept)."""
+        self._ending.set()
+        self._inbox.put(None)
+        with self._work:
+            self._work.notify_all()
+        if self._preparing is not None:
+            self._preparing.stop()
+        for thread in self._threads:
+            thread.join(timeout=2.0)
+
+    def ask(self, command: Mapping[str, Any], refuse: Callable[[str], None]) -> None:
+        """Ask for a change; it is made in the thread of the simulation.
+
+        Args:
+            command: what a client has sent, checked to be a JSON object.
+            refuse: called from that thread with JSON that says why not.
+        """
+        try:
+            self._inbox.put_nowait((command, refuse))
+        except queue.Full:
+            refuse(_refusal(command, "the page is busy; allowed: fewer changes at once"))
+
+    def look(self, watched: bool) -> None:  # noqa: FBT001 - one thing to say
+        """Whether anybody looks; the robots wait for who does."""
+        if watched != self._looked_at:
+            self._looked_at = watched
+            self.ask({"do": "wake"}, lambda _text: None)
+
+    def past(self) -> str:
+        """What the robots have done so far, for a client that comes later."""
+        with self._lock:
+            lanes = [{"generation": lane.generation, **lane.recording.past()} for lane in self._lanes]
+        return json.dumps({"t": "past", "lanes": lanes})
+
+    def recording(self, index: int) -> tuple[Lane, dict[str, Any]] | None:
+        """A robot and its run so far; None if there is no such robot or no run."""
+        with self._lock:
+            if not 0 <= index < len(self._lanes):
+                return None
+            lane = self._lanes[index]
+            return lane, lane.recording.data()
+
+    # the thread of the simulation
+
+    def _run(self) -> None:
+        for index in range(len(self._lanes)):
+            self._want(index)
+        last = time.perf_counter()
+        while not self._ending.is_set():
+            moving = self._playing and self._looked_at and any(self._moves(lane) for lane in self._lanes)
+            changed = self._listen(1.0 / RATE - (time.perf_counter() - last) if moving else 0.2)
+            now = time.perf_counter()
+            if moving and now - last >= 0.9 / RATE:
+                self._advance(now - last)
+                last = now
+                changed = True
+            elif not moving:
+                last = now
+            if changed:
+                self._tell_frame()
+
+    def _moves(self, lane: Lane) -> bool:
+        return lane.built is not None and not lane.trouble and not (lane.moment and lane.moment.ended)
+
+    def _advance(self, elapsed: float) -> None:
+        """All robots by the same time, so that they stay together."""
+        self._behind = max(0.0, elapsed - 1.0 / RATE)
+        dt = min(elapsed, _LATE) * self._pace
+        if any(lane.built is None and not lane.trouble for lane in self._lanes):
+            return  # those who are ready wait for those who are not
+        with self._lock:
+            for lane in self._lanes:
+                lane.advance(dt)
+
+    def _listen(self, wait: float) -> bool:
+        """Do what is asked; wait for something to come if there is nothing."""
+        changed = self._receive()
+        try:
+            item = self._inbox.get(timeout=max(wait, 0.0)) if wait > 0 else self._inbox.get_nowait()
+        except queue.Empty:
+            return changed
+        while item is not None:
+            command, refuse = item
+            try:
+                with self._lock:
+                    self._do(command)
+            except InputError as error:
+                refuse(_refusal(command, str(error)))
+            changed = True
+            try:
+                item = self._inbox.get_nowait()
+            except queue.Empty:
+                break
+        for index, lane in enumerate(self._lanes):
+            if self._asked[index : index + 1] != [(lane.generation, hash(lane.duty))]:
+                self._want(index)
+        self._tell_scene()
+        return changed
+
+    def _do(self, command: Mapping[str, Any]) -> None:
+        what = command.get("do")
+        index = command.get("lane", 0)
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(self._lanes):
+            raise InputError(f"lane = {str(index)[:20]}; allowed: 0 to {len(self._lanes) - 1}")
+        lane = self._lanes[index]
+        action = _ACTIONS.get(str(what))
+        if action is None:
+            raise InputError(f"do = {str(what)[:40]!r}; allowed: {', '.join(_ACTIONS)}")
+        action(self, lane, command)
+
+    def _set(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        name, value = _text(command, "field"), _text(command, "value")
+        if name != "run.flow" or not lane.flow(value):
+            lane.set(name, value)
+
+    def _preset(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        lane.preset(_text(command, "value"), self._own)
+        drive = lane.robot.drive
+        lane.duty = drive.duty if drive is not None else 1.0
+
+    def _undo(self, lane: Lane, _command: Mapping[str, Any]) -> None:
+        lane.undo()
+
+    def _redo(self, lane: Lane, _command: Mapping[str, Any]) -> None:
+        lane.undo(forward=True)
+
+    def _restart(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
+        for lane in self._lanes:
+            lane.start_anew()
+
+    def _remote(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        lane.remote = bool(command.get("value"))
+
+    def _duty(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        lane.duty = _number(command, 0.0, 1.0)
+
+    def _play(self, _lane: Lane, command: Mapping[str, Any]) -> None:
+        self._playing = bool(command.get("value"))
+
+    def _step(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
+        self._playing = False
+        for lane in self._lanes:
+            lane.advance(self._pace / RATE)
+
+    def _set_pace(self, _lane: Lane, command: Mapping[str, Any]) -> None:
+        self._pace = _number(command, SLOWEST_PACE, FASTEST_PACE)
+
+    def _wake(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
+        """Only to be listened to."""
+
+    def _compare(self, _lane: Lane, command: Mapping[str, Any]) -> None:
+        if not command.get("value"):
+            del self._lanes[1:]
+        elif len(self._lanes) == 1:
+            first = self._lanes[0]
+            second = Lane(first.settings, first.robot, first.remote, first.duty)
+            first.start_anew()
+            self._lanes.append(second)
+
+    def _prepare(self, lane: Lane, _command: Mapping[str, Any]) -> None:
+        if self._preparing is not None and self._preparing.running:
+            raise InputError("a table is being made already; allowed: one at a time")
+        self._preparing = Preparing(lane.robot, self._wake_up)
+
+    def _leave_off(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
+        if self._preparing is not None:
+            self._preparing.stop()
+
+    def _wake_up(self) -> None:
+        self.ask({"do": "wake"}, lambda _text: None)
+
+    # the thread of the numbers
+
+    def _want(self, index: int) -> None:
+        lane = self._lanes[index]
+        asked = (lane.generation, hash(lane.duty))
+        self._asked[index:] = [asked]
+        with self._work:
+            known = "" if lane.built is None else lane.built.model
+            self._wanted[index] = (lane.generation, known, lane.settings, lane.predicted())
+            self._work.notify()
+
+    def _build(self) -> None:
+        while not self._ending.is_set():
+            with self._work:
+                while not self._wanted and not self._ending.is_set():
+                    self._work.wait()
+                if self._ending.is_set():
+                    return
+                index = next(iter(self._wanted))
+                generation, model, settings, predicted = self._wanted.pop(index)
+            try:
+                if not model:
+                    built = build(settings)
+                    model = built.model
+                    self._built.put((index, generation, built, None, ""))
+                    self._wake_up()
+                self._built.put((index, generation, None, self._numbers(predicted, model), ""))
+            except InputError as error:
+                self._built.put((index, generation, None, None, str(error)))
+            self._wake_up()
+
+    def _numbers(self, settings: Settings, model: str) -> dict[str, Any]:
+        from spirillum.swimming.prediction import predict
+
+        placement = settings.placement() if model == "tube" else None
+        return prediction_answer(predict(settings.robot(), model=model, placement=placement))
+
+    def _receive(self) -> bool:
+        """Take what was built, unless something else was set meanwhile."""
+        changed = False
+        while True:
+            try:
+                index, generation, built, numbers, trouble = self._built.get_nowait()
+            except queue.Empty:
+                break
+            if index >= len(self._lanes) or self._lanes[index].generation != generation:
+                continue
+            lane = self._lanes[index]
+            with self._lock:
+                if built is not None:
+                    lane.take(built)
+                if numbers is not None:
+                    lane.numbers = numbers
+                if trouble:
+                    lane.trouble, lane.numbers = trouble, None
+            changed = True
+        if self._preparing is not None:
+            changed = self._look_at_table(self._preparing) or changed
+        if changed:
+            self._tell_scene()
+        return changed
+
+    def _look_at_table(self, preparing: Preparing) -> bool:
+        said = preparing.progress()
+        lane = next((lane for lane in self._lanes if lane.robot is preparing.robot), None)
+        if lane is None:
+            return False
+        changed = lane.preparing != said
+        lane.preparing = said
+        if not preparing.running:
+            self._preparing = None
+            if said is not None and said.get("done"):
+                lane.preparing = None
+                lane.start_anew()
+                self._want(self._lanes.index(lane))
+        return changed
+
+    # what is told
+
+    def _tell_scene(self) -> None:
+        scene = {
+            "t": "scene",
+            "lanes": [lane.scene() for lane in self._lanes],
+            "quantities": quantity_list(),
+            "presets": list(preset_names()),
+            "own": self._own if isinstance(self._own, str) else "own",
+            "playing": self._playing,
+            "pace": self._pace,
+        }
+        text = json.dumps(scene)
+        if text != self.scene:
+            self.scene = text
+            self.version += 1
+        self._tell_frame()
+
+    def _tell_frame(self) -> None:
+        lanes = [lane.frame() for lane in self._lanes]
+        self.frame = json.dumps({"t": "frame", "lanes": lanes, "playing": self._playing, "behind": self._behind})
+        self._publish()
+
+
+_ACTIONS: dict[str, Callable[[Theatre, Lane, Mapping[str, Any]], None]] = {
+    "set": Theatre._set,  # noqa: SLF001 - its own
+    "preset": Theatre._preset,  # noqa: SLF001
+    "undo": Theatre._undo,  # noqa: SLF001
+    "redo": Theatre._redo,  # noqa: SLF001
+    "restart": Theatre._restart,  # noqa: SLF001
+    "remote": Theatre._remote,  # noqa: SLF001
+    "duty": Theatre._duty,  # noqa: SLF001
+    "play": Theatre._play,  # noqa: SLF001
+    "step": Theatre._step,  # noqa: SLF001
+    "pace": Theatre._set_pace,  # noqa: SLF001
+    "compare": Theatre._compare,  # noqa: SLF001
+    "prepare": Theatre._prepare,  # noqa: SLF001
+    "leave-off": Theatre._leave_off,  # noqa: SLF001
+    "wake": Theatre._wake,  # noqa: SLF001
+}
+
+
+def _tables(source: Any) -> dict[str, Any]:
+    """A robot as its tables, which fields can be laid over, and which no longer depend on a file."""
+    import tomllib
+
+    return tomllib.loads(robot_text(load(source)))
+
+
+def _text(command: Mapping[str, Any], name: str) -> str:
+    value = command.get(name)
+    if not isinstance(value, str):
+        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
+    return value
+
+
+def _number(command: Mapping[str, Any], low: float, high: float) -> float:
+    value = command.get("value")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
+    return float(value)
+
+
+def _refusal(command: Mapping[str, Any], sentence: str) -> str:
+    name = str(command.get("field") or command.get("do") or "")[:60]
+    sentence = _SOURCE.sub("", sentence)
+    return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})

@@ -1,0 +1,88 @@
+"""One server and one browser for all tests of the page."""
+
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from shutil import which
+from signal import SIGINT
+from typing import Any
+
+import pytest
+
+FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+"""WebGL without a graphics card."""
+
+
+class Served:
+    """A page that runs in a process of its own."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "spirillum", "page", "--no-browser", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        found = re.search(r"http://\S+", self.process.stdout.readline())
+        assert found is not None
+        self.address = found[0]
+        self.base, self.key = self.address.split("/?key=")
+
+    def ended(self, number: int) -> int:
+        """Its exit code after a signal."""
+        self.process.send_signal(number)
+        with self.process:
+            return self.process.wait(timeout=20)
+
+
+@pytest.fixture(scope="session")
+def served(cache_of_its_own: None) -> Iterator[Served]:
+    page = Served()
+    yield page
+    assert page.ended(SIGINT) == 0
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="tests of the page need playwright (extra `test`)")
+    system = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := which(name))), None)
+    with sync_api.sync_playwright() as playwright:
+        try:
+            found = playwright.chromium.launch(executable_path=system, args=list(FLAGS))
+        except sync_api.Error:
+            pytest.skip("no Chromium is installed (`playwright install chromium`): tests of the page are left out")
+        yield found
+        found.close()
+
+
+class Tab:
+    """A tab that notes what goes wrong in it, and who it asks."""
+
+    def __init__(self, page: Any) -> None:
+        self.page, self.wrong, self.asked = page, [], []
+        page.on("console", lambda said: self.wrong.append(said.text) if said.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("request", lambda request: self.asked.append(request.url))
+
+    def value(self, script: str) -> Any:
+        return self.page.evaluate(script)
+
+    def until(self, script: str, longest: float = 60.0) -> None:
+        """Wait for something; its policy forbids the page to evaluate text, so that it is asked from outside."""
+        end = time.monotonic() + longest
+        while not self.value(f"Boolean({script})"):
+            assert time.monotonic() < end, f"{script} in {longest} s; {self.wrong}"
+            time.sleep(0.05)
+
+    def command(self, **what: Any) -> None:
+        self.page.evaluate("what => spirillum.socket.send(JSON.stringify(what))", what)
+
+
+@pytest.fixture(scope="session")
+def tab(served: Served, browser: Any) -> Iterator[Tab]:
+    """The page in a small window, swimming."""
+    context = browser.new_context(viewport={"width": 800, "height": 480})
+    found = Tab(context.new_page())
+    found.page.goto(served.address)
+    found.until("window.spirillum?.frame?.lanes[0].time > 0.1 && spirillum.scene.lanes[0].numbers")
+    yield found
+    context.close()

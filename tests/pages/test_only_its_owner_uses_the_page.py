@@ -1,0 +1,142 @@
+"""Another page, another host, no key, too much: refused, by a server as it runs."""
+
+import json
+import signal
+from http.client import HTTPConnection
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from spirillum.errors import InputError
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, Rate
+from spirillum.pages.knobs import Settings
+
+
+def _answer(served: Any, path: str, method: str = "GET", body: bytes | None = None, **headers: str) -> Any:
+    host = served.base.removeprefix("http://")
+    connection = HTTPConnection(host, timeout=20)
+    connection.putrequest(method, path, skip_host=True)
+    sent = {"Host": host, **{name.replace("_", "-"): value for name, value in headers.items()}}
+    if body is not None:
+        sent["Content-Length"] = str(len(body))
+    for name, value in sent.items():
+        connection.putheader(name, value)
+    connection.endheaders(body)
+    found = connection.getresponse()
+    found.content = found.read()  # type: ignore[attr-defined]
+    connection.close()
+    return found
+
+
+@pytest.fixture
+def cookie(served: Any) -> str:
+    found = _answer(served, f"/?key={served.key}")
+    assert found.status == 303
+    given = found.headers["Set-Cookie"]
+    assert "HttpOnly" in given
+    assert "SameSite=strict" in given
+    return str(given).partition(";")[0]
+
+
+def test_key_opens_and_nothing_else_does(served: Any, cookie: str) -> None:
+    assert _answer(served, "/", Cookie=cookie).status == 200
+    assert _answer(served, "/").status == 403
+    assert _answer(served, "/?key=wrong").status == 403
+    assert _answer(served, "/main.js").status == 403
+    assert _answer(served, "/main.js", Cookie=cookie[:-2] + "xx").status == 403
+
+
+def test_every_answer_has_its_headers(served: Any, cookie: str) -> None:
+    for path in ("/", "/main.js", "/nothing"):
+        found = _answer(served, path, Cookie=cookie)
+        assert {name: found.headers[name] for name in HEADERS} == dict(HEADERS)
+    assert "unsafe" not in HEADERS["Content-Security-Policy"]
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1:1", "192.0.2.7:{port}", ""])
+def test_wrong_host_is_refused(served: Any, cookie: str, host: str) -> None:
+    port = served.base.rpartition(":")[2]
+    assert _answer(served, "/", Cookie=cookie, Host=host.format(port=port)).status == 403
+
+
+def test_another_origin_is_refused(served: Any, cookie: str) -> None:
+    own = served.base
+    assert _answer(served, "/", Cookie=cookie, Origin=own).status == 200
+    for other in ("http://evil.example", "null", own.replace("127.0.0.1", "localhost"), own + "0"):
+        assert _answer(served, "/", Cookie=cookie, Origin=other).status == 403
+    assert _answer(served, "/replay", "POST", b"x", Cookie=cookie).status == 403  # no origin
+    found = _answer(served, "/replay", "POST", b"no run", Cookie=cookie, Origin=own)
+    assert found.status == 400
+    assert b"the file" in found.content
+
+
+@pytest.mark.parametrize(
+    "path", ["/../pyproject.toml", "/%2e%2e/guard.py", "/static/main.js", "/keep/robot.toml?lane=../9"]
+)
+def test_no_path_of_a_client_is_a_file(served: Any, cookie: str, path: str) -> None:
+    assert _answer(served, path, Cookie=cookie).status in (400, 404)
+
+
+def _socket(served: Any, cookie: str, origin: str | None) -> Any:
+    headers = {"Cookie": cookie} | ({} if origin is None else {"Origin": origin})
+    return connect(served.base.replace("http", "ws") + "/live", additional_headers=headers, max_size=None)
+
+
+def test_socket_wants_key_and_origin(served: Any, cookie: str) -> None:
+    for wrong in ((cookie, "http://evil.example"), (cookie, None), ("a=b", served.base)):
+        with pytest.raises(Exception, match="403"):
+            _socket(served, *wrong)
+    with _socket(served, cookie, served.base) as socket:
+        assert json.loads(socket.recv())["t"] == "past"
+
+
+def test_nonsense_gets_a_sentence(served: Any, cookie: str) -> None:
+    with _socket(served, cookie, served.base) as socket:
+        said = []
+        for text in ("nonsense", "[1]", '{"do":"fly"}', '{"do":"set","field":"robot.path","value":"/etc/passwd"}'):
+            socket.send(text)
+        socket.send('{"do":"set","field":"tail.wavelength","value":"' + "9" * 200 + ' mm"}')
+        socket.send('{"do":"pace","value":NaN}')
+        while len(said) < 6:
+            message = json.loads(socket.recv(timeout=20))
+            said += [message["sentence"]] if message["t"] == "refused" else []
+        assert all("allowed" in sentence or "JSON" in sentence for sentence in said)
+
+
+@pytest.mark.parametrize("flood", [["x" * (LARGEST_MESSAGE + 1)], ['{"do":"wake"}'] * 1000], ids=["long", "many"])
+def test_too_much_at_once_is_cut_off(served: Any, cookie: str, flood: list[str]) -> None:
+    def drown() -> None:
+        with _socket(served, cookie, served.base) as socket:
+            for text in flood:
+                socket.send(text)
+            while True:
+                socket.recv(timeout=20)
+
+    with pytest.raises(ConnectionClosed) as closed:
+        drown()
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == 1008
+
+
+def test_interrupt_ends_it_cleanly(served: Any) -> None:
+    other = type(served)("--port", "0")
+    assert other.ended(signal.SIGINT) == 0
+
+
+def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> None:
+    guard = Guard("0.0.0.0", 8000)
+    assert guard.own_host("192.0.2.7:8000")
+    assert not guard.own_host("evil.example:8000")
+    assert not Guard("127.0.0.1", 8000).own_host("192.0.2.7:8000")
+
+
+def test_rate_lets_a_burst_through_and_then_no_more() -> None:
+    rate = Rate(1e-6, 3.0)
+    assert [rate.allowed() for _ in range(5)] == [True, True, True, False, False]
+
+
+def test_only_knobs_can_be_turned() -> None:
+    with pytest.raises(InputError, match="is no knob"):
+        Settings("biorob2012-wide").changed("extends", "biorob2012-narrow")

@@ -1,0 +1,107 @@
+"""The page in a real browser: it draws, it moves, its knobs ask Python, and nothing leaves the machine."""
+
+import json
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import spirillum as sp
+
+FRAME = "spirillum.frame.lanes[0]"
+NUMBERS = "spirillum.scene.lanes[0].numbers"
+
+
+def _picture(tab: Any) -> np.ndarray:
+    return np.asarray(Image.open(BytesIO(tab.page.locator(".scene").first.screenshot())).convert("RGB"), dtype=float)
+
+
+def test_robot_is_drawn_and_moves_as_simulate_says(tab: Any) -> None:
+    picture = _picture(tab)
+    assert picture.std() > 10.0  # not blank
+    stripes = (picture.max(axis=2) - picture.min(axis=2)) > 90.0  # only the robot has such colours
+    assert stripes.mean() > 2e-3
+    before = tab.value(f"{FRAME}.tail_phase")
+    tab.until(f"{FRAME}.time > 0.5")
+    tab.command(do="play", value=False)
+    tab.until("!spirillum.frame.playing")
+    frame = tab.value(FRAME)
+    assert frame["tail_phase"] > before
+    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": frame["time"]})
+    assert frame["position"] == pytest.approx(run.position.values[-1], rel=1e-6, abs=1e-9)
+    assert frame["values"]["motor_current"] == pytest.approx(float(run.motor_current[-1]), rel=1e-6)
+    assert np.abs(_picture(tab) - picture).max() > 50.0
+
+
+def test_knob_gives_the_number_that_python_gives(tab: Any) -> None:
+    tab.page.fill("#fluid-viscosity", "2 Pa s")
+    tab.page.keyboard.press("Enter")
+    tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'fluid.viscosity' && knob.value == 2)")
+    tab.until(f"{NUMBERS} && spirillum.scene.lanes[0].swims_by")
+    expected = sp.predict(sp.load("biorob2012-wide", **{"fluid.viscosity": "2 Pa s"})).forward_velocity
+    tab.until(f"Math.abs({NUMBERS}.rows.forward_velocity.value / {expected!r} - 1) < 1e-9")
+    shown = tab.page.locator("[data-quantity=forward_velocity] .steady")
+    assert shown.inner_text() == f"{1e3 * expected:.3f}"
+    tab.page.keyboard.press("Control+z")
+    tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'fluid.viscosity' && knob.value == 3.5)")
+
+
+def test_wrong_value_gets_a_sentence_at_its_knob(tab: Any) -> None:
+    tab.page.fill("#tail-amplitude", "40")
+    tab.page.keyboard.press("Enter")
+    tab.until("document.getElementById('tail-amplitude-error').textContent.includes('tail.amplitude = 40 mm; allowed')")
+    assert tab.value("spirillum.scene.lanes[0].knobs.find(knob => knob.field == 'tail.amplitude').value") == 2.5
+
+
+def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path: Path) -> None:
+    run = sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.4 s"})
+    run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    tab.page.click("#tab-replay")
+    tab.page.set_input_files("#run-file", tmp_path / "run.nc")
+    tab.until("spirillum.replay")
+    last = len(run.time) - 1
+    tab.value(f"spirillum.replay.seek({last})")
+    shown = tab.value("spirillum.replay.shown")
+    assert shown["time"] == float(run.time[last])
+    assert shown["position"] == run.position.values[last].tolist()
+    assert shown["values"]["forward_velocity"] == float(run.forward_velocity[last])
+    tab.page.click("#tab-swim")
+
+    tab.command(do="step")
+    tab.command(do="step")
+    tab.until(f"{FRAME}.ready && {FRAME}.time > 0.06")
+    kept = tab.page.context.request.get(tab.page.url + "keep/run.html").text()
+    (tmp_path / "run.html").write_text(kept, encoding="utf-8")
+    context = browser.new_context(viewport={"width": 500, "height": 400}, offline=True)
+    alone, wrong, asked = context.new_page(), [], []
+    alone.on("pageerror", lambda error: wrong.append(str(error)))
+    alone.on("request", lambda request: asked.append(request.url))
+    alone.goto((tmp_path / "run.html").as_uri())
+    alone.locator(".stage .scene").wait_for()
+    held = json.loads(alone.locator("#run").inner_text())
+    assert held["run"]["time"][-1] == tab.value(f"{FRAME}.time")
+    assert np.asarray(Image.open(BytesIO(alone.locator(".scene").screenshot())).convert("L")).std() > 5.0
+    assert not wrong
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in asked)
+    context.close()
+
+
+def test_two_robots_start_together(tab: Any) -> None:
+    tab.page.click("#tab-compare")
+    tab.until("spirillum.lanes.length == 2 && spirillum.frame.lanes.length == 2 && spirillum.frame.lanes[1].ready")
+    tab.command(do="duty", lane=1, value=0.5)
+    tab.command(do="step")
+    tab.until("spirillum.scene.lanes[1].duty == 0.5")
+    tab.until("spirillum.frame.lanes[1].time > 0 && spirillum.frame.lanes[0].time == spirillum.frame.lanes[1].time")
+    tab.page.click("#tab-swim")
+    tab.until("spirillum.lanes.length == 1")
+
+
+def test_nothing_went_wrong_and_nobody_else_was_asked(tab: Any, served: Any) -> None:
+    """The last one: what all the others did."""
+    assert not tab.wrong
+    hosts = {url.split("/")[2] for url in tab.asked if url.startswith(("http", "ws"))}
+    assert hosts == {served.base.removeprefix("http://")}
