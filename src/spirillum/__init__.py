@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from spirillum.citations import citation as citation
     from spirillum.designs.answer import Design as Design
     from spirillum.designs.design import design as design
+    from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
     from spirillum.dynamics.prediction import predict as predict
     from spirillum.dynamics.settling import Settling as Settling
@@ -84,6 +85,7 @@ _HOME = {
     "feasibility": "spirillum.measurement.feasibility",
     "film": "spirillum.view.scene3d.film",
     "flow": "spirillum.fields.flow",
+    "flow_of_run": "spirillum.dynamics.flow_of_run",
     "load": "spirillum.robot.load",
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",

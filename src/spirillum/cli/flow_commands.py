@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,15 +16,20 @@ from spirillum.cli.options import (
     ImposedFlow,
     Json,
     Pitch,
-    RobotArgument,
     Settings,
     TailDrop,
     TailRate,
     Tolerance,
+    Yaw,
     complete_frames,
     complete_planes,
+    complete_robots,
     starting,
 )
+from spirillum.errors import InputError
+
+if TYPE_CHECKING:
+    from spirillum.fields.flow import Flow
 
 __all__ = ["flow"]
 
@@ -38,7 +43,10 @@ def _complete_models(incomplete: str) -> list[str]:
 
 
 def flow(
-    robot: RobotArgument,
+    robot: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file; none with --run."),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="FILE", help="The plane: .png, .pdf, .svg, or .nc with its numbers."),
@@ -69,6 +77,11 @@ def flow(
             help="slender (unbounded fluid), tube (in the channel), or auto: tube where there is a channel.",
         ),
     ] = "auto",
+    run: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The flow at a moment of a free run in a tube instead, by `simulate`."),
+    ] = None,
+    time: Annotated[str | None, typer.Option(metavar="TIME", help="With --run: the moment, such as 0.5s.")] = None,
     tail_rate: TailRate = None,
     friction: Friction = None,
     accuracy: Annotated[
@@ -81,6 +94,7 @@ def flow(
     gap: Gap = None,
     eccentricity: Eccentricity = None,
     pitch: Pitch = None,
+    yaw: Yaw = None,
     tail_drop: TailDrop = None,
     ends: Ends = None,
     imposed_flow: ImposedFlow = None,
@@ -99,25 +113,41 @@ def flow(
     from spirillum.results.flow import check_targets, write_flow
 
     check_targets(output, volume)
-    loaded = loaded_robot(robot, settings)
-    placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow)
+    placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow, yaw)
     fineness = {"accuracy": accuracy, "tolerance": tolerance}
-    seat = seat_in_tube(loaded, model, placement, fineness)
-    plane_around(loaded, plane, offset, extent, resolution, seat)
-    if volume is not None:
-        box_around(loaded, extent, volume_resolution, seat)
+    if run is None:
+        if robot is None or time is not None:
+            said = "no robot" if robot is None else f"time = {time} without a run"
+            raise InputError(f"{said}; allowed: a preset's name or a robot file, or --run RUN.nc --time TIME")
+        loaded = loaded_robot(robot, settings)
+        seat = seat_in_tube(loaded, model, placement, fineness)
+        plane_around(loaded, plane, offset, extent, resolution, seat)
+        if volume is not None:
+            box_around(loaded, extent, volume_resolution, seat)
+
+        def around() -> Flow:
+            return answer(
+                loaded,
+                model=model,
+                tail_rate=tail_rate,
+                friction=friction,
+                resolution=fineness,
+                placement=placement,
+                phase=angle(phase),
+                frame=frame,
+            )
+    else:
+        given = {"robot": robot, "tail-rate": tail_rate, "friction": friction, "set": settings, **placement}
+        _check_run(given, time, phase, model)
+
+        def around() -> Flow:
+            from spirillum.dynamics.flow_of_run import flow_of_run
+
+            return flow_of_run(run, str(time), frame=frame, resolution=fineness)
+
     with renderer.progress_bar(quiet=json) as progress:
         progress("flow: forces on the robot", 0, 1)
-        found = answer(
-            loaded,
-            model=model,
-            tail_rate=tail_rate,
-            friction=friction,
-            resolution=fineness,
-            placement=placement,
-            phase=angle(phase),
-            frame=frame,
-        )
+        found = around()
         written = {}
         if output is not None:
             written[output] = found.plane(plane, offset=offset, extent=extent, resolution=resolution, progress=progress)
@@ -126,3 +156,18 @@ def flow(
         for path, dataset in written.items():
             write_flow(found, dataset, path)
     renderer.show(flow_answer(found, written), json=json)
+
+
+def _check_run(given: dict[str, Any], time: str | None, phase: str, model: str) -> None:
+    """Refuse what a run says itself.
+
+    Raises:
+        InputError: if it is given, or no moment.
+    """
+    stated = [name for name, value in given.items() if value is not None]
+    stated += ["phase"] if phase != "0rad" else []
+    stated += ["model"] if model not in ("auto", "tube") else []
+    if stated:
+        raise InputError(f"{stated[0]} together with a run, which says it; allowed: --run and --time alone")
+    if time is None:
+        raise InputError("no moment of the run; allowed: --time, such as 0.5s")

@@ -25,7 +25,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict, prepared
-from spirillum.units import KINDS, Kind, parse_option, show
+from spirillum.units import KINDS, Kind, parse_option
 from spirillum.version import versions
 
 if TYPE_CHECKING:
@@ -83,8 +83,7 @@ class Flow:
     @property
     def heading(self) -> Samples:
         """Unit vector along which the robot swims, in its axes, (3,): the channel's axis."""
-        pitch = 0.0 if self.seat is None else self.seat.pitch
-        return np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+        return np.array([1.0, 0.0, 0.0]) if self.seat is None else self.seat.forward
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -93,6 +92,12 @@ class Flow:
             return self.prediction.warnings
         walls = "the channel's walls are not computed: this is the flow in unbounded fluid"
         return (*self.prediction.warnings, walls)
+
+    def with_held_force(self) -> Flow:
+        """The same with the sideways force that the fluid's traction amounts to."""
+        force = self.field.wrench()[:3]
+        sideways = force - (force @ self.heading) * self.heading
+        return replace(self, held_force=float(np.linalg.norm(sideways)))
 
     def inside(self, points: Samples) -> np.ndarray:
         """Whether each point lies inside body, coupling or tail, or outside the tube, (n,).
@@ -216,8 +221,8 @@ def flow(
             then pulls at the robot; without them it swims free of force.
         resolution: of the model: `accuracy`, and with `tube` also `tolerance` and `phases`; None: the robot's own, but
             accuracy `high` with `slender`. The flow of `standard` leaves out the torque of the wire's spin.
-        placement: with `tube`, where in the channel the robot lies: `gap`, `eccentricity`, `pitch`, `tail_drop`,
-            `ends`, `flow`, each a quantity with its unit or a float in SI.
+        placement: with `tube`, where in the channel the robot lies: `gap`, `eccentricity`, `pitch`, `yaw`,
+            `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
         phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         frame: `lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the robot's forward
             velocity, not turning).
@@ -228,7 +233,6 @@ def flow(
     angle = parse_option("phase", phase, KINDS["angle"])
     if frame not in get_args(Frame):
         raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
-    _check_not_yawed(placement)
     robot = load(robot)
     choice = _choice(model, robot, placement)
     wanted = Resolution.of(resolution)
@@ -246,9 +250,7 @@ def flow(
     )
     prediction = replace(prediction, choice=choice)
     around = Flow(prediction, _field(prediction, angle), angle, cast("Frame", frame))
-    force = around.field.wrench()[:3]
-    sideways = force - (force @ around.heading) * around.heading
-    return replace(around, held_force=float(np.linalg.norm(sideways)))
+    return around.with_held_force()
 
 
 def _choice(model: str, robot: Robot, placement: Placement | Mapping[str, Any] | None) -> ModelChoice:
@@ -269,8 +271,7 @@ def _choice(model: str, robot: Robot, placement: Placement | Mapping[str, Any] |
 def _field(prediction: Prediction, phase: float) -> FluidField:
     """The flow of the predicted motion."""
     seat = _seat(prediction)
-    pitch = 0.0 if seat is None else seat.pitch
-    forward = prediction.forward_velocity * np.array([np.cos(pitch), 0.0, -np.sin(pitch)])
+    forward = prediction.forward_velocity * (np.array([1.0, 0.0, 0.0]) if seat is None else seat.forward)
     body, rotor = (
         np.concatenate([forward, [rate, 0.0, 0.0]])
         for rate in (prediction.body_rotation_rate, prediction.tail_rotation_rate)
@@ -304,20 +305,7 @@ def seat_in_tube(
     chosen = _choice(model, robot, placement).model
     if chosen != "tube":
         return None
-    _check_not_yawed(placement)
     return seat_of(prepared(robot, chosen, placement=placement, resolution=resolution)[2])
-
-
-def _check_not_yawed(placement: Placement | Mapping[str, Any] | None) -> None:
-    """Refuse a yawed robot: the flow in the tube is summed for one side, of which the other is the mirror image.
-
-    Raises:
-        InputError: for a yaw.
-    """
-    yaw = Placement.of(placement).yaw
-    if yaw:
-        why = "for the flow around a yawed robot is not computed"
-        raise InputError(f"placement.yaw = {show(yaw, 'deg')}; allowed: 0 deg, {why}")
 
 
 def plane_around(

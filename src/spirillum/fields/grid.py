@@ -110,9 +110,12 @@ def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -
         whole: show all of a tube that is not much wider than the box.
     """
     reach = (1.0 + _GLASS) * seat.radius
-    heights = [(seat.offset - x * np.sin(seat.pitch)) / np.cos(seat.pitch) for x in box["x"]]
-    up = reach / np.cos(seat.pitch)
-    glass = {"y": (-reach, reach), "z": (min(heights) - up, max(heights) + up)}
+    start, forward = seat.offset * seat.across[0], seat.forward  # the tube's axis in body axes
+    glass = {}
+    for axis, index in (("y", 1), ("z", 2)):
+        middles = [start[index] + (x - start[0]) * forward[index] / forward[0] for x in box["x"]]
+        half = reach / np.sqrt(1.0 - forward[index] ** 2)
+        glass[axis] = (min(middles) - half, max(middles) + half)
     if whole and reach < _WIDEST * box["y"][1]:
         return {**box, **glass}
     return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}

@@ -281,7 +281,10 @@ def _columns(strengths: Strengths, density: Amplitudes, forces: Samples, cut: fl
 
 
 def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float) -> Iterator[_Sources]:
-    """Forces at Gauss points of one panel, and on half circles about the robot's axis: the other half mirrors them."""
+    """Forces at Gauss points of one panel, on half circles about the robot's axis: the other half mirrors them.
+
+    Of a yawed robot, which has no mirror image in its tube, they stand on whole circles.
+    """
     panels, seat = solids.panels, solids.seat
     x_p, rho_p = panels.x[number], panels.rho[number]
     length = float(np.sum(np.hypot(np.diff(x_p), np.diff(rho_p))))
@@ -290,15 +293,19 @@ def _panel_columns(solids: Solids, number: int, density: Amplitudes, cut: float)
     cardinal = panels.cardinals(places)
     x, rho = cardinal @ x_p, cardinal @ rho_p
     modes = np.tensordot(cardinal, density, axes=(1, 0))  # (n, modes, 3)
-    level = seat.pitch == 0 and float(np.ptp(rho_p)) < 1e-9 * seat.radius
+    level = seat.level and float(np.ptp(rho_p)) < 1e-9 * seat.radius
+    around = np.pi if seat.yaw == 0 else 2.0 * np.pi
     distances = seat.distances(x, rho)
     for some in [slice(None)] if level else [slice(at, at + 1) for at in range(x.size)]:
         orders = seat.radius * cut / float(np.min(distances[some]))
         count = int(0.6 * (orders + density.shape[1])) + 12
-        theta = np.pi * (np.arange(count) + 0.5) / count
+        count = round(count * around / np.pi)
+        theta = around * (np.arange(count) + 0.5) / count
         points = _ring_points(x[some], rho[some], theta)
         weight = 2.0 * np.pi / count * gauss[some] * rho[some]
         acting = _ring_forces(weight[:, None, None] * modes[some], theta) @ seat.rotation.T
+        if seat.yaw:  # a force is the sum of its even and its odd half, which cancel in its mirror image
+            acting = np.repeat(acting.sum(axis=2, keepdims=True), 2, axis=2)
         yield _Sources.of(seat.placed(points.reshape(-1, 3)).reshape(points.shape), acting)
 
 

@@ -167,6 +167,12 @@ class Seat:
         along, up, right = self.rotation[0]
         return np.array([along, -right, up])
 
+    @property
+    def across(self) -> Samples:
+        """Up and right about the tube's axis in body axes, (2, 3): a body point p lies at `across @ p`, less e up."""
+        along, up, right = self.rotation[1:].T
+        return np.stack([along, -right, up], axis=1)
+
     def placed(self, points: Samples) -> Samples:
         """Points in the robot's axes as points about the tube's axis, (n, 3)."""
         moved: Samples = points @ self.rotation.T - np.array([0.0, self.offset, 0.0])

@@ -43,7 +43,7 @@ from spirillum.swimming.steady import (
 )
 from spirillum.units import KINDS, parse_option, show
 
-__all__ = ["Prediction", "checked_batch", "predict", "prepared"]
+__all__ = ["Prediction", "checked_batch", "least_gap", "predict", "prepared"]
 
 _LARGEST_REYNOLDS = 0.1
 _GAP_STEP = 1.02
@@ -362,13 +362,25 @@ def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None
 
 
 def _least_gap(batch: RobotBatch, model: SwimmerModel) -> str:
-    """Where only a thin film keeps a model from an answer: the least gap that it resolves, to 2 %, and what else helps.
+    """Where only a thin film keeps a model from an answer: the least gap that it resolves, and what else helps."""
+    least = least_gap(batch, model) if model.placed else float("nan")
+    if not np.isfinite(least):
+        return ""
+    return f"; here at least placement.gap = {show(least, 'mm')}, or a table (`spirillum prepare`)"
+
+
+def least_gap(batch: RobotBatch, model: SwimmerModel) -> float:
+    """Least gap that a model resolves where only the film is too thin for it, to 2 %, m; NaN where that is not so.
 
     It is looked for between the gap that is asked for and the one that is taken where none is.
+
+    Args:
+        batch: one robot in its place.
+        model: a model that computes the walls.
     """
     asked = batch.placement.gap
-    if asked is None or not model.placed:
-        return ""
+    if asked is None:
+        return float("nan")
 
     def fits(gap: float) -> bool:
         placed = batch.placement.model_copy(update={"gap": gap})
@@ -376,11 +388,11 @@ def _least_gap(batch: RobotBatch, model: SwimmerModel) -> str:
 
     low, high = asked, GAP_SHARE * 0.5 * float(batch.body_diameter[0])
     if low >= high or not fits(high):
-        return ""
+        return float("nan")
     while high > _GAP_STEP * low:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if fits(middle) else (middle, high)
-    return f"; here at least placement.gap = {show(high, 'mm')}, or a table (`spirillum prepare`)"
+    return high
 
 
 def _rate(value: str | float | None, placement: Placement) -> float | None:

@@ -305,6 +305,8 @@ def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
     yield f"gap {placement['gap']['value'] / lengths.factor:.4g} {lengths.unit}"
     if flow.seat is not None and flow.seat.pitch:
         yield f"pitch {np.degrees(flow.seat.pitch):.4g}°"
+    if flow.seat is not None and flow.seat.yaw:
+        yield f"yaw {np.degrees(flow.seat.yaw):.4g}°"
     if "tail_drop" in placement:
         yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
     mean = Scale.of(np.array([motion.plug_velocity]), "m/s")

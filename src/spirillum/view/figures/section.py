@@ -88,18 +88,20 @@ def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -
 
 def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
     """Corners of the bore's section, clockwise, m, (n, 2); it is carried on beyond both ends of the panel."""
-    cos, sin = np.cos(seat.pitch), np.sin(seat.pitch)
+    first, second = ("xyz".index(axis) for axis in plane)
+    third = 3 - first - second
+    start = seat.across[:, third] * offset - [seat.offset, 0.0]
+    along, up = seat.across[:, first], seat.across[:, second]  # on the wall |start + x along + y up| = R
     if plane == "yz":
         angle = -2.0 * np.pi * _SAMPLES
-        height = (seat.offset - offset * sin) / cos
-        return np.column_stack([seat.radius * np.cos(angle), height + seat.radius / cos * np.sin(angle)])
+        circle = seat.radius * np.stack([np.sin(angle), -np.cos(angle)])
+        corners = np.linalg.solve(np.column_stack([along, up]), circle - start[:, None]).T
+        return np.asarray(corners, dtype=float)
     x = ends.mean() + 0.55 * np.ptp(ends) * np.linspace(-1.0, 1.0, 800)
-    if plane == "xz":
-        middle = (seat.offset - x * sin) / cos
-        half = np.full(x.size, np.sqrt(max(seat.radius**2 - offset**2, 0.0)) / cos)
-    else:
-        middle = np.zeros(x.size)
-        half = np.sqrt(np.maximum(seat.radius**2 - (x * sin + offset * cos - seat.offset) ** 2, 0.0))
+    there = start + x[:, None] * along
+    size = float(up @ up)
+    middle: Values = -(there @ up) / size
+    half = np.sqrt(np.maximum(middle**2 - (np.sum(there**2, axis=1) - seat.radius**2) / size, 0.0))
     upper, lower = np.column_stack([x, middle + half]), np.column_stack([x, middle - half])
     return np.concatenate([upper, lower[::-1]])
 

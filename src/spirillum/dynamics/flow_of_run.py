@@ -1,0 +1,135 @@
+"""The flow around a robot at a moment of its run in the tube: place, tail and rates are those of the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+import numpy as np
+
+from spirillum.dynamics.poses import rotation_matrix
+from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.errors import InputError, did_you_mean
+from spirillum.fields.flow import Flow, Frame
+from spirillum.fields.in_tube import tube_flow_field
+from spirillum.fluid.tube.tube import Tube
+from spirillum.robot.actuation import FrictionReading
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.load import with_resolution
+from spirillum.robot.options import Resolution
+from spirillum.robot.placement import Placement
+from spirillum.swimming.answer import STEADY, Swimming
+from spirillum.swimming.prediction import Prediction, checked_batch, least_gap
+from spirillum.swimming.steady import requirements
+from spirillum.units import KINDS, parse_option, show
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+
+__all__ = ["flow_of_run"]
+
+_NEEDED = ("offset", "azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow", "attitude", "velocity")
+"""What a run in a tube has beside that of any free run."""
+
+_TOLERANCE = 0.03
+
+
+def flow_of_run(
+    run: str | Path | xr.Dataset,
+    time: str | float,
+    *,
+    frame: str = "lab",
+    resolution: Resolution | Mapping[str, Any] | None = None,
+) -> Flow:
+    """The flow around a robot at a moment of a run by `simulate` with the model `tube`.
+
+    Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
+    wall. No force and torque but weight, contact and a field act on the robot. A film that is thinner than can be
+    resolved is drawn as thick as the thinnest that can, with the same velocities, and a warning says so.
+
+    Args:
+        run: its file, or its dataset.
+        time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
+        frame: `lab` (that of the channel), or `body` (moving with the robot's velocity along the channel).
+        resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03: a yawed
+            robot has no mirror image, which makes it ten times as expensive as others.
+
+    Raises:
+        InputError: for another run, a moment outside it, or a place that cannot be resolved.
+    """
+    if frame not in get_args(Frame):
+        raise InputError(f"frame = {frame!r}{did_you_mean(str(frame), get_args(Frame))}; allowed: lab, body")
+    dataset = open_run(run) if isinstance(run, str | Path) else run
+    moment = parse_option("time", time, KINDS["time"])
+    missing = [name for name in _NEEDED if name not in dataset]
+    if missing:
+        raise InputError(
+            f"the run has no {missing[0]}; allowed: a free run in a tube, by `spirillum simulate --model tube`"
+        )
+    times = np.asarray(dataset["time"].values, dtype=float)
+    if not times[0] <= moment <= times[-1]:
+        raise InputError(
+            f"time = {show(moment, 's')} is outside the run; allowed: {show(times[0], 's')} to {show(times[-1], 's')}"
+        )
+    now = dataset.isel(time=int(np.argmin(np.abs(times - moment))))
+    prediction, phase, body, rotor = _motion(now, resolution)
+    field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
+    around = Flow(prediction, field, phase, cast("Frame", frame))
+    return around.with_held_force()
+
+
+def _motion(
+    now: xr.Dataset, resolution: Resolution | Mapping[str, Any] | None
+) -> tuple[Prediction, float, np.ndarray, np.ndarray]:
+    """The motion as an answer, the tail's phase, and the twists of body and rotor, all in axes that do not roll."""
+    from scipy.spatial.transform import Rotation
+
+    wanted = {"form": "direct", "tolerance": _TOLERANCE} | Resolution.of(resolution).model_dump(exclude_none=True)
+    robot = with_resolution(robot_of(now), wanted, "tube")
+    azimuth, pitch, yaw, gap = (float(now[name]) for name in ("azimuth", "wall_pitch", "wall_yaw", "wall_gap"))
+    axes = Rotation.from_euler("XZY", [azimuth, yaw, -pitch]).as_matrix()
+    turned = axes.T @ rotation_matrix(now["attitude"].values)
+    phase = (np.arctan2(turned[2, 1], turned[1, 1]) + float(now["tail_phase"])) % (2.0 * np.pi)
+    velocity, spin = axes.T @ now["velocity"].values, axes.T @ now["angular_velocity"].values
+    body = np.concatenate([velocity, spin])
+    rotor = body + float(now["motor_rotation_rate"]) * np.eye(6)[3]
+    mean_flow = float(now["mean_flow"])
+    asked = {"gap": gap, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
+    batch = RobotBatch.of(robot, Placement.of(asked))
+    thinnest = least_gap(batch, Tube()) if broken(requirements(batch, Tube())) else gap
+    warnings = [line for line in str(now.attrs.get("warnings", "")).split("\n") if line]
+    if gap < thinnest:
+        warnings.append(
+            f"the film of {show(gap, 'um')} under the body is thinner than can be resolved: the robot is drawn "
+            f"{show(thinnest - gap, 'um')} further off the wall, with the same velocities, and the pressure in the "
+            "film is not that of the run"
+        )
+    batch = checked_batch(
+        robot, Tube(), Placement.of({**asked, "gap": max(gap, thinnest) if np.isfinite(thinnest) else gap})
+    )
+    nothing = {item.name: np.array([np.nan]) for item in STEADY}
+    known = {
+        "forward_velocity": float(now["velocity"].values[0]),
+        "body_rotation_rate": float(now["body_rotation_rate"]),
+        "tail_rotation_rate": float(now["tail_rotation_rate"]),
+        "plug_velocity": mean_flow,
+    }
+    swimming = Swimming(
+        **(nothing | {name: np.array([value]) for name, value in known.items()}), valid=np.array([True])
+    )
+    friction = cast("FrictionReading", str(now.attrs.get("friction", robot.friction.reading)))
+    found = Prediction(
+        robot,
+        Tube(),
+        friction,
+        calibrated=False,
+        batch=batch,
+        swimming=swimming,
+        error_estimate=float("nan"),
+        warnings=tuple(warnings),
+        motion="free",
+    )
+    return found, phase, body, rotor

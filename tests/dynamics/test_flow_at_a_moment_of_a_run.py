@@ -1,0 +1,55 @@
+"""The flow at a moment of a run: solved for anew, its traction carries the robot's weight, wherever it lies."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import spirillum as sp
+
+AZIMUTH = 0.4
+
+
+@pytest.fixture(scope="module")
+def run() -> xr.Dataset:
+    """Far from the wall, above the lowest place and to the side: sinking, with its tail turning."""
+    timing = {"duration": "0.1 s"}
+    return sp.simulate(
+        "biorob2012-wide", model="tube", placement={"gap": "6 mm"}, in_tube={"azimuth": AZIMUTH}, timing=timing
+    )
+
+
+def test_traction_carries_the_weight_and_nothing_along_the_tube(run: xr.Dataset) -> None:
+    """The table moved it, a coarse solution of the flow answers: to their errors."""
+    flow = sp.flow_of_run(run, 0.0, resolution={"tolerance": 0.05})
+    weight = sp.load("biorob2012-wide").derived()["submerged_weight"].value
+    force, seat = flow.field.wrench()[:3], flow.seat
+    assert seat is not None
+    up, right = seat.across @ force
+    assert up == pytest.approx(-weight * np.cos(AZIMUTH), rel=0.03)
+    assert abs(right) == pytest.approx(weight * np.sin(AZIMUTH), rel=0.03)
+    assert abs(force @ seat.forward) < 1e-3 * weight
+    assert flow.held_force == pytest.approx(weight, rel=0.03)
+    assert flow.prediction.tail_rotation_rate == float(run["tail_rotation_rate"][0])
+
+
+@pytest.mark.parametrize(
+    ("time", "options", "words"),
+    [
+        ("1 s", {}, "time = 1 s is outside the run; allowed: 0 s to 0.1 s"),
+        ("1", {}, 'time = "1" has no unit'),
+        ("0 s", {"frame": "tail"}, "frame = 'tail'; allowed: lab, body"),
+    ],
+)
+def test_wrong_moments_are_refused(run: xr.Dataset, time: str, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(sp.InputError, match=re.escape(words)):
+        sp.flow_of_run(run, time, **options)
+
+
+def test_another_run_is_refused(run: xr.Dataset) -> None:
+    with pytest.raises(sp.InputError, match="the run has no wall_yaw; allowed: a free run in a tube"):
+        sp.flow_of_run(run.drop_vars("wall_yaw"), 0.0)
