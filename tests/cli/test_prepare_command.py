@@ -7,6 +7,8 @@ import json
 import pytest
 
 import spirillum as sp
+from spirillum.cli.renderer import progress_bar
+from spirillum.fluid.tube.announced import announcement
 from spirillum.swimming.preparation import Prepared
 
 
@@ -53,3 +55,16 @@ def test_a_table_that_is_not_kept_says_so() -> None:
 def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
     with pytest.raises(sp.InputError, match="workers = "):
         sp.prepare_all(["biorob2012-wide"], workers=workers)
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[str], quiet: bool) -> None:
+    """A line on standard error, also where no progress bar is shown."""
+    with progress_bar(quiet=quiet) as progress:
+        progress(announcement(60, 2), 0, 60)
+        progress("table of the tube", 1, 60)
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert " ".join(shown.err.split()).startswith(
+        "no table of this tube yet: it is made now, once, from 60 places, in about 20 min with 2 processes"
+    )

@@ -19,6 +19,10 @@ __all__ = ["patience", "progress_bar", "show", "with_files"]
 _NARROWEST = 80
 
 
+_PACE = 900.0
+"""Time over which the pace of work is averaged, s: a place of a table takes half a minute."""
+
+
 class _PipedConsole(Console):
     """A console that leaves a reader who has gone, as `| head` does, to the caller."""
 
@@ -73,19 +77,52 @@ def patience(model: str, *, quiet: bool) -> Iterator[None]:
 
 @contextmanager
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """A progress bar on standard error; silent for `--json` and where nobody watches."""
-    if quiet:
-        yield lambda _what, _done, _total: None
-        return
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    """A progress bar on standard error with the time left; silent for `--json` and where nobody watches.
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    That a table is made, which takes minutes, is a line of its own on standard error in any case.
+    """
+    from spirillum.fluid.tube.announced import ANNOUNCED
+
+    console = Console(stderr=True, soft_wrap=True)
+    if quiet:
+
+        def announce(what: str, _done: int, _total: int) -> None:
+            if what.startswith(ANNOUNCED):
+                console.print(what, highlight=False)
+
+        yield announce
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    bar = Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=_PACE
+    )
     task = bar.add_task("starting", total=None)
+    before = [0, 0]
 
     def tell(what: str, done: int, total: int) -> None:
+        if what.startswith(ANNOUNCED):
+            bar.console.print(what, highlight=False)
+            return
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen
+        if total != before[1] or done < before[0]:  # other work has another pace
+            bar.reset(task)
+        before[:] = done, total
         bar.update(task, description=escape(what), completed=done, total=total)
 
     try:

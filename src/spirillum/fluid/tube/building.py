@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.fluid.tube.announced import announcement
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, Places
@@ -59,6 +60,9 @@ def built_tables(
     start = time.perf_counter()
     every = [Places(geometry, radius) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
+    if progress is not None:
+        count = sum(len(some) for some in nodes)
+        progress(announcement(count, workers), 0, count)
     found = iter(solutions([place for some in nodes for place in some], "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
     held = [_held_out(places) for places in every]

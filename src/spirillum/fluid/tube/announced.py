@@ -1,0 +1,24 @@
+"""What is said before a table is made, which takes minutes that nobody has asked for by name."""
+
+from __future__ import annotations
+
+__all__ = ["ANNOUNCED", "announcement"]
+
+ANNOUNCED = "no table of this tube yet"
+"""How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
+_SECONDS = 40.0
+"""Time that a place takes one process, s; measured for the paper's robot, less for short bodies and wide gaps."""
+
+
+def announcement(places: int, workers: int) -> str:
+    """That tables are made, and about how long it takes.
+
+    Args:
+        places: number of places that are solved for.
+        workers: number of processes.
+    """
+    minutes = max(round(places * _SECONDS / max(workers, 1) / 60.0), 1)
+    return (
+        f"{ANNOUNCED}: it is made now, once, from {places} places, in about {minutes} min with "
+        f"{'1 process' if workers == 1 else f'{workers} processes'}; an interruption loses none that are done"
+    )
