@@ -91,7 +91,8 @@ def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path:
 
 def test_two_robots_start_together(tab: Any) -> None:
     tab.page.click("#tab-compare")
-    tab.until("spirillum.lanes.length == 2 && spirillum.frame.lanes.length == 2 && spirillum.frame.lanes[1].ready")
+    tab.until("spirillum.lanes.length == 2 && spirillum.frame.lanes.length == 2")
+    tab.until("spirillum.frame.lanes.every(lane => lane.ready)")
     tab.command(do="duty", lane=1, value=0.5)
     tab.command(do="step")
     tab.until("spirillum.scene.lanes[1].duty == 0.5")

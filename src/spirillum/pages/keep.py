@@ -30,12 +30,12 @@ def asset(name: str) -> str:
 
 def robot_file(lane: Lane) -> str:
     """The robot as it stands, as the text of a robot file."""
-    return robot_text(lane.predicted().robot(), f"From the page of spirillum {own_version()}.")
+    return robot_text(lane.predicted(), f"From the page of spirillum {own_version()}.")
 
 
 def command_line(lane: Lane) -> str:
     """Commands that give the same steady numbers, and a run like the one that is seen."""
-    settings, model = lane.predicted(), _model(lane)
+    settings, model = lane.told(), _model(lane)
     words = [_source(settings), "--model", model]
     for field, value in _overrides(settings).items():
         words += ["--set", f"{field}={value}"]
@@ -49,7 +49,7 @@ def command_line(lane: Lane) -> str:
 
 def python_lines(lane: Lane) -> str:
     """The same in Python."""
-    settings, model = lane.predicted(), _model(lane)
+    settings, model = lane.told(), _model(lane)
     overrides = ", ".join(f"{field!r}: {value!r}" for field, value in _overrides(settings).items())
     placed = _placed(settings, model)
     where = f", placement={placed!r}" if placed else ""

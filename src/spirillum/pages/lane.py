@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
 from spirillum.pages.knobs import MODELS, Settings
-from spirillum.pages.motion import Moment, Motion
 from spirillum.pages.numbers import SERIES
 from spirillum.pages.recording import Recording, finite
 from spirillum.pages.shapes import shape_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot
-from spirillum.swimming.model_choice import choose_model, has_table
+
+if TYPE_CHECKING:
+    from spirillum.pages.motion import Moment, Motion
 
 __all__ = ["Built", "Lane", "build"]
 
@@ -36,13 +37,20 @@ class Built:
     """Whether a table would let it swim in its tube."""
 
 
-def build(settings: Settings) -> Built:
+def build(settings: Settings, robot: Robot) -> Built:
     """Lay a robot down; without a table for its tube it swims by a model without walls.
+
+    Args:
+        settings: what is set: place and model.
+        robot: the robot of these settings.
 
     Raises:
         InputError: for a robot or a place that the model does not know.
     """
-    robot, placed = settings.robot(), settings.placement()
+    from spirillum.pages.motion import Motion  # loads compiled loops: the page is there before
+    from spirillum.swimming.model_choice import choose_model, has_table
+
+    placed = settings.placement()
     if robot.drive is None:
         raise InputError(f"{robot.name} has no [drive]; allowed: a robot with one")
     asked = "auto" if settings.model == "tube" and robot.channel is not None else settings.model
@@ -81,7 +89,7 @@ class Lane:
     _undo: list[Settings] = field(default_factory=list)
     _redo: list[Settings] = field(default_factory=list)
     _last: tuple[str, float] = ("", 0.0)
-    _shape: tuple[Robot, dict[str, Any]] | None = None
+    _shape: tuple[Any, dict[str, Any]] | None = None
 
     @classmethod
     def of(cls, source: Any) -> Lane:
@@ -178,17 +186,25 @@ class Lane:
         self._redo.clear()
         self._last = (name, now)
 
-    def predicted(self) -> Settings:
-        """The settings whose steady swimming is told: at the duty of the remote."""
+    def predicted(self) -> Robot:
+        """The robot whose steady swimming is told: at the duty of the remote."""
         drive = self.robot.drive
         if drive is None or self.duty == drive.duty:
+            return self.robot
+        return self.robot.model_copy(update={"drive": drive.model_copy(update={"duty": self.duty})})
+
+    def told(self) -> Settings:
+        """The settings of that robot, as a command line gives them."""
+        if self.predicted() is self.robot:
             return self.settings
-        return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": repr(self.duty)})
+        return replace(self.settings, overrides={**self.settings.overrides, "drive.duty": f"{self.duty:.6g}"})
 
     def scene(self) -> dict[str, Any]:
         """What changes when something is set: shape, knobs, model, prediction."""
-        if self._shape is None or self._shape[0] is not self.robot:
-            self._shape = (self.robot, shape_of(self.robot))
+        robot = self.robot
+        solid = (robot.body, robot.seal, robot.coupling, robot.tail, robot.channel, robot.motor)
+        if self._shape is None or self._shape[0] != solid:
+            self._shape = (solid, shape_of(robot))
         built = self.built
         return {
             "robot": self.robot.name,

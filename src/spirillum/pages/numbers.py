@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spirillum.quantities import QUANTITIES
-from spirillum.swimming.prediction import Prediction
 from spirillum.units import for_people, shown_in
+
+if TYPE_CHECKING:
+    from spirillum.swimming.prediction import Prediction
 
 __all__ = ["SERIES", "TABLE", "prediction_answer", "quantity_list"]
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.pages.motion import Moment
 from spirillum.pages.numbers import SERIES
+
+if TYPE_CHECKING:
+    from spirillum.pages.motion import Moment
 
 __all__ = ["MOST", "Recording", "thinned"]
 

@@ -16,13 +16,14 @@ from spirillum.pages.lane import Built, Lane, build
 from spirillum.pages.numbers import prediction_answer, quantity_list
 from spirillum.pages.preparing import Preparing
 from spirillum.robot.load import load, preset_names
+from spirillum.robot.robot import Robot
 from spirillum.robot.text import robot_text
 
 __all__ = ["SLOWEST_PACE", "Theatre"]
 
 RATE = 30.0
 """Frames a second."""
-_LATE = 0.25
+_LATE = 1.0
 """Time by which the run may fall behind before it no longer tries to catch up, s."""
 SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
 _MOST_WAITING = 2_000
@@ -50,7 +51,7 @@ class Theatre:
         self._own = source if isinstance(source, str) and source in preset_names() else _tables(source)
         self._publish = publish
         self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
-        self._wanted: dict[int, tuple[int, str, Settings, Settings]] = {}
+        self._wanted: dict[int, tuple[int, str, Settings, Robot, Robot]] = {}
         self._work = threading.Condition()
         self._built: queue.Queue[tuple[int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
         self._lanes = [Lane.of(self._own)]
@@ -141,11 +142,15 @@ class Theatre:
         """All robots by the same time, so that they stay together."""
         self._behind = max(0.0, elapsed - 1.0 / RATE)
         dt = min(elapsed, _LATE) * self._pace
-        if any(lane.built is None and not lane.trouble for lane in self._lanes):
-            return  # those who are ready wait for those who are not
+        if not self._all_ready():
+            return
         with self._lock:
             for lane in self._lanes:
                 lane.advance(dt)
+
+    def _all_ready(self) -> bool:
+        """Those who are ready wait for those who are not."""
+        return all(lane.built is not None or lane.trouble for lane in self._lanes)
 
     def _listen(self, wait: float) -> bool:
         """Do what is asked; wait for something to come if there is nothing."""
@@ -214,8 +219,9 @@ class Theatre:
 
     def _step(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
         self._playing = False
-        for lane in self._lanes:
-            lane.advance(self._pace / RATE)
+        if self._all_ready():
+            for lane in self._lanes:
+                lane.advance(self._pace / RATE)
 
     def _set_pace(self, _lane: Lane, command: Mapping[str, Any]) -> None:
         self._pace = _number(command, SLOWEST_PACE, FASTEST_PACE)
@@ -252,7 +258,7 @@ class Theatre:
         self._asked[index:] = [asked]
         with self._work:
             known = "" if lane.built is None else lane.built.model
-            self._wanted[index] = (lane.generation, known, lane.settings, lane.predicted())
+            self._wanted[index] = (lane.generation, known, lane.settings, lane.robot, lane.predicted())
             self._work.notify()
 
     def _build(self) -> None:
@@ -263,23 +269,23 @@ class Theatre:
                 if self._ending.is_set():
                     return
                 index = next(iter(self._wanted))
-                generation, model, settings, predicted = self._wanted.pop(index)
+                generation, model, settings, robot, predicted = self._wanted.pop(index)
             try:
                 if not model:
-                    built = build(settings)
+                    built = build(settings, robot)
                     model = built.model
                     self._built.put((index, generation, built, None, ""))
                     self._wake_up()
-                self._built.put((index, generation, None, self._numbers(predicted, model), ""))
+                self._built.put((index, generation, None, self._numbers(predicted, settings, model), ""))
             except InputError as error:
                 self._built.put((index, generation, None, None, str(error)))
             self._wake_up()
 
-    def _numbers(self, settings: Settings, model: str) -> dict[str, Any]:
+    def _numbers(self, robot: Robot, settings: Settings, model: str) -> dict[str, Any]:
         from spirillum.swimming.prediction import predict
 
         placement = settings.placement() if model == "tube" else None
-        return prediction_answer(predict(settings.robot(), model=model, placement=placement))
+        return prediction_answer(predict(robot, model=model, placement=placement))
 
     def _receive(self) -> bool:
         """Take what was built, unless something else was set meanwhile."""
