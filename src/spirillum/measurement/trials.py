@@ -169,7 +169,9 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     flags = flags_of(fits, track, robot)
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
-    quantities |= {name: _with_errors(fits[name], "rad/s", *_drifts(track, name)) for name in rates}
+    quantities |= {
+        name: _with_errors(fits[name], "rad/s", *_drifts(track, name), _timing(fits[name], track)) for name in rates
+    }
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _POSITION_ERROR * pixel)
     quantities["heading"] = _mean(track, track.heading, "rad", _HEADING_ERROR * _LONG * pixel / robot.body.length)
@@ -267,6 +269,11 @@ def _with_errors(rate: Rate, unit: str, *errors: float) -> Measured:
 def _drift(track: Track, error: float) -> float:
     """Standard error of a rate by an error that drifts over the length of the track."""
     return error / float(np.ptp(track.time)) if track.time.size > 1 else 0.0
+
+
+def _timing(rate: Rate, track: Track) -> float:
+    """Standard error of a rate by the uncertain length of the film in time."""
+    return track.time_uncertainty * abs(rate.value) if math.isfinite(rate.value) else 0.0
 
 
 def _drifts(track: Track, name: str) -> list[float]:

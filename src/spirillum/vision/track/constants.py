@@ -390,6 +390,50 @@ class CutConstants:
 
 
 @dataclass(frozen=True)
+class LostFramesConstants:
+    """Frames lost while the times go on evenly (`lost_frames`)."""
+
+    fewest: int = 20
+    """Fewest steps of a series that tell its usual step."""
+    windows: tuple[int, ...] = (1, 3, 5, 9)
+    """Frames before and after a step whose medians are compared, one after the other."""
+    rounds: int = 30
+    """Most rounds of correcting times and looking again, for each of them."""
+    around: int = 60
+    """Frames through which the local slope is taken."""
+    most: int = 40
+    """Most frames that may be lost in a row; beyond it, the film is cut."""
+    spike: float = 5.0
+    """Distance from the neighbours' median, over the standard error of a step, from which on a frame is misread."""
+    beyond: float = 3.0
+    """Step over its standard error from which on it is no part of the local slope."""
+    clear: float = 30.0
+    """Chi-square by which a loss has to fit better than none."""
+    apart: float = 12.0
+    """Chi-square by which it has to fit better than any other number of frames."""
+    fits: float = 16.0
+    """Largest chi-square of a loss that fits, for each series."""
+    largest_share: float = 0.35
+    """Share of the steps with a loss from which on the usual step is not known."""
+    odd_share: float = 0.2
+    """Unclear steps over clear losses from which on nothing is given."""
+    power: float = 50.0
+    """Chi-square of the loss of one frame below which further ones may hide."""
+    told: float = 4.0
+    """Size of all losses over the standard error from which on a series sees them."""
+    agrees: float = 0.15
+    """Difference of a series from the size of the losses that is allowed in any case."""
+    tail_error: float = radians(0.5)
+    """Least standard error of a step of the tail, rad."""
+    body_error: float = radians(0.1)
+    """Least standard error of a step of the body, rad."""
+    place_error: float = 0.02
+    """Least standard error of a step of the place, pixels."""
+    half: float = 0.5
+    """Standard error of a loss that one series alone tells, over the loss."""
+
+
+@dataclass(frozen=True)
 class VisibilityConstants:
     """Second robots, wrong directions, gaps, robots that leave, and glare (`warnings`)."""
 
@@ -439,5 +483,6 @@ STRIPES = StripeConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
+LOST_FRAMES = LostFramesConstants()
 VISIBILITY = VisibilityConstants()
 FOLLOWING = FollowingConstants()

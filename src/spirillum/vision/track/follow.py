@@ -19,10 +19,11 @@ from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
-from spirillum.vision.track.constants import FOLLOWING
+from spirillum.vision.track.constants import FOLLOWING, LOST_FRAMES
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.first_look import Start, on_the_way
 from spirillum.vision.track.identity import Identified, identify
+from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.search import candidates, refined
 from spirillum.vision.track.size import checked_scale
@@ -170,15 +171,17 @@ def _track(
     seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
     cut = cut_off(record.placed)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
+    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
+    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
+    time = restored.time
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     scale, size_flags = checked_scale(sight.scale, body, known.size)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
-    frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
     return Track(
         time=time,
         frame=frame,
@@ -195,7 +198,19 @@ def _track(
         setup=setup,
         video=video.name,
         words=video.words,
-        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *cuts, *roll_flags, *tail_flags, *odd),
+        time_uncertainty=restored.relative_error,
+        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *restored.flags, *cuts, *roll_flags, *tail_flags, *odd),
+    )
+
+
+def _readings(
+    body: Samples, tail: Samples, x: Samples, known: Identified, optics: Optics
+) -> tuple[Reading, Reading, Reading]:
+    """The series whose steps tell lost frames, with the least standard errors of a step."""
+    return (
+        Reading(tail, 2.0 * np.pi, LOST_FRAMES.tail_error),
+        Reading(body, known.stripes.period, LOST_FRAMES.body_error),
+        Reading(x, np.inf, LOST_FRAMES.place_error * optics.length_per_pixel),
     )
 
 

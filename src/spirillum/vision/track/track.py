@@ -21,7 +21,7 @@ class Track:
     """
 
     time: Samples = field(repr=False)
-    """Time of each frame in the video, s, (n,)."""
+    """Time of each frame in the video, s, (n,); corrected where frames were lost while the times went on evenly."""
     frame: Samples = field(repr=False)
     """Number of each frame in the video, counted as it was recorded where that is known, (n,)."""
     position: Samples = field(repr=False)
@@ -52,3 +52,5 @@ class Track:
     """What to know about it."""
     words: str = ""
     """What the video's file says of itself, such as that it is synthetic."""
+    time_uncertainty: float = 0.0
+    """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""

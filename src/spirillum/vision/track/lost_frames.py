@@ -1,0 +1,256 @@
+"""Frames that were lost while the time stamps stay even, from the steps of tail, body and place.
+
+A simple recording script states even times, or a constant rate, whatever the camera delivered. Where k frames are
+lost, all of the motion goes on by 1 + k steps on one frame. In steady motion each step gives its own estimate of k:
+sum of squares over the three series, each step modulo the period of its angle, weighted by the scatter of its steps.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from spirillum.arrays import Samples
+from spirillum.robust import mad_scale, running_median
+from spirillum.vision.flag import Flag
+from spirillum.vision.track.constants import LOST_FRAMES
+from spirillum.vision.track.warnings import EVERYTHING
+
+__all__ = ["Reading", "Restored", "restored_times"]
+
+
+class Reading(NamedTuple):
+    """One series of a film, as it was read on each frame."""
+
+    values: Samples
+    """Position, m, or angle modulo `period`, rad, (n,); NaN where unreadable."""
+    period: float
+    """Period of the angle, rad; infinite for a position."""
+    least: float
+    """Least standard error of a step."""
+
+
+class Restored(NamedTuple):
+    """Times with the lost frames put back."""
+
+    time: Samples
+    """Corrected time of each frame, s, (n,); the given times where nothing was corrected."""
+    relative_error: float
+    """Relative standard uncertainty that doubtful steps leave in the length of the film."""
+    flags: tuple[Flag, ...]
+    """What was corrected, or why nothing is given."""
+
+
+class _Jumps(NamedTuple):
+    """Jumps of one series at each step, against the straight line through its neighbourhood."""
+
+    jump: Samples
+    """Median of some frames after the step minus that of as many before it, modulo the period, (m,); NaN: unknown."""
+    usual: Samples
+    """Usual step in the time of one frame, (m,)."""
+    error: float
+    """Robust standard error of a jump."""
+    period: float
+
+
+def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
+    """Find frames that are missing although the times go on evenly, and correct the times where that is clear.
+
+    A loss counts where the jumps prefer it to none by `LOST_FRAMES.clear` in chi-square, and to any other number by
+    `LOST_FRAMES.apart`. Jumps between neighbouring frames are taken first, then those between medians of more and
+    more frames, which show smaller steps. All losses together have to be seen by each series that can see them.
+    Otherwise nothing is given, as also if too many jumps are clear but not by whole frames, or if further losses of
+    one frame could not be seen. Losses by which no series moves clearly stay unseen: slow robots, even rates.
+
+    Args:
+        time: time of each frame as the film states it, s, (n,).
+        readings: the series: tail, body and position.
+    """
+    none = Restored(time, 0.0, ())
+    if time.size <= LOST_FRAMES.fewest or np.any(np.diff(time) <= 0):
+        return none
+    frame = float(np.median(np.diff(time)))
+    lost = np.zeros(time.size - 1, dtype=np.int64)
+    odd = np.zeros(lost.shape, dtype=bool)
+    for wide in LOST_FRAMES.windows:
+        for _ in range(LOST_FRAMES.rounds):
+            series = _all_jumps(_later(time, lost, frame), readings, frame, wide)
+            more, odd = _losses(series, wide) if series else (np.zeros_like(lost), odd)
+            lost += more
+            if not more.any():
+                break
+    if not lost.any():
+        return none
+    after = _all_jumps(_later(time, lost, frame), readings, frame, LOST_FRAMES.windows[-1])
+    many = np.count_nonzero(lost) > LOST_FRAMES.largest_share * lost.size
+    power = sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in after)
+    stray = int(np.sum(odd & ~(lost > 0)))
+    if (
+        many
+        or power < LOST_FRAMES.power
+        or stray > max(2.0, LOST_FRAMES.odd_share * lost.sum())
+        or not all(_agrees(one, lost) for one in after)
+    ):
+        return none._replace(flags=(_uneven(int(np.count_nonzero(lost)) + stray),))
+    corrected = _later(time, lost, frame)
+    # A loss that one series alone tells is half believed.
+    alone = sum(_sees(one, lost) for one in after) < 2
+    doubt = (LOST_FRAMES.half * float(np.sqrt(np.sum(lost**2))) if alone else 0.0) + stray
+    length = float(corrected[-1] - corrected[0])
+    return Restored(corrected, doubt * frame / length, (_corrected(lost, doubtful=doubt > 0),))
+
+
+def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
+    """Times with lost frames put back, s, (n,)."""
+    return time + frame * np.concatenate([[0.0], np.cumsum(lost)])
+
+
+def _losses(series: list[_Jumps], wide: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frames lost at each step, (m,), and a mask of jumps that stand out without being whole frames, (m,)."""
+    counts = np.arange(LOST_FRAMES.most + 1)
+    misfit = np.asarray(sum(_misfit(one, counts) for one in series))
+    rows = np.arange(len(misfit))
+    best = np.argmin(misfit, axis=1)
+    gain = misfit[:, 0] - misfit[rows, best]
+    others = misfit.copy()
+    others[rows, best] = np.inf
+    second = others.min(axis=1) - misfit[rows, best]
+    stands_out = gain > LOST_FRAMES.clear
+    clear = stands_out & (second > LOST_FRAMES.apart) & (misfit[rows, best] < LOST_FRAMES.fits * len(series))
+    lost, odd = np.zeros(best.shape, dtype=np.int64), stands_out & ~clear
+    for place in np.argsort(-gain):  # a jump shows at all steps within the window: the clearest is taken
+        near = slice(max(0, place - wide), place + wide + 1)
+        if clear[place] and not lost[near].any():
+            lost[place] = best[place]
+            odd[near] = False
+    return lost, odd
+
+
+def _all_jumps(time: Samples, readings: tuple[Reading, ...], frame: float, wide: int) -> list[_Jumps]:
+    """Jumps of the series that move enough to tell lost frames.
+
+    Args:
+        time: times, s, (n,).
+        readings: the series.
+        frame: usual time between two frames, s.
+        wide: frames before and after a step whose medians are compared.
+    """
+    found = (_jumps(time, reading, frame, wide) for reading in readings)
+    return [one for one in found if one is not None]
+
+
+def _jumps(time: Samples, reading: Reading, frame: float, wide: int) -> _Jumps | None:
+    known = np.flatnonzero(np.isfinite(reading.values))
+    if known.size <= LOST_FRAMES.fewest:
+        return None
+    spans, steps = np.diff(time[known]), np.diff(reading.values[known])
+    rate = _usual_rate(steps, spans, reading.period)
+    excess = _wrapped(steps - rate * spans, reading.period)
+    level = np.full(time.size, np.nan)
+    level[known] = np.concatenate([[0.0], np.cumsum(excess)])
+    far = LOST_FRAMES.spike * max(float(mad_scale(excess)), reading.least)
+    _without_spikes(level, known, far)
+    rest = np.where(
+        np.abs(excess) > LOST_FRAMES.beyond / LOST_FRAMES.spike * far, 0.0, excess
+    )  # jumps are no part of the slope
+    drift = _local_slope(time[known], np.concatenate([[0.0], np.cumsum(rest)]))
+    padded = np.pad(level, wide, constant_values=np.nan)
+    windows = sliding_window_view(padded, wide)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # windows without any reading
+        medians = np.nanmedian(windows, axis=1)
+        away = np.nanmedian(
+            sliding_window_view(np.pad(np.where(np.isfinite(level), time, np.nan), wide, constant_values=np.nan), wide),
+            axis=1,
+        )
+    before, after = slice(1, time.size), slice(1 + wide, time.size + wide)
+    slope = np.interp(0.5 * (time[1:] + time[:-1]), time[known], drift)
+    jump = _wrapped(medians[after] - medians[before] - slope * (away[after] - away[before]), reading.period)
+    good = np.isfinite(jump)
+    if good.sum() < LOST_FRAMES.fewest:
+        return None
+    error = max(float(mad_scale(jump[good])), reading.least / np.sqrt(wide))
+    usual = (rate + slope) * frame
+    return _Jumps(jump, usual, error, reading.period) if np.median(np.abs(usual)) > 0.1 * error else None
+
+
+def _without_spikes(level: Samples, known: np.ndarray, far: float) -> None:
+    """Leave out frames farther than `far` from the median of their neighbours: misread ones. A lasting jump stays."""
+    values = level[known]
+    level[known[np.abs(values - running_median(values, 5)) > far]] = np.nan
+
+
+def _usual_rate(steps: Samples, spans: Samples, period: float) -> float:
+    """Median rate of the steps, each modulo the period about their circular mean."""
+    if np.isfinite(period):
+        middle = float(np.angle(np.mean(np.exp(2j * np.pi * steps / period)))) * period / (2.0 * np.pi)
+        steps = middle + _wrapped(steps - middle, period)
+    return float(np.median(steps / spans))
+
+
+def _local_slope(time: Samples, values: Samples) -> Samples:
+    """Slope about each frame, from medians at both ends of a neighbourhood of `LOST_FRAMES.around` frames, (n,)."""
+    wide = min(LOST_FRAMES.around, time.size - 1) // 4
+    ends = sliding_window_view(values, wide)
+    medians, times = np.median(ends, axis=1), sliding_window_view(time, wide).mean(axis=1)
+    last = medians.size - 1
+    place = np.arange(time.size) - wide // 2
+    low, high = np.clip(place - 2 * wide, 0, last), np.clip(place + 2 * wide, 0, last)
+    return np.asarray((medians[high] - medians[low]) / (times[high] - times[low]))
+
+
+def _misfit(steps: _Jumps, counts: np.ndarray) -> Samples:
+    """Chi-square of each number of lost frames at each step, (m, counts); 0 where the series says nothing."""
+    off = _wrapped(steps.jump[:, None] - counts[None, :] * steps.usual[:, None], steps.period)
+    return np.nan_to_num((off / steps.error) ** 2, nan=0.0)
+
+
+def _sees(steps: _Jumps, lost: np.ndarray) -> bool:
+    """Whether the series can tell the losses from none, taken together."""
+    at = (lost > 0) & np.isfinite(steps.jump)
+    return bool(np.sqrt(np.sum((lost[at] * steps.usual[at]) ** 2)) > LOST_FRAMES.told * steps.error)
+
+
+def _agrees(steps: _Jumps, lost: np.ndarray) -> bool:
+    """Whether the series has the losses' size; a series that cannot see them agrees.
+
+    What jumps are left with the corrected times is regressed on the losses: 0 within four standard errors, or within
+    `LOST_FRAMES.agrees`.
+    """
+    if not _sees(steps, lost):
+        return True
+    at = (lost > 0) & np.isfinite(steps.jump)
+    wanted = lost[at] * steps.usual[at]
+    square = float(np.sum(wanted**2))
+    left = abs(float(np.sum(wanted * steps.jump[at]))) / square
+    return bool(left < max(4.0 * steps.error / np.sqrt(square), LOST_FRAMES.agrees))
+
+
+def _wrapped(values: Samples, period: float) -> Samples:
+    """Values modulo the period, nearest to 0."""
+    return values if not np.isfinite(period) else values - period * np.round(values / period)
+
+
+def _corrected(lost: np.ndarray, *, doubtful: bool) -> Flag:
+    count, places = int(lost.sum()), int(np.count_nonzero(lost))
+    frames = "1 frame is" if count == 1 else f"{count} frames are"
+    where = "at 1 place" if places == 1 else f"at {places} places"
+    words = (
+        f"{frames} missing {where} although the times of the frames go on evenly: the motion goes on by whole steps "
+        "there, and the times were corrected by it"
+    )
+    if doubtful:
+        words += "; not all of the series show it, so that all intervals are wider"
+    return Flag("lost-frames", words + " (record with the camera's own time stamps)")
+
+
+def _uneven(count: int) -> Flag:
+    sentence = (
+        f"on {count} frames the motion goes on by more than a step while the times go on evenly, but not clearly by "
+        "whole frames: frames were lost, or the motor stutters; nothing is given: record with the camera's own time "
+        "stamps"
+    )
+    return Flag("uneven-steps", sentence, EVERYTHING)

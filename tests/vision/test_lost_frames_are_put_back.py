@@ -1,0 +1,71 @@
+"""Frames lost while the times go on evenly are put back, or nothing is given; whole films stay as they are."""
+
+import numpy as np
+import pytest
+
+from spirillum.vision.track.lost_frames import Reading, Restored, restored_times
+
+PIXEL, FPS = 2.5e-4, 30.0
+
+
+def film(
+    lost: int, seed: int, *, burst: int = 1, stray: float = 0.0, noise: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, tuple[Reading, ...]]:
+    """Even and true times, and readings of a robot at 1 mm/s, -0.12 Hz and 1.2 Hz; noise as on degraded films."""
+    rng = np.random.default_rng(seed)
+    count = 300 + lost
+    kept = np.ones(count, dtype=bool)
+    first = 1 + rng.permutation(count - 2 - burst)[: lost // burst]
+    kept[np.concatenate([first + k for k in range(burst)]).astype(int)] = False
+    true = np.arange(count)[kept] / FPS
+    x = 1e-3 * true + 0.05 * noise * PIXEL * rng.normal(size=true.size)
+    body = -2 * np.pi * 0.12 * true + 0.006 * noise * rng.normal(size=true.size)
+    tail = 2 * np.pi * 1.2 * true + 0.03 * noise * rng.normal(size=true.size)
+    misread = rng.random(true.size) < stray
+    tail[misread] += rng.uniform(-3.0, 3.0, misread.sum())
+    readings = (
+        Reading(tail % (2 * np.pi), 2 * np.pi, 0.009),
+        Reading(body % np.pi, np.pi, 0.002),
+        Reading(x, np.inf, 0.02 * PIXEL),
+    )
+    return np.arange(true.size) / FPS, true, readings
+
+
+def restored(time: np.ndarray, readings: tuple[Reading, ...]) -> tuple[Restored, list[str]]:
+    found = restored_times(time, readings)
+    return found, [flag.name for flag in found.flags]
+
+
+@pytest.mark.parametrize(
+    ("lost", "burst", "stray"), [(1, 1, 0.0), (7, 1, 0.0), (21, 1, 0.0), (15, 15, 0.0), (7, 1, 0.03)]
+)
+def test_lost_frames_are_counted_and_put_where_they_were(lost: int, burst: int, stray: float) -> None:
+    for seed in range(2):
+        time, true, readings = film(lost, seed, burst=burst, stray=stray)
+        found, names = restored(time, readings)
+        assert names == ["lost-frames"]
+        assert f"{lost} frame" in found.flags[0].sentence
+        assert abs(found.time[-1] - true[-1] - found.time[0] + true[0]) < 1e-9
+        assert np.mean(np.abs(found.time - true) > 0.5 / FPS) < 0.05  # a loss is placed to a few frames
+        assert found.relative_error < 0.01
+
+
+@pytest.mark.parametrize(("stray", "noise"), [(0.0, 1.0), (0.03, 1.0), (0.0, 3.0)])
+def test_whole_films_keep_their_times(stray: float, noise: float) -> None:
+    time, _, readings = film(0, 5, stray=stray, noise=noise)
+    found, names = restored(time, readings)
+    assert names == []
+    assert found.time is time
+
+
+def test_true_gaps_are_no_loss() -> None:
+    _, true, readings = film(21, 3)
+    assert restored(true, readings)[1] == []
+
+
+def test_a_tail_that_steps_alone_is_not_believed() -> None:
+    time, _, readings = film(0, 4)
+    tail = readings[0].values + 2 * np.pi * 1.2 / FPS * np.searchsorted([60, 110, 150, 190, 240], np.arange(time.size))
+    found, names = restored(time, (Reading(tail % (2 * np.pi), 2 * np.pi, 0.009), *readings[1:]))
+    assert names != ["lost-frames"] or found.relative_error > 0
+    assert names
