@@ -66,6 +66,9 @@ class Limit:
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))
+        lack, colon, name = self.field.partition(": ")
+        if colon and np.isinf(value):  # there is none
+            return f"{lack}; allowed: a {name} of {self.relation} {show(bound, self.unit)}, because {self.why}"
         return (
             f"{self.field} = {show(value, self.unit)}; allowed: {self.relation} {show(bound, self.unit)}, "
             f"because {self.why}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,6 +33,8 @@ def posterior_figure(found: Calibrated) -> Figure:
     assert posterior is not None  # noqa: S101 - drawn for a posterior only
     every = {name: values.reshape(-1) for name, values in posterior.values().items()}
     names = list(every)[:_MOST]
+    scales = _scales(found, {name: every[name] for name in names})
+    drawn = {name: every[name] / scales[name].factor for name in names}
     count = len(names)
     colour = look_of_model(found.problem.model.name).colour
     with styled():
@@ -55,15 +57,29 @@ def posterior_figure(found: Calibrated) -> Figure:
                     axes.remove()
                     continue
                 if row == column:
-                    _marginal(axes, every[name], colour)
+                    _marginal(axes, drawn[name], colour)
                 else:
-                    _pair(axes, every[name], every[below], colour)
+                    _pair(axes, drawn[name], drawn[below], colour)
                 _ticks(axes, left=column == 0 and row > 0, bottom=row == count - 1)
                 if row == count - 1:
-                    axes.set_xlabel(_label(name), fontsize=7)
+                    axes.set_xlabel(_label(name) + _unit(scales[name], "\n"), fontsize=7)
                 if column == 0 and row > 0:
-                    axes.set_ylabel(_label(below), fontsize=7)
+                    axes.set_ylabel(_label(below) + _unit(scales[below], "\n"), fontsize=7)
         return sheet.finished()
+
+
+def _scales(found: Calibrated, values: Mapping[str, Samples]) -> dict[str, Scale]:
+    """Units of numbers by their labels; that of a discrepancy or a factor is empty."""
+    units = {item.label: item.parameter.unit for item in found.problem.coordinates}
+    return {
+        label: Scale.of(np.abs(column), units[label]) if units.get(label) else Scale(1.0, "")
+        for label, column in values.items()
+    }
+
+
+def _unit(scale: Scale, between: str) -> str:
+    """A unit in brackets behind a name; nothing for a plain number."""
+    return f"{between}({scale.unit})" if scale.unit else ""
 
 
 def _label(name: str) -> str:
@@ -138,16 +154,13 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
         )
         every = list(sheet.panels.flat)
         add_letters(every)
-        units = {item.label: item.parameter.unit for item in found.problem.coordinates}
+        scales = _scales(found, {profile.label: profile.values for profile in profiles})
         for axes, profile in zip(every, profiles, strict=False):
-            scale = Scale.of(np.abs(profile.values), units[profile.label]) if units[profile.label] else None
-            values, unit = (
-                (profile.values, "") if scale is None else (profile.values / scale.factor, f" ({scale.unit})")
-            )
-            axes.plot(values, profile.misfit, color=COLOURS["blue"], marker="o", markersize=2.5)
+            scale = scales[profile.label]
+            axes.plot(profile.values / scale.factor, profile.misfit, color=COLOURS["blue"], marker="o", markersize=2.5)
             axes.axhline(_LIMIT, color="#444444", linewidth=0.8, linestyle=":")
             axes.set_ylim(0.0, 3.2 * _LIMIT)
-            axes.set_xlabel(_label(profile.label).replace("\n", " ") + unit, fontsize=7.5)
+            axes.set_xlabel(_label(profile.label).replace("\n", " ") + _unit(scale, " "), fontsize=7.5)
             axes.xaxis.set_major_locator(MaxNLocator(3))
             axes.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
         for axes in every[len(profiles) :]:

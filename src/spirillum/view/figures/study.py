@@ -209,10 +209,7 @@ def _bound_picture(shown: StudyView) -> Picture:
     notes = []
     if bound:
         notes.append(
-            "The motor turns as fast as it can against the fluid alone (filled) or with the rotor's own friction "
-            "(hollow); contact with the channel slows a real robot down."
-            if shown.friction_unset
-            else "The motor turns against the fluid alone (filled) or with the robot file's friction (hollow)."
+            f"The motor turns {' or '.join(_frictions(shown))}; contact with the channel slows a real robot down."
         )
     if any(shown.paper_speed(channel) for channel in channels):
         notes.append(
@@ -231,6 +228,15 @@ def _bound_picture(shown: StudyView) -> Picture:
     )
     draw = partial(_draw_bound, shown, channels, wavelengths, title, notes)
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
+
+
+def _frictions(shown: StudyView) -> list[str]:
+    """Against what a motor turns under the readings that are drawn, with their marks where there are several."""
+    words = {"none": "as fast as it can against the fluid alone", "rotor": "with the rotor's own friction"}
+    readings = shown.own_drive_readings
+    found = [words.get(reading, f"with friction reading '{reading}'") for reading in readings]
+    marks = ("filled", "hollow")
+    return found if len(found) == 1 else [f"{one} ({mark})" for one, mark in zip(found, marks, strict=False)]
 
 
 def _draw_bound(

@@ -202,6 +202,11 @@ class StudyView:
         names, reading = ", ".join(self.with_intervals), self.own_drive_readings[-1]
         return f"Shades: 95 % intervals of the posterior ({names}, friction reading '{reading}'), discrepancy included."
 
+    @property
+    def _words_of_first_reading(self) -> str:
+        reading = self.own_drive_readings[0]
+        return "without friction" if reading == "none" else f"friction reading '{reading}'"
+
     def _band_words(self) -> str:
         if not self.banded:
             return ""
@@ -210,7 +215,7 @@ class StudyView:
         return (
             f"Bands: the least to the largest value over gaps of {np.nanmin(gaps) * 1e3:.3g} to "
             f"{np.nanmax(gaps) * 1e3:.3g} mm and pitches of {np.nanmin(pitches):.3g} to {np.nanmax(pitches):.3g} deg "
-            "(without friction), none of them likelier than another."
+            f"({self._words_of_first_reading}), none of them likelier than another."
         )
 
     def observed_motor_rate(self) -> tuple[Values, Values]:
