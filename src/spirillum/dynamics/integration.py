@@ -100,9 +100,9 @@ def integrate(
 
     Args:
         links: the robot.
-        start: state at time 0, (17,).
-        time: increasing sample times from 0, s.
-        switches: every switching, the first at 0.
+        start: state at the first sample, (17,).
+        time: increasing sample times, s.
+        switches: every switching, the first at the first sample.
         reach: what ends the run, or its drive.
         progress: told what is being computed, how many stretches are done, and of how many.
 
@@ -114,7 +114,7 @@ def integrate(
     events: list[Event] = []
     state, pending, end = start, list(switches), float(time[-1])
     spent = False
-    now = 0.0
+    now = float(time[0])
 
     def tell(moment: float) -> None:
         if progress is not None:

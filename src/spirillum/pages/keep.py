@@ -90,7 +90,7 @@ def replay_page(replay: dict[str, Any]) -> str:
     for name in MODULES:
         text = _IMPORT.sub(r'\1 "spirillum/\2"', asset(name))
         modules[f"spirillum/{name}"] = "data:text/javascript;base64," + base64.b64encode(text.encode()).decode()
-    data = json.dumps({**replay, "quantities": quantity_list()}).replace("<", "\\u003c")
+    data = json.dumps({"quantities": quantity_list(), **replay}).replace("<", "\\u003c")
     policy = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:"
     title = re.sub(r"[<>&\"]", "", str(replay["robot"]))[:100]
     return f"""<!doctype html>

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
 from spirillum.pages.knobs import MODELS, Settings
-from spirillum.pages.numbers import SERIES
+from spirillum.pages.numbers import SERIES, quantity_list
 from spirillum.pages.recording import Recording, finite
 from spirillum.pages.shapes import shape_of
 from spirillum.robot.batch import RobotBatch
@@ -223,6 +223,7 @@ class Lane:
             "preparing": self.preparing,
             "trouble": self.trouble,
             "numbers": self.numbers,
+            "quantities": quantity_list(self.numbers["rows"] if self.numbers else None),
             "warnings": list(self.robot.warnings),
             "undo": len(self._undo),
             "redo": len(self._redo),

@@ -6,13 +6,13 @@ the last piece ended.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.integration import BATTERY_EMPTY, Event, Trajectory, integrate
+from spirillum.dynamics.integration import BATTERY_EMPTY, Trajectory, integrate
 from spirillum.dynamics.poses import Pose
 from spirillum.dynamics.record import series_of
 from spirillum.dynamics.remote import Switch
@@ -35,6 +35,10 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 
 __all__ = ["Moment", "Motion"]
+
+
+_AT_ONCE = 1e-9
+"""A time in which nothing moves, s."""
 
 
 @dataclass(frozen=True)
@@ -142,8 +146,9 @@ class Motion:
             raise InputError(f"the run has ended: {self._ended}; allowed: a new start")
         asked = 0.0 if self._spent else duty
         run = self._in_tube(dt, asked) if isinstance(self._links, TubeRobot) else self._without_walls(dt, asked)
+        before = self._time
         self._duty, self._time, self._state = asked, float(run.time[-1]), run.states[-1].copy()
-        self._note(run.events)
+        self._note(run, before + dt)
         return self._moment(run)
 
     def now(self) -> Moment:
@@ -155,8 +160,8 @@ class Motion:
             last = Checkpoint(0.0, 0.0, ())
             return self._moment(TubeTrajectory(time, np.full(1, self._duty), states, observed, (), last))
         links = self._links.at_duty(self._duty)
-        run = integrate(links, self._state, np.array([0.0, 1e-9]), [Switch(0.0, self._duty)], self._reach)
-        return self._moment(replace(run, time=run.time + self._time))
+        times = np.array([self._time, self._time + _AT_ONCE])
+        return self._moment(integrate(links, self._state, times, [Switch(self._time, self._duty)], self._reach))
 
     def _in_tube(self, dt: float, duty: float) -> TubeTrajectory:
         assert isinstance(self._links, TubeRobot)  # noqa: S101 - the caller's promise
@@ -171,15 +176,14 @@ class Motion:
 
     def _without_walls(self, dt: float, duty: float) -> Trajectory:
         assert isinstance(self._links, TwoLinks)  # noqa: S101 - the caller's promise
-        run = integrate(self._links, self._state, np.array([0.0, dt]), [Switch(0.0, duty)], self._reach)
-        return replace(run, time=run.time + self._time)
+        times = np.array([self._time, self._time + dt])
+        return integrate(self._links, self._state, times, [Switch(self._time, duty)], self._reach)
 
-    def _note(self, events: tuple[Event, ...]) -> None:
-        for event in events:
-            if event.what == BATTERY_EMPTY:
-                self._spent = True
-            elif not event.what.startswith("duty") and " the wall" not in event.what:
-                self._ended = event.what
+    def _note(self, run: Trajectory, asked: float) -> None:
+        """What happened in a step that was to last until a time."""
+        self._spent = self._spent or any(event.what == BATTERY_EMPTY for event in run.events)
+        if run.time[-1] < asked - 1e-9 * asked:
+            self._ended = run.events[-1].what if run.events else "the equations have no next step"
 
     def _moment(self, run: Trajectory) -> Moment:
         series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from spirillum.quantities import QUANTITIES
-from spirillum.units import for_people, shown_in
+from spirillum.units import display_unit, shown_in
 
 if TYPE_CHECKING:
     from spirillum.swimming.prediction import Prediction
@@ -64,12 +65,17 @@ _LABELS = {
 }
 
 
-def quantity_list() -> dict[str, dict[str, Any]]:
-    """Label, unit, factor from SI, and meaning of all that is shown, from the registry."""
+def quantity_list(rows: Mapping[str, Any] | None = None) -> dict[str, dict[str, Any]]:
+    """Label, unit, factor from SI, and meaning of all that is shown, from the registry.
+
+    Args:
+        rows: values of a prediction, by whose size the units go: a bacterium's speed is read in um/s.
+    """
     found = {}
     for name in dict.fromkeys((*TABLE, *SERIES)):
         item = QUANTITIES[name]
-        unit = for_people(item.unit)
+        value = (rows or {}).get(name, {}).get("value")
+        unit = display_unit(value, item.unit)
         factor = 1.0 if unit == item.unit else 1.0 / _factor(unit)
         label = _LABELS.get(name, name.replace("_", " "))
         meaning = item.meaning + (f" ({item.source})" if item.source else "")

@@ -9,6 +9,7 @@ import { Section, sectionWords } from "./section.js";
 import { Stage } from "./stage.js";
 
 const PLOTS = ["forward_velocity", "tail_rotation_rate", "motor_current"];
+const PLOTS_OTHERWISE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate"];
 const HEADLINE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"];
 const EACH = 110; // ms between two drawings of numbers and plots: faster is not read
 const BEHIND = 0.12; // s; beyond it the page says that it is slower than asked
@@ -87,7 +88,7 @@ class Lane {
       this.shapeText = shape;
       this.shape = lane.shape;
       this.crossing.setShape(lane.shape, lane.roughness);
-      this.drawn = PLOTS.map((name) => {
+      this.drawn = (lane.drive === "dc-motor" ? PLOTS : PLOTS_OTHERWISE).map((name) => {
         const canvas = element("canvas", { role: "img", "aria-label": `${quantities[name].label} over time` });
         return new Plot(canvas, name, quantities[name]);
       });
@@ -107,6 +108,7 @@ class Lane {
     }
     this.crossing.roughness = lane.roughness;
     this.quantities = quantities;
+    for (const plot of this.drawn) plot.quantity = quantities[plot.name];
     for (const plot of this.drawn) plot.band = lane.numbers?.rows[plot.name]?.value != null && lane.remote ? lane.numbers.rows[plot.name] : null;
     this.trouble = lane.trouble;
     this.quietNote = lane.trouble ? "" : lane.caution ? (lane.needs_table ? "Without walls: no table for this tube yet" : "") : "";
@@ -166,7 +168,7 @@ function setScene(scene) {
     $("lanes").append(lane.element);
   }
   $("lanes").classList.toggle("two", scene.lanes.length > 1);
-  scene.lanes.forEach((lane, k) => state.lanes[k].setScene(lane, scene.quantities));
+  scene.lanes.forEach((lane, k) => state.lanes[k].setScene(lane, lane.quantities));
   state.chosen = Math.min(state.chosen, scene.lanes.length - 1);
   showPanel();
   $("play").innerHTML = scene.playing ? "&#10073;&#10073;" : "&#9654;";
@@ -184,7 +186,7 @@ function showPanel() {
     role: "tab", "aria-selected": String(k === chosen), text: `${"AB"[k]} \u00b7 ${one.robot}`,
     onclick: () => { state.chosen = k; showPanel(); },
   })));
-  numbers.show(lane, scene.quantities);
+  numbers.show(lane, lane.quantities);
   knobs.show(lane, chosen, scene);
   $("undo").disabled = lane.undo === 0;
   $("redo").disabled = lane.redo === 0;
@@ -300,7 +302,7 @@ async function replayNow() {
 
 function begin(run) {
   state.replay?.end();
-  state.replay = showReplay($("replay"), { ...run, quantities: state.scene.quantities }, () => {
+  state.replay = showReplay($("replay"), { ...run, quantities: run.quantities ?? state.scene.quantities }, () => {
     state.replay.end();
     state.replay = null;
     askForRun();
@@ -347,10 +349,10 @@ async function keep() {
 // Every frame
 
 function tick(at) {
+  requestAnimationFrame(tick);
   for (const lane of state.lanes) {
     if (state.tab !== "replay") lane.tick(at);
   }
-  requestAnimationFrame(tick);
 }
 
 new ResizeObserver(() => state.lanes.forEach((lane) => { lane.dirty = true; })).observe($("lanes"));

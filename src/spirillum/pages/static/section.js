@@ -46,7 +46,7 @@ export class Section {
       for (const disc of discs) {
         context.beginPath();
         const [x, y] = at(disc.y, disc.z);
-        context.ellipse(x, y, disc.wide * scale + grow, disc.narrow * scale + grow, disc.angle, 0, 2 * Math.PI);
+        context.ellipse(x, y, Math.max(disc.wide * scale + grow, 0), Math.max(disc.narrow * scale + grow, 0), disc.angle, 0, 2 * Math.PI);
         context.fill();
       }
     };

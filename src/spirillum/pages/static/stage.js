@@ -1,6 +1,6 @@
 // A robot on its stage: follows it with the camera, turns with the pointer and the keys, writes the ruler's numbers.
 
-import { colourOf, element, figure, fitted } from "./format.js";
+import { colourOf, element, fitted } from "./format.js";
 import { ANGLE, Renderer } from "./renderer.js";
 
 const VIEWS = {
@@ -124,7 +124,7 @@ export class Stage {
       const x = seen[0] * width;
       if (Math.abs(x - last) < 34) continue;
       last = x;
-      context.fillText(figure(k * 10 * ruler.mark, 4), x, seen[1] * height + 4);
+      context.fillText(String(Number((k * 10 * ruler.mark).toPrecision(6))).replace("-", "\u2212"), x, seen[1] * height + 4);
     }
     const end = renderer.project([ruler.to, ruler.y - ruler.width * 1.5, level]);
     if (end && end[0] < 0.97) context.fillText(ruler.unit, end[0] * width + 14, end[1] * height + 4);
