@@ -2,10 +2,13 @@
 
 Truth is `tube` itself, solved at its default tolerance, at the same place and phase. Places are spread evenly in the
 logarithm of the distance from the floor, between a gap and the tube's axis, and over all pitches and phases of a table;
-a share of them has a yaw, which makes them four to eight times as expensive. Gaps below 0.2 mm are left out: there the
-film that a table adds is the better truth (`tests/fluid/test_film_and_rest_of_a_long_body.py`).
+a share of them has a yaw, up to twice that of the nodes, which makes them four to eight times as expensive. Gaps below
+0.2 mm are left out: there the film that a table adds is the better truth
+(`tests/fluid/test_film_and_rest_of_a_long_body.py`). Tails of several wavelengths share the work at each
+place.
 
-    OMP_NUM_THREADS=1 python benchmarks/tube_tables.py [--places 40] [--yawed 0.25] [--rows ROWS.jsonl] ROBOT...
+    OMP_NUM_THREADS=1 python benchmarks/tube_tables.py [--places 40] [--yawed 0.25] [--gap 0.2 1] [--tolerance 0.005]
+        [--wavelength 25 ...] [--rows ROWS.jsonl] ROBOT...
     OMP_NUM_THREADS=1 python benchmarks/tube_tables.py --grid ROBOT...
 
 The grid lies in the upper part of the tube; it takes two minutes of the processor for each robot. Places that stand in
@@ -17,6 +20,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,13 +33,13 @@ from spirillum.fluid.tube.rest import matrix_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tube import Tube, solved
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import INSIDE, contact_offset
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
 
 Row = dict[str, Any]
 _MOST_PITCH = 0.97  # of the largest
+_MOST_YAW = 2.0  # of that of the nodes, if the tail leaves room
 _GRID = (
     *((0.4, f, 0.0) for f in (0.45, -0.5)),
     *((0.66, f, 0.0) for f in (0.0, 0.45, 0.73, -0.45, -0.85)),
@@ -47,27 +51,28 @@ _GRID = (
 _GRID_PHASE, _GRID_TOLERANCE = 0.8, 0.005
 
 
-def drawn(places: Places, count: int, yawed: float, gap: float, seed: int) -> list[tuple[Seat, float]]:
+def drawn(places: Places, count: int, yawed: float, gaps: Sequence[float], seed: int) -> list[tuple[Seat, float]]:
     """Seats and phases.
 
     Args:
         places: of the table.
         count: how many.
         yawed: share of them that has a yaw.
-        gap: smallest, m.
+        gaps: smallest and largest, of a level robot, m; the largest may be left out for the tube's axis.
         seed: of the draw.
     """
     draw = np.random.default_rng(seed)
-    least = gap / contact_offset(places.rings, places.radius, 0.0)
+    room = contact_offset(places.rings, places.radius, 0.0)
+    least, most = gaps[0] / room, min(gaps[1] / room, 1.0) if len(gaps) > 1 else 1.0
     found: list[tuple[Seat, float]] = []
     while len(found) < count:
-        t, f = float(np.exp(draw.uniform(np.log(least), 0.0))), float(draw.uniform(-_MOST_PITCH, _MOST_PITCH))
-        yaw, phase = float(draw.uniform(-1.0, 1.0)) * places.yaw, float(draw.uniform(0.0, 2.0 * np.pi))
+        t, f = float(np.exp(draw.uniform(np.log(least), np.log(most)))), float(draw.uniform(-_MOST_PITCH, _MOST_PITCH))
+        yaw, phase = float(draw.uniform(-_MOST_YAW, _MOST_YAW)) * places.yaw, float(draw.uniform(0.0, 2.0 * np.pi))
         # evenly among them, so that the first few have both
         turned = int((len(found) + 1) * yawed) > int(len(found) * yawed)
         seat = places.seat_between(t, f, yaw if turned else 0.0)
         clear = places.tail_clearance(seat) > places.least_clearance
-        if clear and seat.clearance(places.geometry.body) >= gap:
+        if clear and seat.clearance(places.geometry.body) >= gaps[0]:
             found.append((seat, phase))
     return found
 
@@ -98,13 +103,24 @@ def summary(rows: list[Row]) -> list[str]:
     return lines
 
 
+def tails_of(name: str, wavelengths: Sequence[float]) -> list[tuple[str, TubeTable, RobotBatch]]:
+    """A robot, and the same with tails of other wavelengths, mm: a word for the tail, its table, the batch."""
+    found = []
+    for change in ({}, *({"tail.wavelength": f"{length:g} mm"} for length in wavelengths)):
+        robot = sp.load(name, **change)
+        found.append((" ".join(["", *change.values()]), sp.prepare(robot).table, RobotBatch.of(robot)))
+    return found
+
+
 def main() -> None:
     """Draw places, solve, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("robots", nargs="+", metavar="ROBOT")
     parser.add_argument("--places", type=int, default=40, help="of each robot")
     parser.add_argument("--yawed", type=float, default=0.25, help="share of the places that has a yaw")
-    parser.add_argument("--gap", type=float, default=0.2, help="smallest, mm")
+    parser.add_argument("--gap", type=float, nargs="+", default=[0.2], metavar="MM", help="smallest, and largest")
+    parser.add_argument("--tolerance", type=float, default=None, help="of waves and modes; default: that of `tube`")
+    parser.add_argument("--wavelength", type=float, nargs="+", default=[], metavar="MM", help="of tails beside the own")
     parser.add_argument("--grid", action="store_true", help="the grid instead of random places")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--rows", type=Path, default=None, help="file of rows, to be read and gone on with")
@@ -115,31 +131,30 @@ def main() -> None:
     rows: dict[str, list[Row]] = {name: [] for name in arguments.robots}
     asked = []
     for name in arguments.robots:
-        robot = sp.load(name)
-        table, batch = sp.prepare(robot).table, RobotBatch.of(robot)
-        places = Places(RobotGeometry.of(batch), table.radius)
+        tails = tails_of(name, arguments.wavelength)
+        places = Places(tails[0][1].geometry, tails[0][1].radius)
         if arguments.grid:
             seats = [(places.seat_between(t, f, yaw * places.yaw), _GRID_PHASE) for t, f, yaw in _GRID]
         else:
-            seats = drawn(places, arguments.places, arguments.yawed, 1e-3 * arguments.gap, arguments.seed)
-        asked.append([(name, number, table, places, *seat, batch) for number, seat in enumerate(seats)])
-    for turn in zip(*asked, strict=True):  # robots in turn
-        for name, number, table, places, seat, phase, batch in turn:
-            asked_for = "grid" if arguments.grid else f"{arguments.seed} {arguments.gap} {arguments.yawed}"
-            key = f"{name} {asked_for} {number}"
+            gaps = [1e-3 * gap for gap in arguments.gap]
+            seats = drawn(places, arguments.places, arguments.yawed, gaps, arguments.seed)
+        asked.append([(name, number, tails, places, *seat) for number, seat in enumerate(seats)])
+    tolerance = _GRID_TOLERANCE if arguments.grid else arguments.tolerance
+    asked_for = "grid" if arguments.grid else f"{arguments.seed} {arguments.gap} {arguments.yawed} {tolerance}"
+    for name, number, tails, places, seat, phase in (place for turn in zip(*asked, strict=True) for place in turn):
+        for tail, table, batch in tails:
+            key = f"{name}{tail} {asked_for} {number}"
             row = known.get(key)
             if row is None:
-                fineness = Tube().fineness(batch.options)
-                if arguments.grid:
-                    fineness = Fineness("standard", _GRID_TOLERANCE)
+                fineness = Tube().fineness(batch.options) if tolerance is None else Fineness("standard", tolerance)
                 row = {"key": key} | row_at(table, places, seat, phase, fineness)
                 if arguments.rows is not None:
                     with arguments.rows.open("a") as file:
                         file.write(json.dumps(row) + "\n")
             rows[name].append(row)
-            print(name, number, json.dumps(row), flush=True)
+            print(name, tail, number, json.dumps(row), flush=True)
     for name, some in rows.items():
-        print(f"\n{name}: {len(some)} places, {sum(row['yaw'] != 0 for row in some)} of them with a yaw\n")
+        print(f"\n{name}: {len(some)} answers, {sum(row['yaw'] != 0 for row in some)} of them with a yaw\n")
         print("\n".join(summary(some)))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics.free_motion import FreeMotion, free_motion
+from spirillum.dynamics.free_motion import FreeMotion, _said, _yawed_beyond_check, free_motion
 from spirillum.dynamics.resting_film import lubrication_resistance
 from spirillum.dynamics.tube_integration import observed_at
 from spirillum.dynamics.turn_map import TurnMap
@@ -156,3 +157,13 @@ def test_bad_input_is_one_sentence(overrides: dict[str, Any], options: dict[str,
         sp.settle(sp.load("biorob2012-wide", **overrides), **options)
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(("yaw", "known"), [(0.069, True), (-0.069, True), (0.071, False), (-0.071, False)])
+def test_error_is_stated_up_to_the_yaw_at_which_the_table_was_checked(yaw: float, known: bool) -> None:
+    """The wide robot's table has nodes, and places against which it was checked, up to 4 degrees."""
+    motion = found()
+    run = motion.run._replace(lying=replace(motion.run.lying, yaw=yaw))
+    said = " ".join(_said(run, motion.robot, weight=True))
+    assert _yawed_beyond_check(run, motion.robot) is not known
+    assert ("checked up to 4 deg: there is no error estimate" in said) is not known

@@ -9,17 +9,20 @@ import pytest
 
 import spirillum as sp
 from spirillum.fluid.tube import library
+from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import matrix_of
 from spirillum.fluid.tube.solids import Fineness
-from spirillum.fluid.tube.table import TubeTable
+from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import INSIDE, YAW_SLACK
+from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
+from spirillum.studies.spec import load_study
 
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
@@ -50,10 +53,18 @@ def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
     np.testing.assert_allclose(np.diag(other), np.diag(own), rtol=1e-9)
 
 
-def test_files_are_small() -> None:
+def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None:
+    study = load_study(paper_study())
+    batches = [RobotBatch.of(study.robot_at(index)) for index in range(study.count)]
+    keys = {key_of(RobotGeometry.of(batch), tube_radius(batch)) for batch in batches}
     files = list((Path(library.__file__).parent / "tables").glob("*.table"))
     assert len(files) >= 2
-    assert max(path.stat().st_size for path in files) < 80_000
+    for path in files:
+        table = TubeTable.read(path)
+        assert path.stem == table.key
+        assert table.key in keys
+        assert all(0 < error < 0.08 for error in table.error.values())
+        assert path.stat().st_size < 80_000
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -27,6 +27,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels.tube_table import yaw_of
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -118,7 +119,8 @@ def free_motion(
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = _means(held, links, run, prescribed=tail_rate is not None)
     warnings = (*held.warnings, *_said(run, links, weight=weight))
-    error = held.error_estimate if run.lying.state in ("steady", "orbits") else float("nan")
+    known = run.lying.state in ("steady", "orbits") and not _yawed_beyond_check(run, links)
+    error = held.error_estimate if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
     return FreeMotion(found, run, links, gap)
 
@@ -147,11 +149,21 @@ def _driven(links: TubeRobot, held: Prediction, *, prescribed: bool) -> TubeRobo
     return replace(links, drive=changed)
 
 
+def _yawed_beyond_check(run: LongRun, links: TubeRobot) -> bool:
+    """Whether it lies yawed further than the places against which its table was checked."""
+    return abs(run.lying.yaw) > yaw_of(links.table)
+
+
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     """What to be careful about, a sentence each."""
     found = []
     if weight and not links.weight.any():
         found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
+    if run.lying.state in ("steady", "orbits") and _yawed_beyond_check(run, links):
+        found.append(
+            f"it lies at a yaw of {np.degrees(run.lying.yaw):.3g} deg against the wall, and its table was checked up "
+            f"to {np.degrees(yaw_of(links.table)):.3g} deg: there is no error estimate"
+        )
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
         found.append(

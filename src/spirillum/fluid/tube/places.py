@@ -39,7 +39,7 @@ _SPACED = 1.3
 _UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
 _DOWN = (0.0, 0.28, 0.55, 0.8, 1.0)
 LARGEST_YAW = float(np.radians(4.0))
-"""Largest yaw of yawed places, rad."""
+"""Largest yaw of yawed places, rad: nose up, the tail is near the glass there; see `YAW_SLACK` of the kernel."""
 _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
 _SWEPT = 121
 """Points along the tail between which it is asked how near it comes to the glass."""
@@ -123,7 +123,8 @@ class Places:
     @cached_property
     def yaw_gaps(self) -> Samples:
         """Nodes t of yawed places."""
-        return self.gaps[[0, min(2, len(self.gaps) - 2), -1]]
+        last = len(self.gaps) - 1
+        return self.gaps[sorted({0, min(2, last - 1), last - 1, last})]
 
     @property
     def yaw_pitches(self) -> Samples:
