@@ -10,7 +10,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from spirillum.errors import InputError
-from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, Rate
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.knobs import Settings
 
 
@@ -133,7 +133,7 @@ def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> Non
 
 
 def test_rate_lets_a_burst_through_and_then_no_more() -> None:
-    rate = Rate(1e-6, 3.0)
+    rate = MessageRate(1e-6, 3.0)
     assert [rate.allowed() for _ in range(5)] == [True, True, True, False, False]
 
 

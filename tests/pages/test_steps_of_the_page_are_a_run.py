@@ -3,7 +3,7 @@
 import pytest
 
 import spirillum as sp
-from spirillum.pages.motion import Motion
+from spirillum.pages.motion import SteppedMotion
 from spirillum.robot.placement import Placement
 
 STEPS = (0.05, 1.0 / 30.0, 0.2, 1e-3, 0.0156666666666667)
@@ -13,7 +13,7 @@ STEPS = (0.05, 1.0 / 30.0, 0.2, 1e-3, 0.0156666666666667)
     ("robot", "model"), [("biorob2012-wide", "tube"), ("biorob2012-wide", "rft"), ("magnetic-helix", "rft")]
 )
 def test_steps_of_any_length_are_the_run_in_one_piece(robot: str, model: str) -> None:
-    motion = Motion(sp.load(robot), model=model, placement=Placement())
+    motion = SteppedMotion(sp.load(robot), model=model, placement=Placement())
     for dt in STEPS:
         moment = motion.step(dt, 1.0)
     run = sp.simulate(robot, model=model, timing={"duration": moment.time})
@@ -23,7 +23,7 @@ def test_steps_of_any_length_are_the_run_in_one_piece(robot: str, model: str) ->
 
 
 def test_remote_acts_where_simulate_switches() -> None:
-    motion = Motion(sp.load("biorob2012-wide"), model="tube", placement=Placement())
+    motion = SteppedMotion(sp.load("biorob2012-wide"), model="tube", placement=Placement())
     for duty in (1.0, 1.0, 0.0, 0.0, 1.0):
         moment = motion.step(0.05, duty)
     on = [("0 s", "0.1 s"), ("0.2 s", "0.25 s")]

@@ -15,7 +15,7 @@ import time
 from collections.abc import Mapping
 from http.cookies import CookieError, SimpleCookie
 
-__all__ = ["HEADERS", "LARGEST_MESSAGE", "Guard", "Rate"]
+__all__ = ["HEADERS", "LARGEST_MESSAGE", "Guard", "MessageRate"]
 
 HEADERS: Mapping[str, str] = {
     "Content-Security-Policy": (
@@ -93,7 +93,7 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-class Rate:
+class MessageRate:
     """So many messages a second, and some more at once."""
 
     def __init__(self, each_second: float, at_once: float) -> None:

@@ -16,7 +16,7 @@ from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from spirillum.pages.motion import Moment, Motion
+    from spirillum.pages.motion import Moment, SteppedMotion
 
 __all__ = ["Built", "Lane", "build"]
 
@@ -29,7 +29,7 @@ _MOST_UNDO = 200
 class Built:
     """A robot laid down, by which model, and what to be careful about."""
 
-    motion: Motion
+    motion: SteppedMotion
     model: str
     reason: str
     caution: str
@@ -47,7 +47,7 @@ def build(settings: Settings, robot: Robot) -> Built:
     Raises:
         InputError: for a robot or a place that the model does not know.
     """
-    from spirillum.pages.motion import Motion  # loads compiled loops: the page is there before
+    from spirillum.pages.motion import SteppedMotion  # loads compiled loops: the page is there before
     from spirillum.swimming.model_choice import choose_model, has_table
 
     placed = settings.placement()
@@ -60,7 +60,7 @@ def build(settings: Settings, robot: Robot) -> Built:
     walled = choice.model == "tube"
     if not walled:
         placed = placed.model_copy(update={"flow": None})
-    motion = Motion(robot, model=choice.model, placement=placed)
+    motion = SteppedMotion(robot, model=choice.model, placement=placed)
     caution = choice.caution
     if settings.run.get("flow") and not walled:
         caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"

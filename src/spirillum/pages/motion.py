@@ -34,7 +34,7 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 
-__all__ = ["Moment", "Motion"]
+__all__ = ["Moment", "SteppedMotion"]
 
 
 _AT_ONCE = 1e-9
@@ -55,7 +55,7 @@ class Moment:
     """Why the run ended here, in half a sentence; empty while it goes on."""
 
 
-class Motion:
+class SteppedMotion:
     """A free robot on its way, from rest; one writer, no threads."""
 
     def __init__(

@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
-from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, Rate
+from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
 from spirillum.pages.theatre import Theatre
@@ -147,7 +147,7 @@ class _House:
             self._count_those_who_look()
 
     async def _listen(self, socket: WebSocket, client: _Client) -> None:
-        rate, loop = Rate(_EACH_SECOND, _AT_ONCE), asyncio.get_running_loop()
+        rate, loop = MessageRate(_EACH_SECOND, _AT_ONCE), asyncio.get_running_loop()
         while True:
             text = await socket.receive_text()
             if len(text) > LARGEST_MESSAGE or not rate.allowed():
