@@ -8,7 +8,7 @@ from spirillum.robot.load import load
 from spirillum.vision.setup import CameraSetup, Markers, RobotSetup, Setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.track.motion import Motion
-from spirillum.vision.track.unwrapping import _largest_advance, contradictions, unwrapped
+from spirillum.vision.track.unwrapping import _largest_advance, contradictions, no_stripe_passes, unwrapped
 
 FPS = 30.0
 TURN = 2 * np.pi
@@ -164,3 +164,11 @@ def test_stripes_read_on_few_frames_give_no_rate():
     angle = np.where(np.arange(240) % 12 == 0, -0.7 * time % np.pi, np.nan)
     _, (flag,) = unwrapped(time, angle, np.full(240, 0.01), np.pi)
     assert (flag.name, flag.spoils) == ("stripes-unreadable", ("body_rotation_rate",))
+
+
+@pytest.mark.parametrize(("turned", "names"), [(2.0, ["stripes-do-not-pass"]), (8.0, [])])
+def test_a_body_that_rests_while_its_tail_turns_shows_no_stripes(turned: float, names: list[str]) -> None:
+    time = np.arange(150) / FPS
+    body = -np.radians(turned) * time / time[-1]
+    motion = Motion(time, 1e-4 * time, body, TURN * 1.2 * time)
+    assert [flag.name for flag in no_stripe_passes(motion, load("biorob2012-wide"))] == names

@@ -17,6 +17,7 @@ __all__ = [
     "named_rightly",
     "order_seen",
     "pattern_period",
+    "told_apart",
     "width_seen",
     "without_glare",
 ]
@@ -168,6 +169,27 @@ def named_rightly(palette: Samples, start: Samples) -> bool:
     cost = np.linalg.norm(_opponent(palette)[:, None] - _opponent(start), axis=-1)
     rows, columns = linear_sum_assignment(cost)
     return bool(np.trace(cost) <= 1.2 * cost[rows, columns].sum() + 1e-9)
+
+
+def told_apart(samples: Samples, palettes: tuple[Samples, Samples, Samples]) -> bool:
+    """Whether the classes that are seen are two or more, and differ as their names do.
+
+    Each pair has to differ by at least `COLOURS.contrast` of what their names differ by. Shades of a plain seal may be
+    learnt as colours: they differ by much less.
+
+    Args:
+        samples: colours of pixels of the stripes, (m, 3).
+        palettes: result of `colour_classes`.
+    """
+    palette, start, glare = palettes
+    nearest = _nearest(samples, np.concatenate([palette, glare]))
+    seen = [k for k in range(len(palette)) if np.mean(nearest == k) > COLOURS.seen]
+    if len(seen) < 2:
+        return False
+    learnt, named = _opponent(np.array([samples[nearest == k].mean(axis=0) for k in seen])), _opponent(start[seen])
+    one, other = np.triu_indices(len(seen), 1)
+    apart = [np.linalg.norm(colours[one] - colours[other], axis=-1) for colours in (learnt, named)]
+    return bool(np.all(apart[0] > COLOURS.contrast * apart[1]))
 
 
 def _renamed(palette: Samples, assigned: np.ndarray) -> Samples:

@@ -235,6 +235,10 @@ class ColourConstants:
     """Brightness of glare to begin with, of 255."""
     pale: float = 0.7
     """Ratio of the weakest to the strongest channel from which on a bright colour is glare."""
+    seen: float = 0.03
+    """Share of the samples from which on a class is seen."""
+    contrast: float = 0.25
+    """Least difference of two learnt colours over that of their names."""
     fits: float = 0.7
     """Share of neighbouring stripes that have to stand in a given order."""
 
@@ -350,6 +354,10 @@ class UnwrappingConstants:
     """Least displacement, over the body's length, of something that is not part of the background."""
     rest_angle: float = 0.02
     """Least rotation of something that is not part of the background, rad."""
+    seen_to_pass: float = radians(5.0)
+    """Least rotation of the body, rad, while the tail makes `tail_turns`: with less, no stripe was seen to pass."""
+    tail_turns: float = 2.0
+    """Turns of the tail after which a free body has to have turned."""
     leap: float = radians(25.0)
     """Deviation of a step of the body from the running median from which on it leaps, rad.
 

@@ -29,7 +29,7 @@ from spirillum.vision.track.search import candidates, refined
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
 from spirillum.vision.track.track import Track
-from spirillum.vision.track.unwrapping import contradictions, nothing_moves, unwrapped
+from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
 from spirillum.vision.video.frames import Frame, Video
 
@@ -181,6 +181,7 @@ def _track(
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
+    odd += no_stripe_passes(motion, body.robot)
     cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
     return Track(
         time=time,

@@ -19,6 +19,7 @@ from spirillum.vision.track.colours import (
     named_rightly,
     order_seen,
     pattern_period,
+    told_apart,
     width_seen,
     without_glare,
 )
@@ -111,6 +112,13 @@ class Stripes:
             other = self._refined(profiles, clear, scales, start)
             loss = self._typical_loss(profiles, scales, other)
             self.appearance, least = (other, loss) if loss < least else (self.appearance, least)
+        if not told_apart(facing, palettes):
+            sentence = (
+                f"the seal does not show the colours {', '.join(self.names)}: what was learnt for them hardly differs; "
+                "the body's rotation is not given: check robot.stripes, or paint the stripes"
+            )
+            self.flags = (Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",)),)
+            return
         rightly = named_rightly(self.appearance.palette, start)
         stated = 2.0 * np.pi / len(self.stripes)
         wide = width_seen(seen_steep, self.angles, (palette, *palettes[1:]), stated) / stated

@@ -19,7 +19,7 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import UNWRAPPING
 from spirillum.vision.track.motion import Motion
 
-__all__ = ["contradictions", "nothing_moves", "unwrapped"]
+__all__ = ["contradictions", "no_stripe_passes", "nothing_moves", "unwrapped"]
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -234,6 +234,29 @@ def nothing_moves(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
         "the picture; nothing is given"
     )
     return (Flag("nothing-moves", sentence, ("forward_velocity", *_RATES["body"], *_RATES["tail"])),)
+
+
+def no_stripe_passes(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
+    """Flag a body that stays where it is while its tail turns: shades of the lamp may have been taken for stripes.
+
+    Args:
+        motion: the robot's motion.
+        robot: the robot; body and tail of one with a fixed joint are one.
+    """
+    known = motion.body_angle[np.isfinite(motion.body_angle)]
+    turns = abs(_slope(motion.time, motion.tail_phase)[1]) / (2.0 * np.pi)
+    fixed = robot.drive is not None and robot.drive.joint == "fixed"
+    if fixed or known.size < UNWRAPPING.fewest_frames or turns < UNWRAPPING.tail_turns:
+        return ()
+    low, high = np.quantile(known, [0.02, 0.98])
+    if high - low > UNWRAPPING.seen_to_pass:
+        return ()
+    sentence = (
+        f"the body turns by less than {np.degrees(UNWRAPPING.seen_to_pass):.0f} degrees while its tail makes "
+        f"{turns:.1f} turns: no stripe was seen to pass, and shades of the lamp may be taken for stripes; the body's "
+        "rotation is not given: check that the seal has the stripes of the robot file"
+    )
+    return (Flag("stripes-do-not-pass", sentence, _RATES["body"]),)
 
 
 def contradictions(motion: Motion, robot: Robot, hand_seen: int = 0) -> tuple[Flag, ...]:

@@ -1,0 +1,27 @@
+"""Shades of a plain seal are no four colours; the named colours under any lamp are."""
+
+import numpy as np
+import pytest
+
+from spirillum.vision.track.colours import colour_classes, named_colours, told_apart
+
+NAMES = ("red", "yellow", "green", "blue")
+
+
+def samples(colours: np.ndarray, lamp: np.ndarray) -> np.ndarray:
+    """Pixels of some colours in light and shade, with noise."""
+    rng = np.random.default_rng(3)
+    shade = rng.uniform(0.5, 1.0, (400, len(colours), 1))
+    return (shade * colours * lamp + rng.normal(0.0, 6.0, (400, len(colours), 3))).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("lamp", [(1.0, 1.0, 1.0), (1.0, 0.85, 0.6), (0.4, 0.4, 0.4)])
+def test_painted_stripes_are_told_apart(lamp: tuple[float, ...]) -> None:
+    seen = samples(named_colours(NAMES), np.array(lamp))
+    assert told_apart(seen, colour_classes(seen, NAMES))
+
+
+@pytest.mark.parametrize("name", ["white", "green", "black", "blue"])
+def test_a_seal_of_one_colour_is_not(name: str) -> None:
+    seen = samples(named_colours([name]), np.ones(3))
+    assert not told_apart(seen, colour_classes(seen, NAMES))
