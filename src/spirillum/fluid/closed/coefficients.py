@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -131,7 +132,7 @@ def _domain_of_the_set(batch: RobotBatch) -> list[Limit]:
                 "model.rft.axis_height",
                 height,
                 "more than",
-                np.e * diameter / 4.0,
+                math.e * diameter / 4.0,
                 "mm",
                 "log(2 h/a) has to exceed 1",
                 "wire-too-close-to-floor",
