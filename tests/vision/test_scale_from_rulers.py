@@ -1,13 +1,17 @@
 """The camera that a drawn ruler gives back, and how uncertain numbers make lengths uncertain."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from spirillum.errors import InputError
+from spirillum.vision.camera.camera import sight_of
 from spirillum.vision.camera.optics import Optics, optics_of
 from spirillum.vision.camera.ruler import lines_in, still_picture
 from spirillum.vision.camera.scale import fitted_camera, given_camera
 from spirillum.vision.setup import Setup
+from spirillum.vision.video.frames import Video
 
 pytest.importorskip("cv2")
 
@@ -106,6 +110,12 @@ def test_pictures_without_a_ruler_show_none():
     tubes[60:63] += 60.0
     tubes[180:183] -= 60.0
     assert lines_in(tubes, BOUNDS) is None
+
+
+def test_a_portrait_film_is_told_to_be_turned() -> None:
+    film = Video(Path("portrait.mp4"), SIZE[::-1], 1.0, 30.0)
+    with pytest.raises(InputError, match=r"along the columns of the picture.*turn the film by a quarter"):
+        sight_of(film, setup(), np.rot90(ruler(camera())), None)
 
 
 def test_an_implausible_spacing_is_refused():

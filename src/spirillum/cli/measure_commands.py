@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -90,6 +91,7 @@ def measure(
             raise typer.Exit(1)
         return
     _check_no_expectations(expect_tail_rate, expect_body_rate, expect_speed, duration, fps, view_width)
+    from spirillum.measurement.trials import RATE_NAMES
     from spirillum.results.measurement import measure as answer
 
     with renderer.progress_bar(quiet=json) as progress:
@@ -113,6 +115,10 @@ def measure(
         more = "" if len(result.failures) == 1 else f" (and {len(result.failures) - 1} more)"
         where = "" if Path(video).name in sentence else f"{video}: "
         raise InputError(f"{where}{sentence}{more}")
+    values = [trial.quantities[name].value for trial in result.trials for name in RATE_NAMES]
+    if values and not any(math.isfinite(value) for value in values):
+        trial = result.trials[0]
+        raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
 
 
 def _check_no_expectations(*given: object) -> None:

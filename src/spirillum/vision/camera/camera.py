@@ -95,8 +95,15 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) ->
     lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size)
     if setup.markers.spacing is None:
         return given_camera(setup, video.size, lens)
-    lines = lines_in(still, bounds_of(setup, video))
+    bounds = bounds_of(setup, video)
+    lines = lines_in(still, bounds)
     if lines is None:
+        left, top, right, bottom = bounds
+        if lines_in(np.swapaxes(still, 0, 1), (top, left, bottom, right)) is not None:
+            raise InputError(
+                f"{video.name} shows its ruler along the columns of the picture; allowed: a channel along the rows: "
+                "turn the film by a quarter, so that the nose points to the side that robot.direction says"
+            )
         raise InputError(
             f"{video.name} shows no ruler: no equally spaced lines across the direction of swimming were found; "
             "allowed: a ruler and a channel along the rows of the picture, or markers.length_per_pixel"
