@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from spirillum.designs.design import design as design
     from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
+    from spirillum.dynamics.plant import Plant as Plant
     from spirillum.dynamics.prediction import predict as predict
     from spirillum.dynamics.settling import Settling as Settling
     from spirillum.dynamics.settling import settle as settle
@@ -68,6 +69,7 @@ _HOME = {
     "Measurement": "spirillum.measurement.measure",
     "ModelComparison": "spirillum.swimming.comparison",
     "Picture3D": "spirillum.view.scene3d.show",
+    "Plant": "spirillum.dynamics.plant",
     "Prediction": "spirillum.swimming.prediction",
     "Prepared": "spirillum.swimming.preparation",
     "Ranking": "spirillum.calibration.ranking",

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.arrays import Samples
 from spirillum.dynamics.averages import stretches_on
 from spirillum.dynamics.fitted_runs import DRAWS, check_draws, chosen_run, with_intervals
+from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
 from spirillum.dynamics.record import dataset_of, free_attributes
-from spirillum.dynamics.start import reach_of, start_state, turning_rate
+from spirillum.dynamics.start import reach_of, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
-from spirillum.dynamics.two_links import TwoLinks, two_links
+from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
 from spirillum.fitted.posterior_file import read_posterior
@@ -39,7 +39,7 @@ from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import friction_reading, requirements
-from spirillum.units import KINDS, parse_option, show
+from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,9 +192,8 @@ def _free_run(
     """A run with six degrees of freedom."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     end, time, switches = times.timetable(2.0 * np.pi / turning_rate(steady), own)
-    links = _links(steady, roughness, weight=weight)
-    start = start_state(steady.robot, placed, lying=float(links.weight[: rigid_links.MOMENT_BODY].sum()) > 0)
-    _check_clear(links, start, placed)
+    links = links_without_walls(steady, roughness, weight=weight)
+    start = resting_state(steady.robot, links, placed)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])
     run = integrate(links, start, moments, switches, reach, progress)
@@ -210,34 +209,6 @@ def _free_run(
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
-
-
-def _check_clear(links: TwoLinks, start: Samples, placement: Placement) -> None:
-    """Refuse a start at which body or tail touch the wall.
-
-    Raises:
-        InputError: if they do, naming what puts them there.
-    """
-    if not links.spots.size:
-        return
-    film, rough = kernel.thinnest_film(start, links.wall, links.spots), float(links.wall[kernel.ROUGHNESS])
-    if film > 0:
-        return
-    gap = film + rough
-    if gap > 0:
-        raise InputError(
-            f"roughness = {show(rough, 'um')} with a gap of {show(gap, 'um')} at the start; allowed: a roughness below "
-            "the gap, or a larger placement.gap"
-        )
-    if placement.pitch:
-        raise InputError(
-            f"placement.pitch = {show(placement.pitch, 'deg')}: body or tail would cut into the wall; allowed: a "
-            "smaller pitch, or a larger placement.gap"
-        )
-    raise InputError(
-        f"the robot would start at the wall of channel.diameter = {show(2 * links.wall[kernel.RADIUS], 'mm')}; "
-        "allowed: a larger placement.gap or a smaller placement.eccentricity"
-    )
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
@@ -278,20 +249,6 @@ def _check_held(
     ]
     if given:
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
-
-
-def _links(steady: Prediction, roughness: float | None, *, weight: bool) -> TwoLinks:
-    effective = steady.effective_friction
-    return two_links(
-        steady.robot,
-        steady.batch,
-        steady.model,
-        friction=steady.friction,
-        effective=0.0 if np.isnan(effective) else effective,
-        calibrated=steady.calibrated,
-        weight=weight,
-        roughness=roughness,
-    )
 
 
 def _first_form(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:

@@ -16,7 +16,7 @@ from spirillum.robot.load import load, preset_names
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from spirillum.pages.motion import Moment, SteppedMotion
+    from spirillum.dynamics.plant import Moment, Plant
 
 __all__ = ["Built", "Lane", "build"]
 
@@ -29,7 +29,7 @@ _MOST_UNDO = 200
 class Built:
     """A robot laid down, by which model, and what to be careful about."""
 
-    motion: SteppedMotion
+    plant: Plant
     model: str
     reason: str
     caution: str
@@ -47,7 +47,7 @@ def build(settings: Settings, robot: Robot) -> Built:
     Raises:
         InputError: for a robot or a place that the model does not know.
     """
-    from spirillum.pages.motion import SteppedMotion  # loads compiled loops: the page is there before
+    from spirillum.dynamics.plant import Plant  # loads compiled loops: the page is there before
     from spirillum.swimming.model_choice import choose_model, has_table
 
     placed = settings.placement()
@@ -60,11 +60,11 @@ def build(settings: Settings, robot: Robot) -> Built:
     walled = choice.model == "tube"
     if not walled:
         placed = placed.model_copy(update={"flow": None})
-    motion = SteppedMotion(robot, model=choice.model, placement=placed)
+    plant = Plant(robot, model=choice.model, placement=placed)
     caution = choice.caution
     if settings.run.get("flow") and not walled:
         caution = (caution + "; " if caution else "") + "the imposed flow is left out, which only 'tube' knows"
-    return Built(motion, choice.model, choice.reason, caution, needs)
+    return Built(plant, choice.model, choice.reason, caution, needs)
 
 
 @dataclass
@@ -140,7 +140,7 @@ class Lane:
     def take(self, built: Built) -> None:
         """The robot is laid down."""
         self.built, self.trouble = built, ""
-        self.moment = built.motion.now()
+        self.moment = built.plant.observe()
         self.recording = Recording()
         self.recording.add(self.moment, self.duty if self.remote else 0.0)
 
@@ -150,7 +150,7 @@ class Lane:
             return
         duty = self.duty if self.remote else 0.0
         try:
-            self.moment = self.built.motion.step(dt, duty)
+            self.moment = self.built.plant.step(dt, duty=duty)
         except InputError as error:
             self.trouble = str(error)
             return
@@ -164,7 +164,7 @@ class Lane:
             self.settings = before
             return False
         try:
-            self.built.motion.flow(self.settings.placement().flow)
+            self.built.plant.impose_flow(self.settings.placement().flow)
         except InputError:
             self.settings = before
             raise
@@ -219,7 +219,7 @@ class Lane:
             "reason": built.reason if built else "",
             "caution": built.caution if built else "",
             "needs_table": built.needs_table if built else False,
-            "roughness": built.motion.roughness if built else None,
+            "roughness": built.plant.roughness if built else None,
             "preparing": self.preparing,
             "trouble": self.trouble,
             "numbers": self.numbers,

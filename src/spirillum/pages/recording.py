@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.pages.numbers import SERIES
 
 if TYPE_CHECKING:
-    from spirillum.pages.motion import Moment
+    from spirillum.dynamics.plant import Moment
 
 __all__ = ["MOST", "Recording", "thinned"]
 

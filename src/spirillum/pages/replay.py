@@ -87,7 +87,7 @@ def replay_of_lane(lane: Lane, run: dict[str, Any]) -> dict[str, Any]:
         "robot": lane.robot.name,
         "model": lane.built.model if lane.built else "",
         "shape": shape_of(lane.robot),
-        "roughness": lane.built.motion.roughness if lane.built else None,
+        "roughness": lane.built.plant.roughness if lane.built else None,
         "samples": len(run["time"]),
         "run": run,
     }

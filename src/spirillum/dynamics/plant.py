@@ -1,0 +1,373 @@
+"""A robot's motion step by step, with remote, duty and flow in hand: what a controller, or a page, drives.
+
+A step is a piece of the run that `spirillum.simulate` computes: the same start, equations, integrator and tolerances,
+continued from where the last piece ended.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.free_start import links_without_walls, resting_state
+from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, Trajectory, integrate
+from spirillum.dynamics.poses import Pose
+from spirillum.dynamics.record import series_of
+from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.start import reach_of
+from spirillum.dynamics.tube_integration import Checkpoint, TubeTrajectory, integrate_in_tube, observed_at
+from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.tube_robot import TubeRobot
+from spirillum.dynamics.tube_run import series_in_tube
+from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
+from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
+from spirillum.dynamics.two_links import TwoLinks
+from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.table import TubeTable
+from spirillum.kernels import rigid_links
+from spirillum.kernels import tube_motion as tube
+from spirillum.kernels import two_links as kernel
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.freedom import check_full
+from spirillum.swimming.model_choice import AUTO, choose_model
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.preparation import table_for
+from spirillum.units import KINDS, parse_option
+
+__all__ = ["Moment", "Plant", "PlantState"]
+
+_AT_ONCE = 1e-9
+"""A time in which nothing moves, s."""
+_LONGEST = 1e6
+"""The longest step, s."""
+_TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A robot at one moment of its run."""
+
+    time: float
+    """s."""
+    pose: Pose
+    """Where it is and how it lies."""
+    values: dict[str, float]
+    """Quantities by name, SI; NaN where one has no value."""
+    ended: str
+    """Why the run ended here, in half a sentence; empty while it goes on."""
+
+
+@dataclass(frozen=True)
+class PlantState:
+    """All that the next step of a plant follows from; another plant of the same robot goes on from it."""
+
+    time: float
+    """s."""
+    state: tuple[float, ...]
+    """State of the equations of motion."""
+    duty: float
+    """Duty of the last step, which the drive has."""
+    command: float
+    """Duty that the next step asks for if none is given."""
+    flow: float | None
+    """Mean flow that is imposed, m/s; None: none is."""
+    spent: bool
+    """Whether the battery is empty."""
+    ended: str
+    """Why the run has ended; empty while it goes on."""
+    azimuth: float
+    """Azimuth counted over whole turns, rad."""
+    checkpoint: Checkpoint | None
+    """Beginning of the integrator's last step, in a tube."""
+
+
+class Plant:
+    """A free robot on its way, from rest, one step at a time; for one thread."""
+
+    def __init__(
+        self,
+        robot: str | Path | Mapping[str, Any] | Robot,
+        *,
+        model: str = AUTO,
+        friction: str | None = None,
+        calibrated: bool = True,
+        calibration: str | Path | None = None,
+        placement: Placement | Mapping[str, Any] | None = None,
+        weight: bool = True,
+        roughness: str | float | None = None,
+        in_tube: InTube | Mapping[str, Any] | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Lay a robot down at rest.
+
+        Args:
+            robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
+            model: `tube`, `slender` or `rft`; or `auto`: `tube` for a robot in a channel that has a table, else
+                `slender`.
+            friction: reading of the friction; None: the robot's own.
+            calibrated: apply the robot's calibration factors for this model.
+            calibration: calibration file whose factors replace the robot's.
+            placement: `gap` or `eccentricity`, and `pitch`; with `tube` also yaw, ends and an imposed flow.
+            weight: let weight and buoyancy act, if the masses are known.
+            roughness: of the wall, with its unit or a float in m; None: 1e-4 of the body's radius.
+            in_tube: with `tube`: `azimuth`, `friction_coefficient`, and `flow` over time, see `InTube`.
+            progress: told how far a table is that has to be made.
+
+        Raises:
+            InputError: for wrong input, or a robot or a place that the model does not know.
+        """
+        placed, asked = Placement.of(placement), InTube.of(in_tube)
+        height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
+        own = load(robot)
+        if own.drive is None:
+            raise InputError(f"{own.name} has no [drive]; allowed: a robot with one")
+        chosen = choose_model(model, own, placement=placed, calibration=calibration, tables_only=True)
+        walled = chosen.model == "tube"
+        if not walled:
+            check_full(find_swimmer_model(chosen.model))
+        if asked.wait:
+            raise InputError("in_tube.wait is given to a plant; allowed: a step with the remote off")
+        if not walled and asked != InTube():
+            raise InputError(f"in_tube is given with model '{chosen.model}'; allowed: only with model 'tube'")
+        if walled:
+            check_in_tube(own, placed, asked, height)
+        self.steady: Prediction = predict(
+            own,
+            model=chosen.model,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            placement=placed if walled else None,
+            band=False,
+        )
+        """The steady state of the robot held where it starts, by the same model."""
+        self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
+        self._table = table_for(RobotBatch.of(own, placed), workers=1, progress=progress) if walled else None
+        self._reach = reach_of(own)
+        self._links: TubeRobot | TwoLinks
+        if self._table is None:
+            self._links = links_without_walls(self.steady, height, weight=weight)
+            first = resting_state(own, self._links, placed)
+        else:
+            links, start = self._in(self._table, placed)
+            first = laid_down(own, links, start)
+            check_roughness(links.roughness, float(links.gaps(first).min()))
+            check_in_table(links, first, observed_at(links, first)[tube.OUTSIDE])
+            self._links = links
+        on = own.drive.duty
+        self._first = PlantState(
+            time=0.0,
+            state=tuple(first.tolist()),
+            duty=on,
+            command=on,
+            flow=placed.flow,
+            spent=False,
+            ended="",
+            azimuth=0.0,
+            checkpoint=None,
+        )
+        self._now = self._first
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.steady.robot
+
+    @property
+    def model(self) -> str:
+        """Name of the hydrodynamic model."""
+        return self.steady.model.name
+
+    @property
+    def state(self) -> PlantState:
+        """All that the next step follows from."""
+        return self._now
+
+    @property
+    def roughness(self) -> float | None:
+        """Height of the wall's asperities, m; None without a wall."""
+        if isinstance(self._links, TubeRobot):
+            return float(self._links.roughness)
+        found = float(self._links.wall[kernel.ROUGHNESS])
+        return found if np.isfinite(self._links.wall[kernel.RADIUS]) else None
+
+    def reset(self, state: PlantState | None = None) -> Moment:
+        """Go back to rest at the start, or to a state that was noted.
+
+        Args:
+            state: of this plant, or of another one of the same robot, model and surroundings; None: the start.
+
+        Raises:
+            InputError: for a state of another kind of plant.
+        """
+        state = self._first if state is None else state
+        if len(state.state) != len(self._first.state):
+            raise InputError("state is none of this plant; allowed: its own, or that of the same robot and model")
+        if state.flow != self._now.flow:
+            self._impose(state.flow)
+        self._now = state
+        return self.observe()
+
+    def copy(self) -> Plant:
+        """A plant of its own that is where this one is; geometry and table are shared."""
+        return copy.copy(self)
+
+    def step(
+        self,
+        dt: float,
+        *,
+        remote: bool | None = None,
+        duty: float | None = None,
+        flow: str | float | None = None,
+    ) -> Moment:
+        """Go on for a time; what is not given stays as it was, and at first the drive is on.
+
+        Args:
+            dt: s, positive. The run ends earlier at the end of the channel, or of the table's range.
+            remote: switch the drive on (at the robot's own duty) or off.
+            duty: of the drive instead, 0 (off) to 1.
+            flow: with `tube`, the mean flow that is imposed from now on, with its unit or a float in m/s.
+
+        Returns:
+            The moment at the end of the step; `ended` says why if it came early.
+
+        Raises:
+            InputError: for wrong input, or a run that has ended; nothing has then moved.
+        """
+        _check_number("dt", dt, 0.0, _LONGEST, "s")
+        if self._now.ended:
+            raise InputError(f"the run has ended: {self._now.ended}; allowed: reset")
+        command = self._commanded(remote=remote, duty=duty)
+        if flow is not None:
+            self.impose_flow(parse_option("flow", flow, KINDS["velocity"]))
+        asked = 0.0 if self._now.spent else command
+        run, checkpoint = self._moved(float(dt), asked)
+        spent = self._now.spent or any(event.what == BATTERY_EMPTY for event in run.events)
+        ended = ""
+        if run.time[-1] < (self._now.time + dt) * (1.0 - 1e-9):
+            ended = run.events[-1].what if run.events else "the equations have no next step"
+        self._now = PlantState(
+            float(run.time[-1]),
+            tuple(run.states[-1].tolist()),
+            asked,
+            command,
+            self._now.flow,
+            spent,
+            ended,
+            self._azimuth(run),
+            checkpoint,
+        )
+        return self._moment(run)
+
+    def observe(self) -> Moment:
+        """The robot where it is: pose and true values of its quantities."""
+        now, state = self._now, np.array([self._now.state])
+        if isinstance(self._links, TubeRobot):
+            time = np.array([now.time])
+            observed = np.empty((1, tube.OBSERVED))
+            tube.observe(time, state, self._links.at_duty(now.duty).data, self._links.table, observed)
+            last = Checkpoint(0.0, 0.0, ())
+            return self._moment(TubeTrajectory(time, np.full(1, now.duty), state, observed, (), last))
+        times = np.array([now.time, now.time + _AT_ONCE])
+        switches = [Switch(now.time, now.duty)]
+        return self._moment(integrate(self._links.at_duty(now.duty), state[0], times, switches, self._reach))
+
+    def impose_flow(self, velocity: float | None) -> None:
+        """From now on another mean flow is imposed.
+
+        Args:
+            velocity: m/s; None: none is, and the ends of the tube decide.
+
+        Raises:
+            InputError: for a model that knows none.
+        """
+        if velocity == self._now.flow:
+            return
+        self._impose(velocity)
+        now = self._now
+        kept = now.checkpoint
+        if kept is not None:  # the last step was taken with the old flow
+            kept = Checkpoint(now.time, kept.step, now.state)
+        self._now = replace(now, flow=velocity, checkpoint=kept)
+
+    def _impose(self, velocity: float | None) -> None:
+        if self._table is None:
+            if velocity is not None:
+                raise InputError("flow is known only to model 'tube'; allowed: another model, or no flow")
+            return
+        self._links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
+
+    def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, StartPlace]:
+        return links_in_tube(self.steady, table, placed, self._asked, self._height, weight=self._weight)
+
+    def _commanded(self, *, remote: bool | None, duty: float | None) -> float:
+        """Duty that is asked for."""
+        if remote is not None and duty is not None:
+            raise InputError("remote and duty are given together; allowed: one of them")
+        if remote is not None:
+            if not isinstance(remote, (bool, np.bool_)):
+                raise InputError(f"remote = {str(remote)[:40]}; allowed: True or False")
+            return self._first.command if remote else 0.0
+        if duty is not None:
+            _check_number("duty", duty, 0.0, 1.0, "", closed=True)
+            return float(duty)
+        return self._now.command
+
+    def _moved(self, dt: float, duty: float) -> tuple[Trajectory, Checkpoint | None]:
+        now = self._now
+        times = np.array([now.time, now.time + dt])
+        if not isinstance(self._links, TubeRobot):
+            state = np.array(now.state)
+            return integrate(self._links, state, times, [Switch(now.time, duty)], self._reach), None
+        switches = [Switch(now.time, duty)]
+        if now.checkpoint is not None:  # its last step is taken again, as far as it goes beyond what was asked for
+            old = [] if now.checkpoint.time == now.time else [Switch(now.checkpoint.time, now.duty)]
+            switches = [*old, *(switches if duty != now.duty or not old else [])]
+        start = now.checkpoint or np.array(now.state)
+        run = integrate_in_tube(self._links, start, times, switches, self._reach)
+        return run, run.last
+
+    def _azimuth(self, run: Trajectory) -> float:
+        if not isinstance(run, TubeTrajectory):
+            return 0.0
+        found = float(run.observed[-1, tube.AZIMUTH])
+        return found + _TURN * round((self._now.azimuth - found) / _TURN)
+
+    def _moment(self, run: Trajectory) -> Moment:
+        series: dict[str, Samples] = dict(series_of(self.steady, self._links, run))
+        if isinstance(run, TubeTrajectory):
+            series |= series_in_tube(run) | {"azimuth": np.array([self._azimuth(run)])}
+        elif isinstance(self._links, TwoLinks) and np.isfinite(self._links.wall[kernel.RADIUS]):
+            series["wall_gap"] = run.observed[:, rigid_links.FILM] + self._links.wall[kernel.ROUGHNESS]
+        state = run.states[-1]
+        attitude = state[rigid_links.ATTITUDE : rigid_links.ATTITUDE + 4]
+        pose = Pose(
+            state[rigid_links.POSITION : rigid_links.POSITION + 3].copy(),
+            attitude / np.linalg.norm(attitude),
+            float(state[rigid_links.PHASE]),
+        )
+        values = {name: float(column[-1]) for name, column in series.items()}
+        return Moment(float(run.time[-1]), pose, values, self._now.ended)
+
+
+def _check_number(name: str, value: Any, low: float, high: float, unit: str, *, closed: bool = False) -> None:
+    """Refuse what is no number from `low` to `high`, `low` itself excluded unless closed.
+
+    Raises:
+        InputError: if it is not.
+    """
+    number = float(value) if isinstance(value, Real) else np.nan
+    if not (low <= number <= high) or (number == low and not closed):
+        allowed = f"a number from {low:g} to {high:g}" if closed else f"above {low:g}, at most {high:g} {unit}".strip()
+        raise InputError(f"{name} = {str(value)[:40]}; allowed: {allowed}")
