@@ -23,6 +23,7 @@ def run() -> xr.Dataset:
     )
 
 
+@pytest.mark.slow
 def test_traction_carries_the_weight_and_nothing_along_the_tube(run: xr.Dataset) -> None:
     """The table moved it, a coarse solution of the flow answers: to their errors."""
     flow = sp.flow_of_run(run, 0.0, resolution={"tolerance": 0.05})

@@ -67,7 +67,9 @@ def glass(count: int, distance: float = 0.0) -> np.ndarray:
     return np.stack([x, rho * np.cos(angle), rho * np.sin(angle)], axis=1)
 
 
-@pytest.mark.parametrize(("which", "median"), [("closed", 2e-4), ("pitched", 2e-4), ("yawed", 1e-3)])
+@pytest.mark.parametrize(
+    ("which", "median"), [("closed", 2e-4), ("pitched", 2e-4), pytest.param("yawed", 1e-3, marks=pytest.mark.slow)]
+)
 def test_no_slip_on_the_glass(request: pytest.FixtureRequest, which: str, median: float) -> None:
     """The yawed robot is resolved to a tolerance that is five times that of the first."""
     field = request.getfixturevalue(which)
@@ -76,7 +78,7 @@ def test_no_slip_on_the_glass(request: pytest.FixtureRequest, which: str, median
     assert np.median(speed) < median * FASTEST
 
 
-@pytest.mark.parametrize("which", ["closed", "pitched", "yawed"])
+@pytest.mark.parametrize("which", ["closed", "pitched", pytest.param("yawed", marks=pytest.mark.slow)])
 def test_no_slip_on_the_body(request: pytest.FixtureRequest, which: str) -> None:
     """As good as the square root of the tolerance: the wrenches are as good as the tolerance."""
     field = request.getfixturevalue(which)
@@ -100,7 +102,7 @@ def through(field: TubeFlowField, x: float, count: int = 20) -> tuple[float, flo
     return tuple(float(share @ v.reshape(count, -1).mean(axis=1)) for v in (along, pressure))  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("which", ["closed", "pitched", "yawed"])
+@pytest.mark.parametrize("which", ["closed", "pitched", pytest.param("yawed", marks=pytest.mark.slow)])
 def test_the_mean_flow_passes_every_section(request: pytest.FixtureRequest, which: str) -> None:
     field = request.getfixturevalue(which)
     for x in (-0.15, -0.105, 0.03, 0.06):

@@ -261,9 +261,9 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
     """
     found = hashlib.sha256()
     for name in sorted(set(attributes) - {"checksum"}):
-        found.update(f"{name}={attributes[name]}\n".encode())
+        found.update(f"{name}={attributes[name]}\n".encode(errors="surrogateescape"))
     for name in sorted(values):
-        found.update(f"{name}\n".encode() + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
+        found.update(f"{name}\n".encode(errors="surrogateescape") + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
     return found.hexdigest()
 
 

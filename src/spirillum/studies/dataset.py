@@ -98,15 +98,15 @@ def _checksum(dataset: xr.Dataset) -> str:
     """Of all values and attributes but itself: damage is noticed, and the dataset computed anew."""
     found = hashlib.sha256()
     for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
-        found.update(f"{name}={value}\n".encode())
+        found.update(f"{name}={value}\n".encode(errors="surrogateescape"))
     for name in sorted(map(str, dataset.variables)):
         variable = dataset.variables[name]
-        found.update(f"{name} {variable.dims} {variable.shape}\n".encode())
+        found.update(f"{name} {variable.dims} {variable.shape}\n".encode(errors="surrogateescape"))
         if variable.dtype.kind in "OUS":
-            found.update("\n".join(map(str, variable.values.flat)).encode())
+            found.update("\n".join(map(str, variable.values.flat)).encode(errors="surrogateescape"))
         else:
             found.update(np.ascontiguousarray(variable.values, dtype="<f8").tobytes())
-        found.update(" ".join(f"{key}={variable.attrs[key]}" for key in sorted(variable.attrs)).encode())
+        found.update(" ".join(f"{key}={variable.attrs[key]}" for key in sorted(variable.attrs)).encode(errors="surrogateescape"))
     return found.hexdigest()
 
 
