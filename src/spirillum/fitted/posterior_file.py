@@ -261,9 +261,11 @@ def posterior_checksum(attributes: Mapping[str, Any], values: Mapping[str, Sampl
     """
     found = hashlib.sha256()
     for name in sorted(set(attributes) - {"checksum"}):
-        found.update(f"{name}={attributes[name]}\n".encode(errors="surrogateescape"))
+        found.update(f"{name}={attributes[name]}\n".encode(errors="surrogatepass"))
     for name in sorted(values):
-        found.update(f"{name}\n".encode(errors="surrogateescape") + np.ascontiguousarray(values[name], dtype="<f8").tobytes())
+        found.update(
+            f"{name}\n".encode(errors="surrogatepass") + np.ascontiguousarray(values[name], dtype="<f8").tobytes()
+        )
     return found.hexdigest()
 
 

@@ -94,19 +94,23 @@ def assembled(
     return dataset
 
 
+_ANY = "surrogatepass"
+"""Damaged names are summed, too."""
+
+
 def _checksum(dataset: xr.Dataset) -> str:
     """Of all values and attributes but itself: damage is noticed, and the dataset computed anew."""
     found = hashlib.sha256()
     for name, value in sorted((str(name), value) for name, value in dataset.attrs.items() if name != "checksum"):
-        found.update(f"{name}={value}\n".encode(errors="surrogateescape"))
+        found.update(f"{name}={value}\n".encode(errors=_ANY))
     for name in sorted(map(str, dataset.variables)):
         variable = dataset.variables[name]
-        found.update(f"{name} {variable.dims} {variable.shape}\n".encode(errors="surrogateescape"))
+        found.update(f"{name} {variable.dims} {variable.shape}\n".encode(errors=_ANY))
         if variable.dtype.kind in "OUS":
-            found.update("\n".join(map(str, variable.values.flat)).encode(errors="surrogateescape"))
+            found.update("\n".join(map(str, variable.values.flat)).encode(errors=_ANY))
         else:
             found.update(np.ascontiguousarray(variable.values, dtype="<f8").tobytes())
-        found.update(" ".join(f"{key}={variable.attrs[key]}" for key in sorted(variable.attrs)).encode(errors="surrogateescape"))
+        found.update(" ".join(f"{key}={variable.attrs[key]}" for key in sorted(variable.attrs)).encode(errors=_ANY))
     return found.hexdigest()
 
 
