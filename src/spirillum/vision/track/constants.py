@@ -15,6 +15,7 @@ __all__ = [
     "COLOURS",
     "CONTOUR",
     "CUTS",
+    "DIRECTION",
     "FIRST_LOOK",
     "FOLLOWING",
     "IDENTITY",
@@ -29,6 +30,7 @@ __all__ = [
     "ColourConstants",
     "ContourConstants",
     "CutConstants",
+    "DirectionConstants",
     "FirstLookConstants",
     "FollowingConstants",
     "IdentityConstants",
@@ -442,6 +444,18 @@ class LostFramesConstants:
 
 
 @dataclass(frozen=True)
+class DirectionConstants:
+    """Direction of the channel where no ruler tells it (`direction`)."""
+
+    frames: int = 10
+    """Fewest frames with a place."""
+    way: float = 20.0
+    """Least way of a robot over the scatter of its places, to tell the direction."""
+    least: float = 0.026
+    """Least angle to the rows of the picture, rad: below it lengths are wrong by less than the lens's 0.03 %."""
+
+
+@dataclass(frozen=True)
 class VisibilityConstants:
     """Second robots, wrong directions, gaps, robots that leave, and glare (`warnings`)."""
 
@@ -492,5 +506,6 @@ TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
 LOST_FRAMES = LostFramesConstants()
+DIRECTION = DirectionConstants()
 VISIBILITY = VisibilityConstants()
 FOLLOWING = FollowingConstants()

@@ -21,6 +21,7 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.constants import FOLLOWING, LOST_FRAMES
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.first_look import Start, on_the_way
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.track.lost_frames import Reading, restored_times
@@ -172,6 +173,10 @@ def _track(
     cut = cut_off(record.placed)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    along = Along(position, pose[:, 2], ())
+    if setup.markers.spacing is None:  # no ruler says how the camera is rolled
+        along = along_its_way(time, *along[:2])
+    position = along.position
     frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
     restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
     time = restored.time
@@ -182,12 +187,13 @@ def _track(
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot)
+    early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
     return Track(
         time=time,
         frame=frame,
         position=position,
-        heading=pose[:, 2],
+        heading=along.heading,
         body_angle=body_angle,
         tail_phase=tail_phase,
         position_error=errors[:, 0] * optics.focal / sight.optics.focal,
@@ -200,7 +206,7 @@ def _track(
         video=video.name,
         words=video.words,
         time_uncertainty=restored.relative_error,
-        flags=(*size_flags, *flags, *seen_flags, *gap_flags, *restored.flags, *cuts, *roll_flags, *tail_flags, *odd),
+        flags=(*early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 
 
