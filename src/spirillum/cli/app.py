@@ -345,31 +345,20 @@ def citation(
     typer.echo(answer(model))
 
 
-for _command in (
-    predict,
-    compare_models,
-    resistance,
-    study,
-    prepare,
-    simulate,
-    settle,
-    flow,
-    magnetic_sweep,
-    show,
-    film,
-    page,
-    export,
-    render,
-    virtual_experiment,
-    measure,
-    calibrate,
-    rank_models,
-    suggest,
-    design,
-    schema,
-    citation,
-):
-    app.command()(_command)
-app.add_typer(robot_app, name="robot")
-app.add_typer(setup_app, name="setup")
-app.add_typer(observations_app, name="observations")
+_TASKS = {
+    "Predict": (predict, compare_models, study, prepare, resistance),
+    "Move": (simulate, settle, magnetic_sweep),
+    "Look": (page, show, film, flow),
+    "Measure": (render, virtual_experiment, measure),
+    "Learn": (calibrate, rank_models, suggest),
+    "Design": (design,),
+    "Files": (export, schema, citation),
+}
+"""The commands by what one wants to do, with their panels of the help."""
+
+for _task, _commands in _TASKS.items():
+    for _command in _commands:
+        app.command(rich_help_panel=_task)(_command)
+app.add_typer(robot_app, name="robot", rich_help_panel="Files")
+app.add_typer(setup_app, name="setup", rich_help_panel="Files")
+app.add_typer(observations_app, name="observations", rich_help_panel="Files")

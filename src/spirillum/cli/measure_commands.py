@@ -13,7 +13,9 @@ from spirillum.cli.options import Json, Settings
 
 __all__ = ["measure"]
 
-_Rate = typer.Option(metavar="RATE", help="Feasibility: expected rate, such as 1.2Hz; else predicted.")
+_FEASIBILITY = "Before an experiment"
+_BY_HAND = "Instead of the tracker"
+_Rate = typer.Option(metavar="RATE", help="Expected rate, such as 1.2Hz; else predicted.", rich_help_panel=_FEASIBILITY)
 
 
 def measure(
@@ -26,13 +28,23 @@ def measure(
     ),
     marks: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Readings by hand (CSV); they replace what is seen on their frames."),
+        typer.Option(
+            metavar="FILE",
+            help="Readings by hand (CSV); they replace what is seen on their frames.",
+            rich_help_panel=_BY_HAND,
+        ),
     ] = None,
     no_tracking: Annotated[
-        bool, typer.Option("--no-tracking", help="Readings by hand alone; the video gives scale and times.")
+        bool,
+        typer.Option(
+            "--no-tracking", help="Readings by hand alone; the video gives scale and times.", rich_help_panel=_BY_HAND
+        ),
     ] = False,
     track: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Positions from trackpy or DeepLabCut (CSV) instead of ours.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Positions from trackpy or DeepLabCut (CSV) instead of ours.", rich_help_panel=_BY_HAND
+        ),
     ] = None,
     no_annotated: Annotated[bool, typer.Option("--no-annotated", help="Write no annotated video.")] = False,
     no_figures: Annotated[bool, typer.Option("--no-figures", help="Draw no figures and write no report.")] = False,
@@ -41,21 +53,30 @@ def measure(
     ] = None,
     end: Annotated[str | None, typer.Option(metavar="TIME", help="Time until which to measure.")] = None,
     feasibility: Annotated[
-        bool, typer.Option("--feasibility", help="Before an experiment: does this camera resolve the expected rates?")
+        bool,
+        typer.Option(
+            "--feasibility", help="Does this camera resolve the expected rates?", rich_help_panel=_FEASIBILITY
+        ),
     ] = False,
     expect_tail_rate: Annotated[str | None, _Rate] = None,
     expect_body_rate: Annotated[str | None, _Rate] = None,
     expect_speed: Annotated[
-        str | None, typer.Option(metavar="VELOCITY", help="Feasibility: expected speed, such as 1mm/s; else predicted.")
+        str | None,
+        typer.Option(
+            metavar="VELOCITY", help="Expected speed, such as 1mm/s; else predicted.", rich_help_panel=_FEASIBILITY
+        ),
     ] = None,
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Feasibility: length of a trial; else 20s.")
+        str | None, typer.Option(metavar="TIME", help="Length of a trial; else 20s.", rich_help_panel=_FEASIBILITY)
     ] = None,
-    fps: Annotated[float | None, typer.Option(help="Feasibility: frames a second; else the setup's, or 30.")] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames a second; else the setup's, or 30.", rich_help_panel=_FEASIBILITY)
+    ] = None,
     view_width: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Feasibility: width of the view at the robot's axis.")
+        str | None,
+        typer.Option(metavar="LENGTH", help="Width of the view at the robot's axis.", rich_help_panel=_FEASIBILITY),
     ] = None,
-    width: Annotated[int, typer.Option(help="Feasibility: width of the picture, pixels.")] = 640,
+    width: Annotated[int, typer.Option(help="Width of the picture, pixels.", rich_help_panel=_FEASIBILITY)] = 640,
     settings: Settings = None,
     json: Json = False,
 ) -> None:

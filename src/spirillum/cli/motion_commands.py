@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 __all__ = ["magnetic_sweep", "simulate"]
 
+_START = "Start of a free run, and its tube"
+_TIMING = "Timing and remote"
+_PICTURES = "Pictures"
+
 _FullModel = Annotated[
     str,
     typer.Option(
@@ -51,62 +55,105 @@ def simulate(
     model: _FullModel = "auto",
     motion: _RunMotion = None,
     friction: Friction = None,
-    turns: Annotated[float, typer.Option(help="Length of the run in turns of the tail (of the field).")] = 3.0,
+    turns: Annotated[
+        float, typer.Option(help="Length of the run in turns of the tail (of the field).", rich_help_panel=_TIMING)
+    ] = 3.0,
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.")
+        str | None,
+        typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.", rich_help_panel=_TIMING),
     ] = None,
     on: Annotated[
         list[str] | None,
-        typer.Option(metavar="FROM:TO", help="When the remote switches the drive on, such as 0s:2s; repeatable."),
+        typer.Option(
+            metavar="FROM:TO",
+            help="When the remote switches the drive on, such as 0s:2s; repeatable.",
+            rich_help_panel=_TIMING,
+        ),
     ] = None,
     duty: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Duty over time instead: CSV with the columns time_s, duty.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Duty over time instead: CSV with the columns time_s, duty.", rich_help_panel=_TIMING
+        ),
     ] = None,
     gap: Annotated[
         str | None,
         typer.Option(
             metavar="LENGTH",
             help="Free: smallest distance of body and wall at the start; else 1/18 of the body's radius.",
+            rich_help_panel=_START,
         ),
     ] = None,
     eccentricity: Annotated[
-        float | None, typer.Option(help="Free, instead of --gap: the body's offset towards the floor over R - a.")
+        float | None,
+        typer.Option(
+            help="Free, instead of --gap: the body's offset towards the floor over R - a.", rich_help_panel=_START
+        ),
     ] = None,
     pitch: Annotated[
-        str | None, typer.Option(metavar="ANGLE", help="Free: angle by which the nose is raised at the start.")
+        str | None,
+        typer.Option(
+            metavar="ANGLE", help="Free: angle by which the nose is raised at the start.", rich_help_panel=_START
+        ),
     ] = None,
-    no_weight: Annotated[bool, typer.Option("--no-weight", help="Free: leave weight and buoyancy out.")] = False,
+    no_weight: Annotated[
+        bool, typer.Option("--no-weight", help="Free: leave weight and buoyancy out.", rich_help_panel=_START)
+    ] = False,
     roughness: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="Free: roughness under the robot, else 1e-4 of its radius.")
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="Free: roughness under the robot, else 1e-4 of its radius.", rich_help_panel=_START
+        ),
     ] = None,
     yaw: Annotated[
-        str | None, typer.Option(metavar="ANGLE", help="Free, tube: angle of the nose to +y at the start.")
+        str | None,
+        typer.Option(metavar="ANGLE", help="Free, tube: angle of the nose to +y at the start.", rich_help_panel=_START),
     ] = None,
     azimuth: Annotated[
         str | None,
-        typer.Option(metavar="ANGLE", help="Free, tube: azimuth of the body's centre about +x from the lowest place."),
+        typer.Option(
+            metavar="ANGLE",
+            help="Free, tube: azimuth of the body's centre about +x from the lowest place.",
+            rich_help_panel=_START,
+        ),
     ] = None,
-    ends: Annotated[str | None, typer.Option(help="Free, tube: ends of the channel, open or closed.")] = None,
+    ends: Annotated[
+        str | None, typer.Option(help="Free, tube: ends of the channel, open or closed.", rich_help_panel=_START)
+    ] = None,
     flow: Annotated[
         str | None,
         typer.Option(
             metavar="VELOCITY|FILE",
             help="Free, tube: imposed mean flow, such as 1mm/s, or over time: CSV with the columns time_s, flow_mm_s.",
+            rich_help_panel=_START,
         ),
     ] = None,
     friction_coefficient: Annotated[
-        float | None, typer.Option(help="Free, tube: coefficient of dry friction where asperities touch; else 0.1.")
+        float | None,
+        typer.Option(
+            help="Free, tube: coefficient of dry friction where asperities touch; else 0.1.", rich_help_panel=_START
+        ),
     ] = None,
     wait: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.")
+        str | None,
+        typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.", rich_help_panel=_START),
     ] = None,
-    samples_per_turn: Annotated[int, typer.Option(help="Samples of the output per steady turn of the tail.")] = 100,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.")] = None,
+    samples_per_turn: Annotated[
+        int, typer.Option(help="Samples of the output per steady turn of the tail.", rich_help_panel=_TIMING)
+    ] = 100,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
+    ] = None,
     column: Annotated[
-        str, typer.Option(help="Width of the plot: single or double, as the columns of a page.")
+        str,
+        typer.Option(help="Width of the plot: single or double, as the columns of a page.", rich_help_panel=_PICTURES),
     ] = "double",
     movie: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`; see `film`).", rich_help_panel=_PICTURES
+        ),
     ] = None,
     no_calibration: NoCalibration = False,
     calibration: Calibration = None,

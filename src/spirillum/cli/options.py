@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "MODEL_PANEL",
+    "PLACE_PANEL",
     "Accuracy",
     "Calibration",
     "Eccentricity",
@@ -43,6 +45,12 @@ __all__ = [
     "complete_schemas",
     "starting",
 ]
+
+
+MODEL_PANEL = "Model"
+"""Panel of the help: which model answers, with which friction and calibration, how finely."""
+PLACE_PANEL = "Place in the channel (model tube)"
+"""Panel of the help: where in its channel the robot lies."""
 
 
 def starting(words: tuple[str, ...], incomplete: str) -> list[str]:
@@ -116,7 +124,12 @@ def _complete_friction(incomplete: str) -> list[str]:
 
 RobotArgument = Annotated[str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file.")]
 NamedModel = Annotated[
-    str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: sbt, rft, slender or tube.")
+    str,
+    typer.Option(
+        autocompletion=complete_models,
+        help="Hydrodynamic model: sbt, rft, slender or tube.",
+        rich_help_panel=MODEL_PANEL,
+    ),
 ]
 Model = Annotated[
     str,
@@ -124,6 +137,7 @@ Model = Annotated[
         autocompletion=complete_auto_models,
         help="Hydrodynamic model: sbt, rft, slender, tube; or auto: that of the posterior or calibration, else tube in "
         "a channel and slender without.",
+        rich_help_panel=MODEL_PANEL,
     ),
 ]
 Accuracy = Annotated[
@@ -131,13 +145,16 @@ Accuracy = Annotated[
     typer.Option(
         autocompletion=_complete_accuracies,
         help="Of the models slender and tube: standard or high; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
     ),
 ]
 Friction = Annotated[
     str | None,
     typer.Option(
         autocompletion=_complete_friction,
-        help="Where the rotary friction acts: none, rotor (in the joint), body (on the wall), paper (as printed).",
+        help="Where the rotary friction acts: none; rotor: in the motor's joint, between body and tail; body: the wall "
+        "brakes the body; paper: as eq. (19) is printed, on the tail from outside.",
+        rich_help_panel=MODEL_PANEL,
     ),
 ]
 Motion = Annotated[
@@ -146,13 +163,22 @@ Motion = Annotated[
         autocompletion=_complete_motions, help="Lateral motion and tilt held, as the channel's floor does, or free."
     ),
 ]
-NoCalibration = Annotated[bool, typer.Option("--no-calibration", help="Leave the calibration factors out.")]
+NoCalibration = Annotated[
+    bool, typer.Option("--no-calibration", help="Leave the calibration factors out.", rich_help_panel=MODEL_PANEL)
+]
 Calibration = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Calibration file whose factors replace the robot's.")
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Calibration file whose factors replace the robot's.", rich_help_panel=MODEL_PANEL
+    ),
 ]
 Posterior = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Posterior of a calibration: its middle replaces the robot's values; intervals."),
+    typer.Option(
+        metavar="FILE",
+        help="Posterior of a calibration: its middle replaces the robot's values; intervals.",
+        rich_help_panel=MODEL_PANEL,
+    ),
 ]
 PosteriorFor = Annotated[
     str,
@@ -160,6 +186,7 @@ PosteriorFor = Annotated[
         "--for",
         metavar="new|measured",
         help="With --posterior: intervals of a new tail like those fitted, or of this one, which was measured.",
+        rich_help_panel=MODEL_PANEL,
     ),
 ]
 Settings = Annotated[
@@ -178,41 +205,72 @@ TailRate = Annotated[
     typer.Option(metavar="RATE", help="Lab rotation rate of the tail, such as 1.2Hz; else the robot's drive."),
 ]
 Gap = Annotated[
-    str | None, typer.Option(metavar="LENGTH", help="Model tube: smallest distance of body and glass, such as 0.5mm.")
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="Model tube: smallest distance of body and glass, such as 0.5mm.",
+        rich_help_panel=PLACE_PANEL,
+    ),
 ]
 Eccentricity = Annotated[
     float | None,
-    typer.Option(help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1."),
+    typer.Option(
+        help="Model tube, instead of --gap: the body's offset towards the floor over R - a, 0 to 1.",
+        rich_help_panel=PLACE_PANEL,
+    ),
 ]
 Pitch = Annotated[
     str | None,
-    typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is raised, such as 2deg; below 0 lowered."),
+    typer.Option(
+        metavar="ANGLE",
+        help="Model tube: angle by which the nose is raised, such as 2deg; below 0 lowered.",
+        rich_help_panel=PLACE_PANEL,
+    ),
 ]
 Yaw = Annotated[
-    str | None, typer.Option(metavar="ANGLE", help="Model tube: angle by which the nose is turned to +y, such as 2deg.")
+    str | None,
+    typer.Option(
+        metavar="ANGLE",
+        help="Model tube: angle by which the nose is turned to +y, such as 2deg.",
+        rich_help_panel=PLACE_PANEL,
+    ),
 ]
 TailDrop = Annotated[
     str | None,
-    typer.Option(metavar="LENGTH", help="Model tube: distance by which the tail's axis is lowered (a surrogate)."),
+    typer.Option(
+        metavar="LENGTH",
+        help="Model tube: distance by which the tail's axis is lowered (a surrogate).",
+        rich_help_panel=PLACE_PANEL,
+    ),
 ]
 Ends = Annotated[
     str | None,
     typer.Option(
         autocompletion=_complete_ends,
         help="Model tube: open or closed ends of the channel; else open if it has a length.",
+        rich_help_panel=PLACE_PANEL,
     ),
 ]
 ImposedFlow = Annotated[
     str | None,
     typer.Option(
-        "--flow", metavar="VELOCITY", help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s."
+        "--flow",
+        metavar="VELOCITY",
+        help="Model tube, instead of --ends: imposed mean velocity, such as -2mm/s.",
+        rich_help_panel=PLACE_PANEL,
     ),
 ]
 Tolerance = Annotated[
     float | None,
-    typer.Option(help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's."),
+    typer.Option(
+        help="Model tube: relative tolerance of the speed per turn, 0.0001 to 0.05; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
+    ),
 ]
 Phases = Annotated[
     int | None,
-    typer.Option(help="Model tube: number of phases of the tail to average over, 1 to 64; else the robot's."),
+    typer.Option(
+        help="Model tube: number of phases of the tail to average over, 1 to 64; else the robot's.",
+        rich_help_panel=MODEL_PANEL,
+    ),
 ]

@@ -43,7 +43,7 @@ def show(
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Draw a robot in three dimensions: a picture of its computed geometry. Needs the extra `3d`.
+    """Draw a robot in three dimensions: a picture of its shape. Needs the extra `3d`.
 
     Example: `spirillum show biorob2012-wide -o robot.png --view side`
     """
@@ -79,7 +79,7 @@ def film(
     ] = "auto",
     json: Json = False,
 ) -> None:
-    """Film a run in three dimensions. Needs the extra `3d`.
+    """Film a run of `simulate` in three dimensions, to show to people. Needs the extra `3d`.
 
     Example: `spirillum film run.nc -o run.mp4 --speed 0.5`
     """

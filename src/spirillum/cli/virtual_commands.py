@@ -29,28 +29,76 @@ def _complete_directions(incomplete: str) -> list[str]:
     return starting(("left", "right"), incomplete)
 
 
-_View = Annotated[str, typer.Option(autocompletion=_complete_views, help="Camera: top, or side (level).")]
-_Direction = Annotated[
-    str, typer.Option(autocompletion=_complete_directions, help="Where the nose points in the picture: right or left.")
+_CAMERA = "Camera"
+_DISTURBED = "Disturbances"
+_MOTION = "Motion"
+_ERRORS = "Errors of the setup file"
+
+_View = Annotated[
+    str, typer.Option(autocompletion=_complete_views, help="Camera: top, or side (level).", rich_help_panel=_CAMERA)
 ]
-_Fps = Annotated[float, typer.Option(help="Frames a second.")]
-_Size = Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the picture, even numbers.")]
-_Seed = Annotated[int, typer.Option(help="Of all random numbers.")]
+_Direction = Annotated[
+    str,
+    typer.Option(
+        autocompletion=_complete_directions,
+        help="Where the nose points in the picture: right or left.",
+        rich_help_panel=_CAMERA,
+    ),
+]
+_Fps = Annotated[float, typer.Option(help="Frames a second.", rich_help_panel=_CAMERA)]
+_Size = Annotated[
+    str, typer.Option(metavar="WIDTHxHEIGHT", help="Pixels of the picture, even numbers.", rich_help_panel=_CAMERA)
+]
+_Seed = Annotated[
+    int,
+    typer.Option(
+        help="Of what is random: noise, drift, lost frames, tilt, glare. A clean film has nothing random.",
+        rich_help_panel=_DISTURBED,
+    ),
+]
 _Preset = Annotated[
     str,
     typer.Option(
-        "--preset", autocompletion=_complete_presets, help="clean, or degraded: all disturbances but bubbles and hand."
+        "--preset",
+        autocompletion=_complete_presets,
+        help="clean, or degraded: all disturbances but bubbles and hand.",
+        rich_help_panel=_DISTURBED,
     ),
 ]
-_Noise = Annotated[float | None, typer.Option(help="Standard deviation of noise, in steps of 255.")]
-_Lamp = Annotated[float | None, typer.Option(help="Share by which the lamp's brightness drifts, such as 0.2.")]
-_Crf = Annotated[int | None, typer.Option(help="Compression (H.264): 0, none lost, to 51; clean 18, degraded 33.")]
-_Dropped = Annotated[float | None, typer.Option(help="Share of frames that are lost, such as 0.05.")]
-_Tilt = Annotated[str | None, typer.Option(metavar="ANGLE", help="Tilt of the camera in a random direction.")]
-_Glare = Annotated[float | None, typer.Option(help="Share of the body's picture under a spot of glare, such as 0.2.")]
-_Fixed = Annotated[bool, typer.Option("--glare-fixed", help="The glare stands still instead of moving with the body.")]
-_Bubbles = Annotated[int | None, typer.Option(help="Number of bubbles that drift over the robot.")]
-_Hand = Annotated[bool, typer.Option("--hand", help="The shadow of a hand passes over the picture.")]
+_Noise = Annotated[
+    float | None, typer.Option(help="Standard deviation of noise, in steps of 255.", rich_help_panel=_DISTURBED)
+]
+_Lamp = Annotated[
+    float | None,
+    typer.Option(help="Share by which the lamp's brightness drifts, such as 0.2.", rich_help_panel=_DISTURBED),
+]
+_Crf = Annotated[
+    int | None,
+    typer.Option(help="Compression (H.264): 0, none lost, to 51; clean 18, degraded 33.", rich_help_panel=_DISTURBED),
+]
+_Dropped = Annotated[
+    float | None, typer.Option(help="Share of frames that are lost, such as 0.05.", rich_help_panel=_DISTURBED)
+]
+_Tilt = Annotated[
+    str | None,
+    typer.Option(metavar="ANGLE", help="Tilt of the camera in a random direction.", rich_help_panel=_DISTURBED),
+]
+_Glare = Annotated[
+    float | None,
+    typer.Option(help="Share of the body's picture under a spot of glare, such as 0.2.", rich_help_panel=_DISTURBED),
+]
+_Fixed = Annotated[
+    bool,
+    typer.Option(
+        "--glare-fixed", help="The glare stands still instead of moving with the body.", rich_help_panel=_DISTURBED
+    ),
+]
+_Bubbles = Annotated[
+    int | None, typer.Option(help="Number of bubbles that drift over the robot.", rich_help_panel=_DISTURBED)
+]
+_Hand = Annotated[
+    bool, typer.Option("--hand", help="The shadow of a hand passes over the picture.", rich_help_panel=_DISTURBED)
+]
 
 
 def render(
@@ -62,32 +110,59 @@ def render(
     tail_rate: TailRate = None,
     friction: Friction = None,
     forward_velocity: Annotated[
-        str | None, typer.Option(metavar="VELOCITY", help="Instead of the model's, such as 1mm/s.")
+        str | None,
+        typer.Option(metavar="VELOCITY", help="Instead of the model's, such as 1mm/s.", rich_help_panel=_MOTION),
     ] = None,
     body_rate: Annotated[
-        str | None, typer.Option(metavar="RATE", help="Lab rotation rate of the body instead of the model's.")
+        str | None,
+        typer.Option(
+            metavar="RATE", help="Lab rotation rate of the body instead of the model's.", rich_help_panel=_MOTION
+        ),
     ] = None,
     run: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="A run of `spirillum simulate` instead of steady swimming.")
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="A run of `spirillum simulate` instead of steady swimming.", rich_help_panel=_MOTION
+        ),
     ] = None,
     duration: Annotated[str, typer.Option(metavar="TIME", help="Length of the video.")] = "20s",
     start: Annotated[
-        str | None, typer.Option(metavar="LENGTH", help="x of the body at the first frame; else its way is centred.")
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="x of the body at the first frame; else its way is centred.", rich_help_panel=_MOTION
+        ),
     ] = None,
-    lateral: Annotated[str, typer.Option(metavar="LENGTH", help="Horizontal offset across the channel.")] = "0mm",
-    heading: Annotated[str, typer.Option(metavar="ANGLE", help="Angle of the robot's axis to the channel.")] = "0deg",
-    wobble: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Amplitude of a motion across, at the tail's rate.")
+    lateral: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Horizontal offset across the channel.", rich_help_panel=_MOTION)
     ] = "0mm",
-    body_angle: Annotated[str, typer.Option(metavar="ANGLE", help="Of the body at the first frame.")] = "0deg",
-    tail_phase: Annotated[str, typer.Option(metavar="ANGLE", help="Of the tail at the first frame.")] = "0deg",
-    gap: Annotated[str, typer.Option(metavar="LENGTH", help="Between body and tube.")] = "0.5mm",
+    heading: Annotated[
+        str, typer.Option(metavar="ANGLE", help="Angle of the robot's axis to the channel.", rich_help_panel=_MOTION)
+    ] = "0deg",
+    wobble: Annotated[
+        str,
+        typer.Option(
+            metavar="LENGTH", help="Amplitude of a motion across, at the tail's rate.", rich_help_panel=_MOTION
+        ),
+    ] = "0mm",
+    body_angle: Annotated[
+        str, typer.Option(metavar="ANGLE", help="Of the body at the first frame.", rich_help_panel=_MOTION)
+    ] = "0deg",
+    tail_phase: Annotated[
+        str, typer.Option(metavar="ANGLE", help="Of the tail at the first frame.", rich_help_panel=_MOTION)
+    ] = "0deg",
+    gap: Annotated[
+        str, typer.Option(metavar="LENGTH", help="Between body and tube.", rich_help_panel=_MOTION)
+    ] = "0.5mm",
     view: _View = "top",
     direction: _Direction = "right",
     fps: _Fps = 30.0,
     size: _Size = "640x480",
-    exposure: Annotated[str, typer.Option(metavar="TIME", help="Of each frame; else 1/120 s.")] = "8.3333333ms",
-    distortion: Annotated[float, typer.Option(help="Coefficient k1 of the lens's radial distortion.")] = -0.02,
+    exposure: Annotated[
+        str, typer.Option(metavar="TIME", help="Of each frame; else 1/120 s.", rich_help_panel=_CAMERA)
+    ] = "8.3333333ms",
+    distortion: Annotated[
+        float, typer.Option(help="Coefficient k1 of the lens's radial distortion.", rich_help_panel=_CAMERA)
+    ] = -0.02,
     preset: _Preset = "clean",
     noise: _Noise = None,
     lamp_drift: _Lamp = None,
@@ -100,15 +175,25 @@ def render(
     hand: _Hand = False,
     seed: _Seed = 0,
     depth_error: Annotated[
-        str, typer.Option(metavar="LENGTH", help="By which the setup's height of the axis is wrong, on purpose.")
+        str,
+        typer.Option(
+            metavar="LENGTH",
+            help="By which the setup's height of the axis is wrong, on purpose.",
+            rich_help_panel=_ERRORS,
+        ),
     ] = "0mm",
     depth_uncertainty: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Standard uncertainty of that height that the setup states.")
+        str,
+        typer.Option(
+            metavar="LENGTH", help="Standard uncertainty of that height that the setup states.", rich_help_panel=_ERRORS
+        ),
     ] = "0mm",
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Render a video of a swimming robot as a camera sees it, with its truth: synthetic. Needs the extra `video`.
+    """Film a robot with a virtual laboratory camera, to try `measure` before the experiment. Needs the extra `video`.
+
+    The video is synthetic, and its truth is written beside it. For a film to show to people, see `film`.
 
     Example: `spirillum render biorob2012-wide -o trial.mp4 --tail-rate 1.2Hz --duration 20s`
     """
@@ -182,7 +267,7 @@ def virtual_experiment(
     jobs: Annotated[int, typer.Option(help="Trials that are rendered at the same time.")] = 1,
     json: Json = False,
 ) -> None:
-    """Render five trials of each robot of a study, with their truth: synthetic. A rerun resumes.
+    """Film five trials of each robot of a study with that camera, with their truth: synthetic. A rerun resumes.
 
     Example: `spirillum virtual-experiment -o experiment --tail-rate 1.2Hz`
     """
