@@ -26,6 +26,7 @@ HEAVY = (
     "starlette",
     "uvicorn",
     "websockets",
+    "control",
 )
 
 

@@ -31,6 +31,9 @@ if TYPE_CHECKING:
     from spirillum.fields.flow import flow as flow
     from spirillum.fluid.resistance import Resistance as Resistance
     from spirillum.fluid.resistance import resistance as resistance
+    from spirillum.interfaces.python_control import LinearSystem as LinearSystem
+    from spirillum.interfaces.python_control import control_system as control_system
+    from spirillum.interfaces.python_control import linear_system as linear_system
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
     from spirillum.measurement.measure import Measurement as Measurement
@@ -66,6 +69,7 @@ _HOME = {
     "Film": "spirillum.view.scene3d.film",
     "Flow": "spirillum.fields.flow",
     "InputError": "spirillum.errors",
+    "LinearSystem": "spirillum.interfaces.python_control",
     "Measurement": "spirillum.measurement.measure",
     "ModelComparison": "spirillum.swimming.comparison",
     "Picture3D": "spirillum.view.scene3d.show",
@@ -82,12 +86,14 @@ _HOME = {
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
+    "control_system": "spirillum.interfaces.python_control",
     "design": "spirillum.designs.design",
     "export": "spirillum.exports.write",
     "feasibility": "spirillum.measurement.feasibility",
     "film": "spirillum.view.scene3d.film",
     "flow": "spirillum.fields.flow",
     "flow_of_run": "spirillum.dynamics.flow_of_run",
+    "linear_system": "spirillum.interfaces.python_control",
     "load": "spirillum.robot.load",
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",

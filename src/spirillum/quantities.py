@@ -200,6 +200,17 @@ _IN_THE_TUBE = (
     Quantity("exponent", "", "1", "exponent of the normal resistance in the gap", "model tube"),
 )
 
+_HELD = "linear response of the held robot, (8), (15)"
+
+_RESPONSES = (
+    Quantity("forward_velocity_per_torque", "", "m/(s N m)", "held robot: forward velocity per joint torque", _HELD),
+    Quantity("body_rotation_rate_per_torque", "", "rad/(s N m)", "held robot: body rate per joint torque", _HELD),
+    Quantity("tail_rotation_rate_per_torque", "", "rad/(s N m)", "held robot: tail rate per joint torque", _HELD),
+    Quantity("forward_velocity_per_flow", "", "1", "held robot: forward velocity per imposed mean flow", _HELD),
+    Quantity("body_rotation_rate_per_flow", "", "rad/m", "held robot: body rate per imposed mean flow", _HELD),
+    Quantity("tail_rotation_rate_per_flow", "", "rad/m", "held robot: tail rate per imposed mean flow", _HELD),
+)
+
 _STUDIES = (
     Quantity("contact_share", "", "1", "share of the time in which asperities carry load", _TUBE),
     Quantity("body_drag_factor", "", "1", "factor on the isolated body's drag that an observed speed asks for", "(15)"),
@@ -227,7 +238,8 @@ _MEASURED = (
 )
 
 QUANTITIES: dict[str, Quantity] = {
-    item.name: item for item in (*_STEADY, *_RUNS, *_FIELDS, *_ROTATING_FIELD, *_IN_THE_TUBE, *_STUDIES, *_MEASURED)
+    item.name: item
+    for item in (*_STEADY, *_RUNS, *_FIELDS, *_ROTATING_FIELD, *_IN_THE_TUBE, *_RESPONSES, *_STUDIES, *_MEASURED)
 }
 """Every quantity by its name."""
 

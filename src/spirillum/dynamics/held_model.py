@@ -1,0 +1,184 @@
+"""A robot that is held to its channel's axis as a handful of numbers: what other programs compute it from.
+
+Held, a robot has two degrees of freedom and no inertia: its speed and rates follow the motor's torque and an imposed
+flow at once and linearly, and the current (17) is the only state with dynamics of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.held import axial_response
+from spirillum.errors import InputError
+from spirillum.quantities import unit_of
+from spirillum.robot.batch import Electrics
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.balance import coasting_rates, friction_torques
+from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.prediction import Prediction, predict
+from spirillum.swimming.steady import calibrated_balance
+
+__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "held_model"]
+
+
+class Parameter(NamedTuple):
+    """One number of the equations."""
+
+    name: str
+    """Field of the robot file, or quantity of the registry."""
+    unit: str
+    """SI."""
+    meaning: str
+    """What it is, in half a sentence."""
+
+
+PARAMETERS = (
+    Parameter("motor.torque_constant", "N m/A", "K_m: torque in the joint per current, gear included"),
+    Parameter("motor.back_emf_constant", "V s/rad", "K_b: back-emf per rate of the joint, gear included"),
+    Parameter("motor.inductance", "H", "L"),
+    Parameter("motor.resistance.constant", "ohm", "R(I): constant part"),
+    Parameter("motor.resistance.decay", "ohm", "R(I): part that decays with the current"),
+    Parameter("motor.resistance.decay_rate", "1/A", "R(I): how fast it decays"),
+    Parameter("motor.resistance.growth", "ohm", "R(I): part that grows with the current"),
+    Parameter("motor.resistance.growth_rate", "1/A", "R(I): how fast it grows"),
+    Parameter("motor.resistance.slope", "ohm/A", "R(I): part in proportion to the current"),
+    Parameter("battery.voltage", "V", "V(I) without a current"),
+    Parameter("battery.internal_resistance", "ohm", "V(I): loss per current"),
+    Parameter("polarity", "1", "sense about +x in which the motor turns the tail: 1 or -1"),
+    *(
+        Parameter(f"{of}_per_{per}", unit_of(f"{of}_per_{per}"), f"{words} per {over}")
+        for per, over in (("torque", "joint torque"), ("flow", "imposed mean flow"))
+        for of, words in (
+            ("forward_velocity", "forward velocity"),
+            ("body_rotation_rate", "body rate"),
+            ("tail_rotation_rate", "tail rate"),
+        )
+    ),
+)
+"""The numbers in the order of the compiled equations, which know them by their places."""
+STATES = ("motor_current", "position", "tail_angle", "body_angle", "battery_charge_used")
+"""The state in the order of the compiled equations; quantities of the registry."""
+
+
+@dataclass(frozen=True)
+class HeldModel:
+    """The equations of a held robot, SI; rates and current signed about +x."""
+
+    prediction: Prediction
+    """The steady motion, with robot, model and friction."""
+    values: tuple[float, ...]
+    """Of `PARAMETERS`."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.prediction.robot
+
+    @property
+    def flow(self) -> float | None:
+        """Mean flow that is imposed at the start, m/s; None: none is, and the equations have no such input."""
+        return self.prediction.batch.placement.flow
+
+    @property
+    def duty(self) -> float:
+        """The drive's own duty."""
+        motor = self.prediction.batch.electrics
+        return 1.0 if motor is None else float(motor.duty[0])
+
+    @property
+    def capacity(self) -> float:
+        """Charge of the battery, C; infinite where it is unknown."""
+        battery = self.robot.battery
+        return np.inf if battery is None or battery.capacity is None else battery.capacity
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The numbers by name."""
+        return dict(zip((item.name for item in PARAMETERS), self.values, strict=True))
+
+
+def held_model(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = AUTO,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+) -> HeldModel:
+    """The equations of a robot that is held to its channel's axis, as in a run of `simulate` with motion `held`.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+        model: a hydrodynamic model, or `auto`.
+        friction: reading of the friction; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+        placement: where the robot is held, for `tube`; with a `flow` the imposed flow is an input, which starts there.
+
+    Raises:
+        InputError: for wrong input, another drive, or a robot or place that the model does not know.
+    """
+    placed = Placement.of(placement)
+    still = placed if placed.flow is None else placed.model_copy(update={"flow": 0.0})
+    steady = predict(
+        robot,
+        model=model,
+        friction=friction,
+        calibrated=calibrated,
+        calibration=calibration,
+        placement=still if placed.is_given else None,
+        band=False,
+    )
+    motor = steady.batch.electrics
+    if steady.batch.drive != "dc-motor" or motor is None:
+        raise InputError(f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a motor to switch")
+    response = axial_response(steady.batch, steady)
+    per_flow = np.zeros(3) if placed.flow is None else _per_flow(steady)
+    if placed.flow is not None:
+        steady = predict(
+            robot,
+            model=steady.model.name,
+            friction=friction,
+            calibrated=calibrated,
+            calibration=calibration,
+            placement=placed,
+            band=False,
+        )
+    values = (*_of_motor(motor), response.speed, response.body_rate, response.tail_rate, *per_flow.tolist())
+    return HeldModel(steady, values)
+
+
+def _of_motor(motor: Electrics) -> tuple[float, ...]:
+    columns = (
+        motor.joint_torque_constant,
+        motor.joint_back_emf_constant,
+        motor.inductance,
+        motor.constant,
+        motor.decay,
+        motor.decay_rate,
+        motor.growth,
+        motor.growth_rate,
+        motor.slope,
+        motor.voltage,
+        motor.internal_resistance,
+        motor.polarity,
+    )
+    return tuple(float(column[0]) for column in columns)
+
+
+def _per_flow(steady: Prediction) -> Samples:
+    """(U, Omega, omega) per imposed mean flow while the motor gives no torque."""
+    batch = steady.batch.placed(steady.batch.placement.model_copy(update={"flow": 1.0}))
+    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
+    motor = batch.electrics
+    rotor = np.zeros(1) if motor is None else motor.joint_rotor_friction
+    body, tail = coasting_rates(s, friction_torques(steady.friction, np.array([steady.effective_friction]), rotor))
+    return np.array([float(s.speed(body, tail)[0]), float(body[0]), float(tail[0])])

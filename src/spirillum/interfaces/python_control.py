@@ -1,0 +1,150 @@
+"""The held robot as a system of the library python-control, with named signals, and linearised at a stated point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
+from spirillum.dynamics.held_model import STATES, HeldModel, held_model
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
+from spirillum.units import KINDS, parse_option
+
+if TYPE_CHECKING:
+    import control
+
+__all__ = ["LinearSystem", "control_system", "linear_system"]
+
+
+@dataclass(frozen=True)
+class LinearSystem:
+    """A robot's equations linearised, and where."""
+
+    system: control.StateSpace
+    """Of deviations from the point below; signals as in `control_system`."""
+    inputs: dict[str, float]
+    """The point: inputs by name, SI."""
+    outputs: dict[str, float]
+    """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
+    time_constant: float
+    """Of the motor's current there, s; path, angles and charge only add up."""
+
+
+def control_system(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    model: str = AUTO,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+) -> control.NonlinearIOSystem:
+    """A robot held to its channel's axis as a system of python-control (extra `control`).
+
+    Inputs are `duty`, 0 (off) to 1, and with an imposed flow `mean_flow`, m/s; states and outputs are quantities of the
+    registry by name, SI, rates signed about +x. A duty beyond its range is taken at its end, as the drive does. The
+    system's `params` are the robot's numbers, see `held_model.PARAMETERS`, and can be changed in a response.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+        model: a hydrodynamic model, or `auto`.
+        friction: reading of the friction; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+        placement: where the robot is held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
+
+    Raises:
+        InputError: for wrong input, another drive, or where python-control is not installed; in a response, for an
+            input that is no number.
+    """
+    library = required("control", "a system of python-control", "control")
+    held = held_model(
+        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
+    )
+    return library.nlsys(
+        lambda _t, x, u, params: rates(params, float(x[0]), *_inputs_of(u)),
+        lambda _t, x, u, params: outputs(params, x, *_inputs_of(u)),
+        name=held.robot.name,
+        inputs=_inputs(held),
+        states=list(STATES),
+        outputs=list(OUTPUTS),
+        params=held.parameters,
+    )
+
+
+def linear_system(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    *,
+    duty: float | None = None,
+    flow: str | float | None = None,
+    model: str = AUTO,
+    friction: str | None = None,
+    calibrated: bool = True,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
+) -> LinearSystem:
+    """The system of `control_system` linearised where a duty and a flow have become steady, in closed form.
+
+    Args:
+        robot: as `control_system`.
+        duty: duty of the point, 0 to 1; None: the drive's own.
+        flow: mean flow of the point, with its unit or a float in m/s; None: that of the placement.
+        model: as `control_system`.
+        friction: as `control_system`.
+        calibrated: as `control_system`.
+        calibration: as `control_system`.
+        placement: as `control_system`.
+
+    Raises:
+        InputError: as `control_system`, and for a flow without one in the placement.
+    """
+    library = required("control", "a system of python-control", "control")
+    held = held_model(
+        robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
+    )
+    at_duty = held.duty if duty is None else float(duty)
+    if not 0.0 <= at_duty <= 1.0:
+        raise InputError(f"duty = {at_duty:g}; allowed: a number from 0 to 1")
+    if flow is not None and held.flow is None:
+        raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
+    at_flow = (held.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
+    values = held.parameters
+    current = steady_state(values, at_duty, at_flow)
+    a, b, c, d = slopes(values, current, at_duty)
+    names = _inputs(held)
+    kept = len(names)
+    system = library.ss(
+        a, b[:, :kept], c, d[:, :kept], name=held.robot.name, inputs=names, states=list(STATES), outputs=list(OUTPUTS)
+    )
+    found = outputs(values, np.array([current, 0.0, 0.0, 0.0, 0.0]), at_duty, at_flow)
+    return LinearSystem(
+        system=system,
+        inputs=dict(zip(names, (at_duty, at_flow), strict=False)),
+        outputs=dict(zip(OUTPUTS, found.tolist(), strict=True)),
+        time_constant=-1.0 / float(a[0, 0]),
+    )
+
+
+def _inputs(held: HeldModel) -> list[str]:
+    return [INPUTS[0]] if held.flow is None else list(INPUTS)
+
+
+def _inputs_of(u: Samples) -> tuple[float, float]:
+    """Duty and flow from a system's inputs.
+
+    Raises:
+        InputError: if one is no number.
+    """
+    if not np.all(np.isfinite(u)):
+        name = INPUTS[int(np.flatnonzero(~np.isfinite(u))[0])]
+        raise InputError(f"{name} = {float(u[~np.isfinite(u)][0])}; allowed: a number")
+    return min(max(float(u[0]), 0.0), 1.0), float(u[1]) if len(u) > 1 else 0.0
