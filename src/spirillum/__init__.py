@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from spirillum.interfaces.python_control import LinearSystem as LinearSystem
     from spirillum.interfaces.python_control import control_system as control_system
     from spirillum.interfaces.python_control import linear_system as linear_system
+    from spirillum.live.observation import Observation as Observation
+    from spirillum.live.tracker import LiveTracker as LiveTracker
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
     from spirillum.measurement.measure import Measurement as Measurement
@@ -70,8 +72,10 @@ _HOME = {
     "Flow": "spirillum.fields.flow",
     "InputError": "spirillum.errors",
     "LinearSystem": "spirillum.interfaces.python_control",
+    "LiveTracker": "spirillum.live.tracker",
     "Measurement": "spirillum.measurement.measure",
     "ModelComparison": "spirillum.swimming.comparison",
+    "Observation": "spirillum.live.observation",
     "Picture3D": "spirillum.view.scene3d.show",
     "Plant": "spirillum.dynamics.plant",
     "Prediction": "spirillum.swimming.prediction",

@@ -14,6 +14,18 @@ from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
+from spirillum.measurement.systematic import (
+    AMPLITUDE_ERROR,
+    DRIFT_ANGLE,
+    DRIFT_BARE,
+    DRIFT_PIXELS,
+    HEADING_ERROR,
+    LONG,
+    PHASE_ERROR,
+    PIXEL_ERROR,
+    POSITION_ERROR,
+    STRIPE_ERROR,
+)
 from spirillum.robot.robot import Robot
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
@@ -44,27 +56,6 @@ WOBBLES = (
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
 """All quantities of a trial, and of a summary over trials."""
 _NORMAL = 1.959964
-_PIXEL_ERROR = 0.03
-"""Least expected amplitude of periodic errors of the position, by an angle or by the pixel grid, pixels."""
-_AMPLITUDE_ERROR = 0.12
-"""Relative standard error of a lateral amplitude: static edges of the glass beside the body bias it towards zero.
-
-On rendered films from the side, with the body within a few pixels of the tube's edge, the bias was 12 to 20 %."""
-_STRIPE_ERROR = math.radians(0.2)
-"""Least expected amplitude of errors of the body's angle that repeat with every stripe, rad."""
-_PHASE_ERROR = math.radians(1.0)
-"""Least expected amplitude of errors of the tail's phase that repeat once or twice a turn, rad."""
-_DRIFT_PIXELS = 0.01
-"""Drift of the position error from end to end, by light and perspective, pixels."""
-_DRIFT_BARE = 0.1
-"""Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered films."""
-_DRIFT_ANGLE = math.radians(0.1)
-"""Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
-_POSITION_ERROR = 0.15
-"""Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
-_HEADING_ERROR = math.radians(0.2)
-"""Systematic standard error of the heading of a body that is `_LONG` pixels long, rad."""
-_LONG = 100.0
 _FEW_TURNS = 2.0
 """Fewest turns over which a wobble is fitted."""
 _DEGREE = 5
@@ -173,8 +164,8 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
         name: _with_errors(fits[name], "rad/s", *_drifts(track, name), _timing(fits[name], track)) for name in rates
     }
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
-    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", _POSITION_ERROR * pixel)
-    quantities["heading"] = _mean(track, track.heading, "rad", _HEADING_ERROR * _LONG * pixel / robot.body.length)
+    quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", POSITION_ERROR * pixel)
+    quantities["heading"] = _mean(track, track.heading, "rad", HEADING_ERROR * LONG * pixel / robot.body.length)
     quantities |= _wobbles(track, robot)
     if not by_hand:
         quantities = {name: _with_interval(item) for name, item in quantities.items()}
@@ -199,17 +190,17 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
     if math.isfinite(pixel):  # manual readings in millimetres have no pixel grid
         angles = (_smooth(time, 2 * np.pi * x / pixel), tail, body, around * body)
         of_x = [
-            PeriodicError(angle, _expected(track.position_error, _PIXEL_ERROR * pixel))
+            PeriodicError(angle, _expected(track.position_error, PIXEL_ERROR * pixel))
             for angle in angles
             if _turns(angle)
         ]
     of_body = [
-        PeriodicError(multiple * body, _expected(track.body_angle_error, _STRIPE_ERROR))
+        PeriodicError(multiple * body, _expected(track.body_angle_error, STRIPE_ERROR))
         for multiple in sorted({1, repeats, 2 * repeats, 3 * repeats, around})
         if _turns(body)
     ]
     of_tail = [
-        PeriodicError(multiple * tail, _expected(track.tail_phase_error, _PHASE_ERROR))
+        PeriodicError(multiple * tail, _expected(track.tail_phase_error, PHASE_ERROR))
         for multiple in (1, 2)
         if _turns(tail)
     ]
@@ -281,7 +272,7 @@ def _drifts(track: Track, name: str) -> list[float]:
     errors = {"body_rotation_rate": (track.body_angle_error,), "tail_rotation_rate": (track.tail_phase_error,)}
     both = (track.body_angle_error, track.tail_phase_error)
     read = any(flag.name == BY_HAND for flag in track.flags)  # errors of manual readings are independent
-    return [_drift(track, _DRIFT_ANGLE if read else _expected(error, _DRIFT_ANGLE)) for error in errors.get(name, both)]
+    return [_drift(track, DRIFT_ANGLE if read else _expected(error, DRIFT_ANGLE)) for error in errors.get(name, both)]
 
 
 def _velocity(rate: Rate, track: Track) -> Measured:
@@ -289,7 +280,7 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name == "no-stripes" for flag in track.flags)
-    return _with_errors(rate, "m/s", _drift(track, (_DRIFT_BARE if bare else _DRIFT_PIXELS) * pixel), scale)
+    return _with_errors(rate, "m/s", _drift(track, (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel), scale)
 
 
 def _mean(track: Track, values: Samples, unit: str, systematic: float) -> Measured:
@@ -312,7 +303,7 @@ def _wobbles(track: Track, robot: Robot) -> dict[str, Measured]:
     for part, angle in (("tail", track.tail_phase), ("body", track.body_angle)):
         size, error = _amplitude(track.time, track.position[:, 1], angle)
         turned, turned_error = _amplitude(track.time, track.heading, angle)
-        added = math.hypot(_PIXEL_ERROR * pixel, _AMPLITUDE_ERROR * size if math.isfinite(size) else 0.0)
+        added = math.hypot(PIXEL_ERROR * pixel, AMPLITUDE_ERROR * size if math.isfinite(size) else 0.0)
         found[f"lateral_wobble_at_{part}_rate"] = _wobble(size, math.hypot(error, added), "m", part)
         found[f"heading_wobble_at_{part}_rate"] = _wobble(turned, math.hypot(turned_error, added / half), "rad", part)
     return {name: found[name] for name in WOBBLES}

@@ -145,6 +145,10 @@ class FirstLookConstants:
     """Least share of such frames."""
     faint: float = 0.4
     """Score over that on the best frames below which a frame is not learnt from: the robot is partly out of view."""
+    doubtful: float = 0.6
+    """Score over that on the best frames below which a frame is looked at again where the others say."""
+    clearer: float = 1.2
+    """Score there over the first one from which on it is taken."""
     whole_frames: int = 4
     """Frames in full view that are enough to learn stripes and tail from."""
     relearning: int = 3

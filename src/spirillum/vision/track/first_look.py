@@ -121,10 +121,28 @@ def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequ
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
     found = [refined(frame.image, still, body, Candidate(on_the_way(known, frame.time), 0.0)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
+    found = _on_one_way(found, usual, body, frames, still)
     clear = [
         (frame, one.pose) for frame, one in zip(frames, found, strict=True) if one.score > FIRST_LOOK.faint * usual
     ]
     return _Learnt([frame for frame, _ in clear], [pose for _, pose in clear], usual, [True] * len(clear))
+
+
+def _on_one_way(
+    found: list[Candidate], usual: float, body: BodyFinder, frames: Sequence[Frame], still: Samples
+) -> list[Candidate]:
+    """Look again, where the clear frames say, on those that are less clear: they may show clutter for the body."""
+    sure = {k: (frames[k].time, one.pose) for k, one in enumerate(found) if one.score > FIRST_LOOK.doubtful * usual}
+    doubtful = [k for k in range(len(found)) if k not in sure]
+    if len(sure) < FIRST_LOOK.whole_frames or not doubtful:
+        return found
+    found = list(found)
+    for k in sorted(doubtful, key=lambda k: min(abs(k - other) for other in sure)):
+        guess = on_the_way(sorted(sure.values()), frames[k].time)
+        better = refined(frames[k].image, still, body, Candidate(guess, 0.0))
+        if better.score > FIRST_LOOK.clearer * found[k].score:
+            found[k], sure[k] = better, (frames[k].time, better.pose)
+    return found
 
 
 def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:

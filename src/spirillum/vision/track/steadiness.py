@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,11 +19,41 @@ from spirillum.vision.track.constants import STEADINESS
 from spirillum.vision.track.first_look import Start
 from spirillum.vision.video.frames import Frame
 
-__all__ = ["camera_flags", "shift_between"]
+__all__ = ["View", "camera_flags", "shift_between", "shift_of", "view_of"]
 
 _STEPS, _STILL = 8, 0.01
 """Most Gauss-Newton steps, and the step below which they end, pixels."""
 _THREADS = 2
+
+
+class View(NamedTuple):
+    """What stands still in some pictures."""
+
+    lines: Lines | None
+    """The ruler's lines; None without a ruler."""
+    flat: Samples
+    """High-pass filtered brightness; 0 in the rows of the robot, (h, w)."""
+
+
+def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> View:
+    """What stands still in some pictures, three or more.
+
+    Args:
+        images: 8-bit RGB, (h, w, 3) each.
+        start: result of the first look.
+        ruled: whether a ruler is in the picture.
+    """
+    still, bounds = still_picture(list(images)), start.body.bounds
+    return View(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start)))
+
+
+def shift_of(first: View, other: View) -> tuple[float, bool]:
+    """Shift of a view along the channel against another one, pixels, and whether it says that the camera moved."""
+    rough = shift_between(first.flat, other.flat)
+    if first.lines is None:
+        return rough, abs(rough) > STEADINESS.moved_roughly
+    shift = rough if other.lines is None else _by_lines(first.lines, other.lines, rough)
+    return shift, abs(shift) > STEADINESS.moved
 
 
 def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple[Flag, ...]:
@@ -40,15 +71,10 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     ]
     if len(parts) < 2:
         return ()
-    bounds, rows = start.body.bounds, _rows_of(start)
     with ThreadPoolExecutor(_THREADS) as pool:
-        stills = list(pool.map(lambda part: still_picture([frames[k].image for k in part]), parts))
-        lines = list(pool.map(lambda still: lines_in(still, bounds) if ruled else None, stills))
-        smooth = list(pool.map(lambda still: _flat(still, bounds, rows), stills))
-        roughly = list(pool.map(lambda other: shift_between(smooth[0], other), smooth[1:]))
-    first, shifts = lines[0], [0.0]
-    for rough, found in zip(roughly, lines[1:], strict=True):
-        shifts.append(rough if first is None or found is None else _by_lines(first, found, rough))
+        views = list(pool.map(lambda part: view_of([frames[k].image for k in part], start, ruled=ruled), parts))
+        shifts = [0.0, *pool.map(lambda other: shift_of(views[0], other)[0], views[1:])]
+    first = views[0].lines
     bound = STEADINESS.moved if first is not None else STEADINESS.moved_roughly
     if np.ptp(shifts) < bound:
         return ()

@@ -19,7 +19,7 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import UNWRAPPING
 from spirillum.vision.track.motion import Motion
 
-__all__ = ["contradictions", "no_stripe_passes", "nothing_moves", "unwrapped"]
+__all__ = ["contradictions", "likeliest_rate", "no_stripe_passes", "nothing_moves", "unwrapped"]
 
 _Part = Literal["body", "tail"]
 _RATES: dict[str, tuple[str, ...]] = {"body": ("body_rotation_rate",), "tail": ("tail_rotation_rate",)}
@@ -77,6 +77,18 @@ def _resultant(t: Samples, a: Samples, period: float, dt: float, rates: Samples)
     near = (spans > 0) & (spans < 3.5 * dt)
     turns = (steps[near] - rates[:, None] * spans[near]) / period
     return np.asarray(np.mean(np.cos(2 * np.pi * turns), axis=1) if near.any() else np.zeros(rates.size))
+
+
+def likeliest_rate(time: Samples, angle: Samples, period: float, usual: float) -> float:
+    """The rate below half a period a frame that fits the steps of some readings best, rad/s.
+
+    Args:
+        time: of the readings, s, (n,), two or more.
+        angle: modulo `period`, rad, (n,).
+        period: of the angle, rad.
+        usual: time from frame to frame, s.
+    """
+    return _rate(time, angle, period, usual)[0]
 
 
 def _rate(t: Samples, a: Samples, period: float, dt: float) -> tuple[float, float]:

@@ -1,0 +1,240 @@
+"""A robot that is known, followed frame by frame, and what is said of each frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.live.observation import Observation
+from spirillum.live.watch import CameraWatch, Readings, motion_flags
+from spirillum.live.windows import Window, periodic_error
+from spirillum.measurement.systematic import (
+    DRIFT_ANGLE,
+    DRIFT_BARE,
+    DRIFT_PIXELS,
+    PHASE_ERROR,
+    PIXEL_ERROR,
+    STRIPE_ERROR,
+)
+from spirillum.measurement.trials import LEVEL, RATE_NAMES, Measured, Trial, trial_of
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.optics import BodyPose, places_seen_by
+from spirillum.vision.flag import Flag
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.assembly import track_of
+from spirillum.vision.track.body import Placed
+from spirillum.vision.track.causal_angle import CausalAngle
+from spirillum.vision.track.constants import VISIBILITY
+from spirillum.vision.track.direction import along_its_way
+from spirillum.vision.track.learning import Learnt
+from spirillum.vision.track.size import checked_scale
+from spirillum.vision.track.steps import Follower
+from spirillum.vision.video.frames import Frame, Video
+
+__all__ = ["Following"]
+
+_CHECKED = 1.0
+"""Time between two looks at the last seconds for what is odd, s."""
+_LOOKED_BACK = 10.0
+"""Time over which that looks back, s."""
+_MOST_FRAMES = 36_000
+"""Frames that the summary keeps: twenty minutes at 30 a second."""
+_NORMAL = 1.959964
+_VELOCITY, _BODY, _TAIL, _MOTOR = RATE_NAMES
+_NOT_SEEN = "the robot is not seen where it should be"
+_NOT_WHOLE = "the robot is partly out of view"
+
+
+class Following:
+    """A robot that is known, and what was seen of it."""
+
+    def __init__(self, video: Video, setup: Setup, robot: Robot, learnt: Learnt, window: float) -> None:
+        """Begin.
+
+        Args:
+            video: the source, for its name and the size of its pictures.
+            setup: its setup.
+            robot: the robot.
+            learnt: camera, scale, and the robot as it looks.
+            window: time over which rates are taken, s.
+        """
+        self.video, self.setup, self.robot, self.learnt = video, setup, robot, learnt
+        ruled = setup.markers.spacing is not None
+        self.follower = Follower(learnt.known, learnt.still, ahead=False)
+        self.body, self.tail = CausalAngle(learnt.known.stripes.period), CausalAngle(2.0 * math.pi)
+        self.windows = {name: Window(window) for name in RATE_NAMES}
+        self.readings = Readings(_LOOKED_BACK)
+        self.camera = CameraWatch(learnt.known.start, ruled=ruled)
+        start = learnt.known.start
+        self.scale, size_flags = checked_scale(learnt.sight.scale, start.body, learnt.known.size)
+        self.roll, rolled = (0.0, ()) if ruled else self._roll()
+        self.always = (*learnt.sight.flags, *size_flags, *rolled)
+        self.moved: tuple[Flag, ...] = ()
+        self.flags: tuple[Flag, ...] = (*self.always, *learnt.flags)
+        self.next_check = -math.inf
+        self.restarts = (0, 0)
+
+    def _roll(self) -> tuple[float, tuple[Flag, ...]]:
+        """Angle of the channel to the rows of the picture where no ruler tells it, by the first look."""
+        path = self.learnt.known.start.path
+        time, pose = np.array([at for at, _ in path]), np.array([one for _, one in path])
+        along = along_its_way(time, self._places(pose[:, :2]), pose[:, 2])
+        return float(np.median(pose[:, 2] - along.heading)), along.flags
+
+    def _places(self, xy: np.ndarray) -> np.ndarray:
+        """Places in the camera's frame at the stated scale, from the middle of the picture, m, (n, 2)."""
+        sight = self.learnt.sight.optics
+        return places_seen_by(sight, self.learnt.known.start.body.optics, xy) - sight.origin[:2]
+
+    def observed(self, frame: Frame) -> Observation:
+        """What a frame shows."""
+        self.follower.step(frame)
+        record = self.follower.record
+        found, roll, tail = record.placed[-1], record.roll[-1], record.tail[-1]
+        whole = found.known and found.inside >= VISIBILITY.full_view
+        if not whole:
+            roll = tail = (math.nan, math.nan)
+        body_angle = self.body.update(frame.time, *roll)
+        tail_phase = self.tail.update(frame.time, *tail)
+        place, pixel = (math.nan, math.nan), (math.nan, math.nan)
+        if whole:
+            place, pixel = self._place(found.pose)
+        self._take(frame.time, place[0], body_angle, tail_phase)
+        self.readings.add((frame.time, place[0], body_angle, tail_phase, *roll, *tail))
+        self._look(frame)
+        if len(record.time) > _MOST_FRAMES:
+            self._forget(_MOST_FRAMES // 2)
+        seen = Observation(
+            frame.index,
+            frame.time,
+            "tracking" if whole else "lost",
+            "" if whole else (_NOT_WHOLE if found.known else _NOT_SEEN),
+            x=place[0],
+            y=place[1],
+            heading=found.pose.heading - self.roll if whole else math.nan,
+            body_angle=body_angle,
+            tail_phase=tail_phase,
+            position_error=self._magnified(found) if whole else math.nan,
+            heading_error=found.error.heading if whole else math.nan,
+            body_angle_error=roll[1] if math.isfinite(body_angle) else math.nan,
+            tail_phase_error=tail[1] if math.isfinite(tail_phase) else math.nan,
+            body_period=self.body.period,
+            rates=self._rates(roll[1], tail[1]),
+            pixel=pixel,
+            flags=self.flags,
+        )
+        return _without_spoiled(seen)
+
+    def _magnified(self, found: Placed) -> float:
+        """Standard error of the place at the stated scale, m."""
+        known, sight = self.learnt.known.start.body.optics, self.learnt.sight.optics
+        return found.error.x * known.focal / sight.focal
+
+    def _place(self, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Along and across the channel, m, and the pixel of the body's mid-length."""
+        optics = self.learnt.known.start.body.optics
+        x, y = self._places(np.array([[pose.x, pose.y]]))[0]
+        c, s = math.cos(self.roll), math.sin(self.roll)
+        u, v = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]]))[0]
+        return (float(c * x + s * y), float(c * y - s * x)), (float(u), float(v))
+
+    def _take(self, time: float, x: float, body: float, tail: float) -> None:
+        """Readings into the windows; those before a break of an angle do not hang together with those after it."""
+        restarts = self.body.restarts, self.tail.restarts
+        for name, before, now in zip((_BODY, _TAIL), self.restarts, restarts, strict=True):
+            if before != now:
+                self.windows[name].clear()
+                self.windows[_MOTOR].clear()
+        self.restarts = restarts
+        for name, value in zip(RATE_NAMES, (x, body, tail, tail - body), strict=True):
+            self.windows[name].add(time, value)
+
+    def _look(self, frame: Frame) -> None:
+        """Renew the flags once a second."""
+        moved = self.camera.look(frame)
+        if moved:
+            self.moved = moved  # what stood still is not where it was: this stays
+        if frame.time < self.next_check and not moved:
+            return
+        self.next_check = frame.time + _CHECKED
+        hand = self.learnt.known.wire.handedness()
+        odd = motion_flags(self.readings, self.robot, self.body.period, hand)
+        self.flags = (*self.moved, *self.always, *self.learnt.flags, *odd)
+
+    def _rates(self, body_error: float, tail_error: float) -> dict[str, Measured]:
+        """Speed and rates over the window."""
+        slopes = {name: window.slope(LEVEL) for name, window in self.windows.items()}
+        pixel, scale = self.scale.length_per_pixel, self.scale.relative_uncertainty
+        known = {name: slope[0] if math.isfinite(slope[0]) else 0.0 for name, slope in slopes.items()}
+        striped = bool(self.learnt.known.stripes.stripes)
+        around = len(self.learnt.known.stripes.stripes) * known[_BODY]
+        body_size = max(STRIPE_ERROR, body_error if math.isfinite(body_error) else 0.0)
+        tail_size = max(PHASE_ERROR, tail_error if math.isfinite(tail_error) else 0.0)
+        grid = 2.0 * math.pi * known[_VELOCITY] / pixel
+        returning = {
+            _VELOCITY: (PIXEL_ERROR * pixel, (grid, known[_TAIL], known[_BODY], around)),
+            _BODY: (body_size, (known[_BODY], around)),
+            _TAIL: (tail_size, (known[_TAIL], 2.0 * known[_TAIL])),
+        }
+        drifts = {
+            _VELOCITY: (DRIFT_PIXELS if striped else DRIFT_BARE) * pixel,
+            _BODY: max(DRIFT_ANGLE, body_size / 2.0),
+            _TAIL: max(DRIFT_ANGLE, tail_size / 2.0),
+        }
+        found = {}
+        for name in RATE_NAMES:
+            unit = "m/s" if name == _VELOCITY else "rad/s"
+            value, half, span = slopes[name]
+            if not math.isfinite(value):
+                found[name] = Measured.missing(unit, f"too few readings in the last {self.windows[name].length:g} s")
+                continue
+            parts = (_BODY, _TAIL) if name == _MOTOR else (name,)
+            errors = [periodic_error(*returning[part], span) for part in parts]
+            errors += [drifts[part] / span for part in parts]
+            errors += [scale * value] if name == _VELOCITY else []
+            half = math.hypot(half, _NORMAL * math.hypot(*errors))
+            found[name] = Measured(value, value - half, value + half, unit)
+        return found
+
+    def _forget(self, count: int) -> None:
+        """Forget the first frames."""
+        record = self.follower.record
+        for column in (record.time, record.index, record.placed, record.roll, record.tail):
+            del column[:count]
+
+    def trial(self, name: str) -> Trial:
+        """The measurement of all frames that are kept.
+
+        Args:
+            name: of the source.
+
+        Raises:
+            InputError: if there is none.
+        """
+        flags = (*self.moved, *self.learnt.sight.flags, *self.learnt.flags)
+        known, sight = self.learnt.known, self.learnt.sight
+        if not self.follower.record.time:
+            raise InputError(f"{name} has no frame after the robot was learnt; allowed: a longer one")
+        return trial_of(track_of(self.video, self.setup, sight, known, self.follower.record, flags), self.robot, name)
+
+
+def _without_spoiled(seen: Observation) -> Observation:
+    """An observation without the numbers that a flag spoils; the first such flag is the reason."""
+    rates, changes = dict(seen.rates), dict[str, Any]()
+    for flag in reversed(seen.flags):
+        names = set(flag.spoils)
+        if names & {_BODY, _TAIL}:
+            names.add(_MOTOR)
+        for name in names & set(rates):
+            rates[name] = Measured.missing(rates[name].unit, flag.sentence)
+        if _VELOCITY in names:
+            changes |= {"x": math.nan, "y": math.nan, "position_error": math.nan}
+        if _BODY in names:
+            changes |= {"body_angle": math.nan, "body_angle_error": math.nan}
+        if _TAIL in names:
+            changes |= {"tail_phase": math.nan, "tail_phase_error": math.nan}
+    return replace(seen, rates=rates, **changes)

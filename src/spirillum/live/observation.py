@@ -1,0 +1,86 @@
+"""What the live tracker says of one frame."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from spirillum.answer import envelope, quantity
+from spirillum.measurement.trials import Measured
+from spirillum.vision.flag import Flag
+
+__all__ = ["Observation", "State"]
+
+State = Literal["learning", "tracking", "lost"]
+"""`learning`: the robot's appearance is not yet known; `lost`: it is not where it should be, or not in full view."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A robot on one frame, from this frame and those before it; SI, NaN where it was not seen."""
+
+    frame: int
+    """Number of the frame, from 0; frames that were left out are counted."""
+    time: float
+    """When it was taken, s."""
+    state: State
+    """`learning`, `tracking` or `lost`."""
+    reason: str = ""
+    """Why it is not tracking, in one sentence."""
+    x: float = math.nan
+    """The body's mid-length along the channel, from the middle of the picture, towards the nose, m."""
+    y: float = math.nan
+    """Across the channel, m."""
+    heading: float = math.nan
+    """Angle of the motor axis to the channel, rad."""
+    body_angle: float = math.nan
+    """Angle by which the body has turned about +x, continuous, rad; all of it may be off by `body_period`."""
+    tail_phase: float = math.nan
+    """Phase of the tail about +x in the lab, continuous, rad; all of it may be off by whole turns."""
+    position_error: float = math.nan
+    """Standard error of x, m."""
+    heading_error: float = math.nan
+    """Standard error of the heading, rad."""
+    body_angle_error: float = math.nan
+    """Standard error of the body's angle, rad."""
+    tail_phase_error: float = math.nan
+    """Standard error of the tail's phase, rad."""
+    body_period: float = 2.0 * math.pi
+    """Angle after which the stripes look the same, rad."""
+    rates: Mapping[str, Measured] = field(default_factory=dict)
+    """Speed and rates over the last seconds, by the names of `measure`, each with a 95 % interval or a reason."""
+    pixel: tuple[float, float] = (math.nan, math.nan)
+    """Pixel (u, v) of the body's mid-length."""
+    flags: tuple[Flag, ...] = ()
+    """What to know about this frame's numbers."""
+
+    @property
+    def seen(self) -> bool:
+        """Whether the robot was seen on this frame."""
+        return self.state == "tracking"
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON, SI with rates in rad/s."""
+        content: dict[str, Any] = {
+            "frame": self.frame,
+            "time": quantity(self.time, "s"),
+            "state": self.state,
+        }
+        if self.reason:
+            content["reason"] = self.reason
+        if self.state != "learning":
+            content |= {
+                "position": quantity([self.x, self.y], "m", standard_error=_known(self.position_error)),
+                "heading": quantity(self.heading, "rad", standard_error=_known(self.heading_error)),
+                "body_angle": quantity(self.body_angle, "rad", standard_error=_known(self.body_angle_error)),
+                "tail_phase": quantity(self.tail_phase, "rad", standard_error=_known(self.tail_phase_error)),
+                "pixel": quantity(list(self.pixel), "px"),
+            }
+            content |= {name: item.to_dict() for name, item in self.rates.items()}
+        return envelope("live-observation", content, [flag.sentence for flag in self.flags])
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,106 @@
+"""From what was seen on every frame to a track: lengths, continuous angles, true times, and all flags."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
+from spirillum.vision.camera.scale import Sight
+from spirillum.vision.flag import Flag
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.constants import LOST_FRAMES
+from spirillum.vision.track.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.direction import Along, along_its_way
+from spirillum.vision.track.identity import Identified
+from spirillum.vision.track.lost_frames import Reading, restored_times
+from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.size import checked_scale
+from spirillum.vision.track.steps import Record
+from spirillum.vision.track.track import Track
+from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
+from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
+from spirillum.vision.video.frames import Video
+
+__all__ = ["track_of"]
+
+
+def track_of(
+    video: Video, setup: Setup, sight: Sight, known: Identified, record: Record, flags: tuple[Flag, ...]
+) -> Track:
+    """The track of a film, with all flags.
+
+    Args:
+        video: the film.
+        setup: its setup.
+        sight: the calibrated camera.
+        known: the robot.
+        record: what was seen on every frame.
+        flags: those of film, camera and first look.
+    """
+    body, time = known.start.body, np.array(record.time)
+    seen = np.array([one.known for one in record.placed])
+    pose = np.where(seen[:, None], np.array([one.pose for one in record.placed]), np.nan)
+    errors = np.array([one.error for one in record.placed])
+    roll, tail = np.array(record.roll), np.array(record.tail)
+    optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
+    seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
+    cut = cut_off(record.placed)
+    pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
+    position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
+    along = Along(position, pose[:, 2], ())
+    if setup.markers.spacing is None:  # no ruler says how the camera is rolled
+        along = along_its_way(time, *along[:2])
+    position = along.position
+    frame, gap_flags = gaps_of(time, np.array(record.index, dtype=float))
+    restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
+    time = restored.time
+    body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
+    tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
+    scale, size_flags = checked_scale(sight.scale, body, known.size)
+    hand = known.wire.handedness()
+    motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
+    odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
+    odd += no_stripe_passes(motion, body.robot)
+    early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
+    cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
+    return Track(
+        time=time,
+        frame=frame,
+        position=position,
+        heading=along.heading,
+        body_angle=body_angle,
+        tail_phase=tail_phase,
+        position_error=errors[:, 0] * optics.focal / sight.optics.focal,
+        body_angle_error=np.where(np.isfinite(body_angle), roll[:, 1], np.nan),
+        tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
+        picture=_drawn(pose, body.robot, optics),
+        size=video.size,
+        scale=scale,
+        setup=setup,
+        video=video.name,
+        words=video.words,
+        time_uncertainty=restored.relative_error,
+        flags=(*early, *cuts, *roll_flags, *tail_flags, *odd),
+    )
+
+
+def _readings(
+    body: Samples, tail: Samples, x: Samples, known: Identified, optics: Optics
+) -> tuple[Reading, Reading, Reading]:
+    """The series whose steps tell lost frames, with the least standard errors of a step."""
+    return (
+        Reading(tail, 2.0 * np.pi, LOST_FRAMES.tail_error),
+        Reading(body, known.stripes.period, LOST_FRAMES.body_error),
+        Reading(x, np.inf, LOST_FRAMES.place_error * optics.length_per_pixel),
+    )
+
+
+def _drawn(pose: Samples, robot: Robot, optics: Optics) -> Samples:
+    """Pixels of the body's mid-length and of its nose on every frame, (n, 4)."""
+    axis = np.array([[0.0, 0.0, 0.0], [0.5 * robot.body.length, 0.0, 0.0]])
+    out = np.full((len(pose), 4), np.nan)
+    for k in np.flatnonzero(np.isfinite(pose[:, 0])):
+        out[k] = optics.pixels(placed(axis, BodyPose(*pose[k].tolist()), optics.axis_height)).ravel()
+    return out

@@ -1,0 +1,55 @@
+"""What a first look at some frames of a video tells: the camera and its scale, and the robot's appearance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.camera import bounds_of, sight_of
+from spirillum.vision.camera.ruler import still_picture
+from spirillum.vision.camera.scale import Sight
+from spirillum.vision.flag import Flag
+from spirillum.vision.setup import Setup
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.identity import Identified, identify
+from spirillum.vision.video.frames import Frame, Video
+
+__all__ = ["Learnt", "learnt_from"]
+
+
+class Learnt(NamedTuple):
+    """Camera, scale, and the robot as it looks."""
+
+    sight: Sight
+    """The calibrated camera."""
+    known: Identified
+    """The robot."""
+    still: Samples
+    """Static background of the pictures, (h, w, 3)."""
+
+    @property
+    def flags(self) -> tuple[Flag, ...]:
+        """All that is odd about the robot so far, also about what was read since."""
+        known = self.known
+        return (*known.flags, *known.start.flags, *known.stripes.flags, *known.wire.flags)
+
+
+def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None) -> Learnt:
+    """Learn from some frames.
+
+    Args:
+        video: the video, for its name and the size of its pictures.
+        frames: frames spread over it.
+        setup: its setup.
+        robot: the robot in front of the camera.
+        folder: folder of the setup file, to which the checkerboard's folder is relative.
+
+    Raises:
+        InputError: if neither ruler nor robot is found.
+    """
+    still = still_picture([frame.image for frame in frames])
+    sight = sight_of(video, setup, still, folder)
+    finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
+    return Learnt(sight, identify(video.name, setup, finder, frames, still), still)

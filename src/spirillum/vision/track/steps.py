@@ -1,0 +1,125 @@
+"""One frame after the other: where the body is, and what stripes and tail say; nothing looks ahead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.track.body import Placed
+from spirillum.vision.track.constants import FOLLOWING
+from spirillum.vision.track.first_look import on_the_way
+from spirillum.vision.track.identity import Identified
+from spirillum.vision.track.search import candidates, refined
+from spirillum.vision.video.frames import Frame
+
+__all__ = ["Follower", "Record", "Seen"]
+
+_UNREAD = (np.nan, np.nan)
+
+
+class Seen(NamedTuple):
+    """The observation on one frame, for drawing."""
+
+    time: float
+    """Time of the frame, s."""
+    pose: BodyPose | None
+    """Pose of the body in the camera's frame; None where it was not detected."""
+    body_angle: float
+    """Rotation angle of the body, rad, modulo the stripes' period; NaN where unreadable."""
+    tail_phase: float
+    """Phase of the tail, rad, modulo 2 pi; NaN where unreadable."""
+    optics: Optics
+    """The camera."""
+
+
+@dataclass
+class Record:
+    """Observations on all frames so far."""
+
+    time: list[float] = field(default_factory=list)
+    """Time of each frame, s."""
+    index: list[int] = field(default_factory=list)
+    """Number of each frame."""
+    placed: list[Placed] = field(default_factory=list)
+    """The body on each frame."""
+    roll: list[tuple[float, float]] = field(default_factory=list)
+    """Angle of the body modulo the stripes' period, and its standard error, rad; NaN where unreadable."""
+    tail: list[tuple[float, float]] = field(default_factory=list)
+    """Phase of the tail modulo 2 pi, and its standard error, rad; NaN where unreadable."""
+
+
+class Follower:
+    """Follows a robot that is known from frame to frame."""
+
+    def __init__(self, known: Identified, still: Samples, *, ahead: bool = True) -> None:
+        """Begin.
+
+        Args:
+            known: the robot, with readers that have learnt its appearance.
+            still: static background of the pictures, (h, w, 3).
+            ahead: whether the first look has seen the frames that come, so that its path says where the robot is.
+        """
+        self.known, self.still, self.record = known, still, Record()
+        self._ahead = ahead
+        self._last: BodyPose | None = None
+
+    def step(self, frame: Frame) -> Seen:
+        """Place the robot on the next frame, and read its stripes and tail."""
+        start, record = self.known.start, self.record
+        found = self._placed(frame, self._guess(frame.time))
+        if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
+            found = self._found_again(frame.image, found)
+        roll = self.known.stripes.read(frame.image, found.pose) if found.known else _UNREAD
+        tail = self.known.wire.read(frame.image, found.pose) if found.known else _UNREAD
+        record.time.append(frame.time)
+        record.index.append(frame.index)
+        record.placed.append(found)
+        record.roll.append(roll)
+        record.tail.append(tail)
+        if found.known:
+            self._last = found.pose
+        return Seen(frame.time, found.pose if found.known else None, roll[0], tail[0], start.body.optics)
+
+    def _guess(self, time: float) -> BodyPose | None:
+        """Pose predicted from the last frames; None where the body was not detected on the last one."""
+        record = self.record
+        if not record.placed or not record.placed[-1].known:
+            return None
+        times, places = record.time[-FOLLOWING.memory :], record.placed[-FOLLOWING.memory :]
+        last = [(at, one.pose) for at, one in zip(times, places, strict=True) if one.known]
+        return None if len(last) < 2 else on_the_way(last, time)
+
+    def _expected(self, time: float) -> BodyPose:
+        """Where it should be by the first look; in frames that are new, where it was last."""
+        if self._ahead or self._last is None:
+            return self.known.start.expected(time)
+        return self._last
+
+    def _placed(self, frame: Frame, guess: BodyPose | None) -> Placed:
+        """Place the body near a predicted pose, else where it should be; a jump counts as not detected."""
+        body = self.known.start.body
+        found, far = None, FOLLOWING.largest_jump * body.optics.length_per_pixel
+        if guess is not None:
+            found = body.place(frame.image, guess)
+            if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+                return found
+        expected = self._expected(frame.time)
+        again = body.place(frame.image, expected)
+        if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
+            return again
+        return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
+
+    def _found_again(self, image: np.ndarray, lost: Placed) -> Placed:
+        """Search the whole picture for the body; `lost` if it is not found."""
+        start = self.known.start
+        for candidate in candidates(image, self.still, start.body)[:2]:
+            better = refined(image, self.still, start.body, candidate)
+            if start.as_clear(better.score):
+                found = start.body.place(image, better.pose)
+                if found.known:
+                    return found
+        return lost
