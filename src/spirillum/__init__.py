@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from spirillum.calibration.suggest import Suggestion as Suggestion
     from spirillum.calibration.suggest import suggest as suggest
     from spirillum.citations import citation as citation
+    from spirillum.controllers.control import Control as Control
+    from spirillum.controllers.control import control as control
     from spirillum.designs.answer import Design as Design
     from spirillum.designs.design import design as design
     from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Calibrated": "spirillum.calibration.calibrated",
+    "Control": "spirillum.controllers.control",
     "Design": "spirillum.designs.answer",
     "Export": "spirillum.exports.write",
     "Feasibility": "spirillum.measurement.feasibility",
@@ -90,6 +93,7 @@ _HOME = {
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
+    "control": "spirillum.controllers.control",
     "control_system": "spirillum.interfaces.python_control",
     "design": "spirillum.designs.design",
     "export": "spirillum.exports.write",

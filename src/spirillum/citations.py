@@ -46,6 +46,14 @@ REFERENCES: dict[str, str] = {
         "Physics of Fluids 25:071904, 2013."
     ),
     "adler1946": "R. Adler. A study of locking phenomena in oscillators. Proceedings of the IRE 34:351-357, 1946.",
+    "kalman1960": (
+        "R. E. Kalman. A new approach to linear filtering and prediction problems. "
+        "Journal of Basic Engineering 82:35-45, 1960."
+    ),
+    "smith1957": (
+        "O. J. M. Smith. Closer control of loops with dead time. Chemical Engineering Progress 53:217-219, 1957."
+    ),
+    "tsypkin1984": "Y. Z. Tsypkin. Relay Control Systems. Cambridge University Press, 1984.",
     "honda1996": (
         "T. Honda, K. I. Arai and K. Ishiyama. Micro swimming mechanisms propelled by external magnetic fields. "
         "IEEE Transactions on Magnetics 32:5085-5087, 1996."

@@ -211,6 +211,26 @@ _RESPONSES = (
     Quantity("tail_rotation_rate_per_flow", "", "rad/m", "held robot: tail rate per imposed mean flow", _HELD),
 )
 
+_CONTROL = "control"
+
+_CONTROLLED = (
+    Quantity("imposed_flow", "", "m/s", "mean flow that is imposed up to here; 0 without one", _CONTROL),
+    Quantity("frame_time", "t", "s", "when a frame was taken", "camera"),
+    Quantity("seen_position", "x", "m", "x of the body's mid-length as seen; NaN on lost frames", "camera"),
+    Quantity("seen_heading", "", "rad", "yaw as seen from above", "camera"),
+    Quantity("seen_body_angle", "", "rad", "the body's angle as seen", "camera"),
+    Quantity("seen_tail_phase", r"\phi", "rad", "the tail's phase against the body as seen", "camera"),
+    Quantity("reading_time", "t", "s", "when the meter was read", "meter"),
+    Quantity("read_current", "I", "A", "motor current as read", "meter"),
+    Quantity("read_voltage", "V", "V", "battery voltage as read", "meter"),
+    Quantity("decision_time", "t", "s", "when the controller decided", _CONTROL),
+    Quantity("command", "", "1", "duty that was sent", _CONTROL),
+    Quantity("estimated_position", "x", "m", "x of the body's mid-length as estimated at the decision", _CONTROL),
+    Quantity("estimated_position_error", "", "m", "standard deviation of the estimated place", _CONTROL),
+    Quantity("estimated_speed", "", "m/s", "estimated speed at the robot's own duty in fluid at rest", _CONTROL),
+    Quantity("estimated_drift", "", "m/s", "estimated speed at which the fluid carries the robot", _CONTROL),
+)
+
 _STUDIES = (
     Quantity("contact_share", "", "1", "share of the time in which asperities carry load", _TUBE),
     Quantity("body_drag_factor", "", "1", "factor on the isolated body's drag that an observed speed asks for", "(15)"),
@@ -239,7 +259,17 @@ _MEASURED = (
 
 QUANTITIES: dict[str, Quantity] = {
     item.name: item
-    for item in (*_STEADY, *_RUNS, *_FIELDS, *_ROTATING_FIELD, *_IN_THE_TUBE, *_RESPONSES, *_STUDIES, *_MEASURED)
+    for item in (
+        *_STEADY,
+        *_RUNS,
+        *_FIELDS,
+        *_ROTATING_FIELD,
+        *_IN_THE_TUBE,
+        *_RESPONSES,
+        *_CONTROLLED,
+        *_STUDIES,
+        *_MEASURED,
+    )
 }
 """Every quantity by its name."""
 

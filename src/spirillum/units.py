@@ -96,6 +96,7 @@ USUAL = {
     "rad": ("deg",),
     "m/s": ("mm/s", "um/s"),
     "V": ("mV",),
+    "A": ("mA",),
     "C": ("mA h",),
     "T": ("mT",),
 }
@@ -140,6 +141,7 @@ KINDS: dict[str, Kind] = {
     "magnetic moment": Kind("magnetic moment", "A m**2", "1e-4 A m^2", "1e-25 A m^2", "1e6 A m^2"),
     "magnetic field": Kind("magnetic flux density", "T", "5 mT", "1e-12 T", "1e3 T"),
     "moment angle": Kind("angle", "rad", "90 deg", "0 deg", "180 deg"),
+    "current": Kind("current", "A", "300 mA", "0 A", "1e6 A"),
     "charge": Kind("charge", "C", "70 mA h", "1e-9 C", "1e9 C"),
     "inverse current": Kind("inverse current", "1/A", "54.6 1/A", "0 1/A", "1e4 1/A"),
     "resistance per current": Kind("resistance per current", "ohm/A", "1.555 ohm/A", "-1e6 ohm/A", "1e6 ohm/A"),

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Annotated, Any, NamedTuple, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -16,6 +25,7 @@ __all__ = [
     "Angle",
     "BackEmfConstant",
     "Charge",
+    "Current",
     "Density",
     "Factor",
     "FieldValue",
@@ -33,6 +43,7 @@ __all__ = [
     "ResistancePerCurrent",
     "RotaryFriction",
     "Section",
+    "SignedLength",
     "Text",
     "Time",
     "Torque",
@@ -119,8 +130,15 @@ def _all_metadata(info: FieldInfo) -> list[Any]:
     return [*info.metadata, *inside]
 
 
+def _read_signed(value: Any, read: ValidatorFunctionWrapHandler) -> float:
+    """A length of either sign; the sign is not a part of the quantity."""
+    negative = isinstance(value, str) and value.strip().startswith("-")
+    return -float(read(value.strip()[1:])) if negative else float(read(value))
+
+
 Length = Annotated[float, *_quantity("length")]
 LengthOrZero = Annotated[float, *_quantity("length or zero")]
+SignedLength = Annotated[LengthOrZero, WrapValidator(_read_signed)]
 Mass = Annotated[float, *_quantity("mass")]
 Density = Annotated[float, *_quantity("density")]
 Viscosity = Annotated[float, *_quantity("viscosity")]
@@ -140,6 +158,7 @@ Resistance = Annotated[float, *_quantity("resistance")]
 Inductance = Annotated[float, *_quantity("inductance")]
 TorqueConstant = Annotated[float, *_quantity("torque constant")]
 BackEmfConstant = Annotated[float, *_quantity("back-emf constant")]
+Current = Annotated[float, *_quantity("current")]
 Charge = Annotated[float, *_quantity("charge")]
 InverseCurrent = Annotated[float, *_quantity("inverse current")]
 ResistancePerCurrent = Annotated[float, *_quantity("resistance per current")]

@@ -6,11 +6,11 @@ import math
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, ValidatorFunctionWrapHandler, WrapValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
-from spirillum.robot.fields import Angle, LengthOrZero, Rate, Time, Velocity
+from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity
 
 __all__ = ["CameraOptions", "MotionOptions", "Seeded", "SetupErrors", "TrialOptions"]
 
@@ -29,12 +29,6 @@ def _read_size(value: Any) -> tuple[int, int]:
     return width, height
 
 
-def _read_signed(value: Any, read: ValidatorFunctionWrapHandler) -> float:
-    """A length of either sign; the sign is not a part of the quantity."""
-    negative = isinstance(value, str) and value.strip().startswith("-")
-    return -float(read(value.strip()[1:])) if negative else float(read(value))
-
-
 def _check_heading(angle: float) -> float:
     most = 45.0  # a setup knows only right and left
     if abs(angle) > math.radians(most) * (1.0 + 1e-9):
@@ -45,9 +39,6 @@ def _check_heading(angle: float) -> float:
 def _read_frame_rate(value: Any) -> float:
     """Frames a second, as the nearest fraction that a video can hold."""
     return float(Fraction(in_range(1.0, 1000.0, " frames a second")(value)).limit_denominator(1001))
-
-
-SignedLength = Annotated[LengthOrZero, WrapValidator(_read_signed)]
 
 
 class MotionOptions(Options):

@@ -1,0 +1,250 @@
+"""`spirillum.control`: a robot under control, one run with all its errors, and scores over many."""
+
+from __future__ import annotations
+
+import json
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.answer import envelope, quantity
+from spirillum.controllers.jobs import Job, Outcome, begun, done, finished, named, plant_of
+from spirillum.controllers.lab import Lab
+from spirillum.controllers.loop import LoopRun
+from spirillum.controllers.registry import task_of
+from spirillum.controllers.run_record import record
+from spirillum.controllers.scores import Scores, scored
+from spirillum.controllers.sensors import Drawn
+from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
+from spirillum.dynamics.integration import Progress
+from spirillum.errors import InputError, did_you_mean
+from spirillum.processes import as_they_come
+from spirillum.robot.fields import field_values
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.units import show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Control", "control"]
+
+_MOST_SEEDS = 10_000
+_LAST_SEED = 2**31 - 1
+_ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weight", "roughness", "in_tube")
+
+
+@dataclass(frozen=True)
+class Control:
+    """A controlled run, and scores over many."""
+
+    robot: Robot
+    model: str
+    task: Task
+    lab: Lab
+    controller: str
+    seed: int
+    drawn: Drawn
+    """What the robot and the flow of this run were, and the controller did not know."""
+    score: Score
+    run: LoopRun
+    dataset: xr.Dataset
+    """The run, see `docs/control.md`."""
+    late: float | None
+    """Live: by how much the last decision was late against the clock on the wall, s."""
+    scores: Scores | None
+    """Over many seeds, if they were asked for."""
+    warnings: tuple[str, ...]
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether run or scores were interrupted; what was done is here."""
+        return self.run.interrupted or any(line.startswith("interrupted") for line in self.warnings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer as data; with `settings`, `task`, `lab` and `seed` the run can be done again."""
+        run, pulse = self.run, self.drawn.pulse
+        last = run.moments[-1]
+        content: dict[str, Any] = {
+            "robot": self.robot.name,
+            "model": self.model,
+            "task": {"kind": self.task.kind, **_fields(self.task)},
+            "controller": self.controller,
+            "seed": self.seed,
+            "good": self.score.good,
+            "error": quantity(self.score.error, self.task.error_unit, meaning=self.task.error_name),
+            "duration": quantity(last.time, "s"),
+            "final_position_x": quantity(float(last.pose.position[0]), "m"),
+            "electrical_energy": quantity(self.score.energy, "J"),
+            "time_on": quantity(_time_on(run), "s"),
+            "ended": run.ended or None,
+            "motor_off_at_end": last.values["duty"] == 0.0,
+            "late": quantity(self.late, "s") if self.late is not None else None,
+            "frames": {"taken": len(run.frames), "lost": sum(sight is None for _, sight in run.frames)},
+            "commands": {"sent": len(run.decisions), "lost": run.lost},
+            "drawn": {
+                "friction_factor": self.drawn.friction,
+                "gap_factor": self.drawn.gap,
+                "pulse": None
+                if pulse is None
+                else {
+                    "start": quantity(pulse.start, "s"),
+                    "end": quantity(pulse.end, "s"),
+                    "velocity": quantity(pulse.velocity, "m/s"),
+                },
+            },
+            "lab": {name: _fields(getattr(self.lab, name)) for name in Lab.model_fields},
+            "scores": None if self.scores is None else self.scores.to_dict(),
+        }
+        return envelope("control", content, self.warnings)
+
+
+def control(
+    robot: str | Path | Mapping[str, Any] | Robot,
+    task: Task | Mapping[str, Any],
+    *,
+    lab: Lab | str | Path | Mapping[str, Any] | None = None,
+    controller: str = FEEDBACK,
+    seed: int = 0,
+    seeds: int = 0,
+    plant: Mapping[str, Any] | None = None,
+    workers: int = 1,
+    live: bool = False,
+    progress: Progress | None = None,
+) -> Control:
+    """Control a robot: plant, sensors, remote and controller in a closed loop, all of it drawn from a seed.
+
+    Args:
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a drive.
+        task: `kind` and its fields, as ``{"kind": "stop-at", "at": "80 mm"}``, see `docs/control.md`.
+        lab: `camera`, `meter`, `remote`, `pulse`, `unknown`: tables by name, or a TOML file with them.
+        controller: `feedback`, or what it is judged against: `nothing`, `open-loop`, `knowing`.
+        seed: of the run: what is unknown of the robot, the flow, and all errors of sensors and remote.
+        seeds: score all controllers over so many seeds, from `seed` on, too; 0: none.
+        plant: further arguments of `spirillum.Plant`: `model`, `placement`, `roughness`, ...
+        workers: processes for the scores.
+        live: run at the pace of the clock on the wall.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Returns:
+        The run and the scores; with an interrupt what was done until then. The drive is off at the end of every run.
+
+    Raises:
+        InputError: for wrong input, or a task that the robot cannot be asked for.
+    """
+    asked, there, arguments = task_of(task), Lab.of(lab), dict(plant or {})
+    _check(controller, seed, seeds, workers, arguments)
+    own = load(robot)
+    said: list[str] = []
+    nominal = plant_of(own, arguments, Drawn(1.0, 1.0, None), progress)
+    if there.pulse.velocity and nominal.model != "tube":
+        said.append(f"model '{nominal.model}' knows no flow: there is no pulse")
+        there = there.model_copy(update={"pulse": there.pulse.model_copy(update={"velocity": 0.0})})
+    brief = asked.brief(nominal, there, progress)
+    job = Job(own, arguments, asked, brief, controller, seed)
+    moving, found = begun(job)
+    pace = _Pace() if live else None
+    run = done(job, moving, found, pace=pace, progress=progress)
+    scores = None
+    if seeds and not run.interrupted:
+        outcomes = _all(job, seeds, workers, progress)
+        scores = scored(asked, outcomes) if outcomes else None
+        if len(outcomes) < seeds * len(CONTROLLERS):
+            said.append(f"interrupted after {len(outcomes)} of {seeds * len(CONTROLLERS)} runs: scores are of these")
+    score = asked.score(run, brief)
+    dataset = record(run, moving)
+    settings = {"task": {"kind": asked.kind, **asked.model_dump()}, "lab": there.model_dump(), "controller": controller}
+    dataset = dataset.assign_attrs(
+        control=json.dumps({**settings, "seed": seed}, sort_keys=True),
+        task=asked.kind,
+        controller=controller,
+        seed=seed,
+        warnings="\n".join([*moving.steady.warnings, *said, *_of(run)]),
+    )
+    return Control(
+        robot=own,
+        model=moving.model,
+        task=asked,
+        lab=there,
+        controller=controller,
+        seed=seed,
+        drawn=found,
+        score=score,
+        run=run,
+        dataset=dataset,
+        late=None if pace is None else pace.late,
+        scores=scores,
+        warnings=(*moving.steady.warnings, *said, *_of(run)),
+    )
+
+
+class _Pace:
+    """The clock on the wall."""
+
+    def __init__(self) -> None:
+        self._begun: float | None = None
+        self.late = 0.0
+
+    def __call__(self, time: float) -> None:
+        """Wait for a time of the run."""
+        if self._begun is None:
+            self._begun = clock.monotonic() - time
+        left = self._begun + time - clock.monotonic()
+        if left > 0.0:
+            clock.sleep(left)
+        self.late = max(0.0, -left)
+
+
+def _all(job: Job, seeds: int, workers: int, progress: Progress | None) -> list[Outcome]:
+    """Every controller from every seed, seed by seed; with an interrupt those that are done."""
+    jobs = [named(job, name, job.seed + number) for number in range(seeds) for name in CONTROLLERS]
+    found: list[Outcome] = []
+    try:
+        for _job, outcome in as_they_come(finished, jobs, workers):
+            found.append(outcome)
+            if progress is not None:
+                progress("scored runs", len(found), len(jobs))
+    except KeyboardInterrupt:
+        pass
+    return found
+
+
+def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapping[str, Any]) -> None:
+    if controller not in CONTROLLERS:
+        hint = did_you_mean(controller, CONTROLLERS)
+        raise InputError(f"controller = {controller[:60]!r}{hint}; allowed: {', '.join(CONTROLLERS)}")
+    if not 0 <= seeds <= _MOST_SEEDS:
+        raise InputError(f"seeds = {seeds}; allowed: 0 to {_MOST_SEEDS}")
+    if not 0 <= seed <= _LAST_SEED - seeds:
+        raise InputError(f"seed = {seed}; allowed: 0 to {_LAST_SEED - seeds}")
+    if not 1 <= workers <= 256:
+        raise InputError(f"workers = {workers}; allowed: 1 to 256")
+    for name in arguments:
+        if name not in _ALLOWED:
+            hint = did_you_mean(str(name)[:60], _ALLOWED)
+            raise InputError(f"plant.{str(name)[:60]} is not known{hint}; allowed: {', '.join(_ALLOWED)}")
+
+
+def _of(run: LoopRun) -> list[str]:
+    """What to be careful about in a run."""
+    said = []
+    if run.silent is not None:
+        said.append(f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}")
+    if run.ended:
+        said.append(f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off")
+    return said
+
+
+def _fields(options: Any) -> dict[str, Any]:
+    """Fields of options as data."""
+    return {
+        item.path: item.value if item.unit is None or item.value is None else quantity(item.value, item.unit)
+        for item in field_values(options)
+    }
+
+
+def _time_on(run: LoopRun) -> float:
+    return sum(after.time - before.time for before, after in pairwise(run.moments) if after.values["duty"] > 0.0)

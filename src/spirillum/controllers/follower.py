@@ -1,0 +1,98 @@
+"""Where a robot is and how fast, from late and noisy sights: a Kalman filter with the commands that are under way.
+
+The state is place x, speed s at full duty and drift w of the fluid:
+
+    dx/dt = u(t) s + w,   ds = sigma_s dB,   dw = -w/tau dt + sigma_w sqrt(2/tau) dB',   y_k = x(t_k) + noise,
+
+with the duty u that acts at t, which was sent a delay before (Kalman 1960). Frames are used at the time of their
+exposure; what has been sent since moves the state on to the time at which a command that is decided now will act: the
+predictor of Smith (1957) for a dead time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.controllers.lab import Lab
+from spirillum.controllers.signals import Sight
+
+__all__ = ["Follower"]
+
+_SPEED_WALK = 0.15
+"""sigma_s over the predicted speed, 1/sqrt(s): the film under the robot thins within some ten seconds."""
+_DRIFT = 3e-4
+"""sigma_w, m/s: of the size of a pulse."""
+_DRIFT_MEMORY = 2.0
+"""tau, s."""
+_STRAY = 6.0
+"""Sights further away than so many standard deviations are left out..."""
+_STRAYS = 5
+"""...but not more than so many in a row."""
+
+
+class Follower:
+    """The filter of one run."""
+
+    def __init__(self, lab: Lab, speed: float, *, start: float = 0.0) -> None:
+        """Begin.
+
+        Args:
+            lab: sensors and remote.
+            speed: predicted at full duty, m/s; its own uncertainty is as large.
+            start: place at time 0, m.
+        """
+        self._noise = max(np.hypot(lab.camera.position_noise, lab.camera.position_wander), 1e-6) ** 2
+        self._delay = lab.remote.delay
+        self._walk = (_SPEED_WALK * abs(speed)) ** 2
+        self._sent: deque[tuple[float, float]] = deque([(0.0, 0.0)])
+        self._time, self._strays = 0.0, 0
+        self._mean: Samples = np.array([start, speed, 0.0])
+        self._spread: Samples = np.diag([1e-3, abs(speed), _DRIFT]) ** 2
+
+    def send(self, time: float, duty: float) -> None:
+        """Note a command that is sent now."""
+        if duty != self._sent[-1][1]:
+            self._sent.append((time + self._delay, duty))
+
+    def see(self, sight: Sight) -> None:
+        """Take in a sight."""
+        self._mean, self._spread = self._moved(sight.time)
+        self._time = sight.time
+        while len(self._sent) > 1 and self._sent[1][0] <= self._time:
+            self._sent.popleft()
+        surprise, size = sight.position - self._mean[0], self._spread[0, 0] + self._noise
+        if surprise**2 > _STRAY**2 * size and self._strays < _STRAYS:
+            self._strays += 1
+            return
+        self._strays = 0
+        gain = self._spread[:, 0] / size
+        self._mean = self._mean + gain * surprise
+        self._spread = self._spread - np.outer(gain, self._spread[0])
+
+    def ahead(self, time: float) -> tuple[Samples, Samples]:
+        """Mean (x, s, w) and covariance at a time, with the commands that have been sent; SI."""
+        return self._moved(time)
+
+    def duty_at(self, time: float) -> float:
+        """Duty that acts at a time if no command was lost."""
+        return [duty for start, duty in self._sent if start <= time][-1]
+
+    def _moved(self, time: float) -> tuple[Samples, Samples]:
+        mean, spread, now = self._mean, self._spread, self._time
+        edges = [start for start, _ in self._sent if now < start < time]
+        for after in [*edges, time]:
+            if after > now:
+                mean, spread = self._stepped(mean, spread, after - now, self.duty_at(now))
+                now = after
+        return mean, spread
+
+    def _stepped(self, mean: Samples, spread: Samples, dt: float, duty: float) -> tuple[Samples, Samples]:
+        left = np.exp(-dt / _DRIFT_MEMORY)
+        moves = np.array([[1.0, duty * dt, _DRIFT_MEMORY * (1.0 - left)], [0.0, 1.0, 0.0], [0.0, 0.0, left]])
+        spread = moves @ spread @ moves.T
+        spread[1, 1] += self._walk * dt
+        spread[2, 2] += _DRIFT**2 * (1.0 - left**2)
+        return moves @ mean, spread

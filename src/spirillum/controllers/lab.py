@@ -1,0 +1,193 @@
+"""Sensors, remote and disturbances of a controlled run as data: the same in files, Python and on the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import AfterValidator, BeforeValidator
+
+from spirillum.errors import InputError, did_you_mean
+from spirillum.files import read_toml
+from spirillum.robot.arguments import Options, in_range, refusal
+from spirillum.robot.fields import Angle, Current, LengthOrZero, Section, Time, Velocity
+
+__all__ = ["Camera", "Lab", "Meter", "Pulse", "Remote", "Unknown"]
+
+_WHAT = "a lab file (TOML with the tables [camera], [meter], [remote], [pulse], [unknown])"
+_LONGEST_DELAY = 60.0
+
+
+def _short(value: float) -> float:
+    if not 0.0 <= value <= _LONGEST_DELAY:
+        raise refusal(f"= {value:g} s; allowed: 0 to {_LONGEST_DELAY:g} s")
+    return value
+
+
+def _not_negative(value: float) -> float:
+    if value < 0.0:
+        raise refusal(f"= {value:g} rad; allowed: at least 0")
+    return value
+
+
+def _lasting(value: float) -> float:
+    if not 1e-3 <= value <= _LONGEST_DELAY:
+        raise refusal(f"= {value:g} s; allowed: 0.001 to {_LONGEST_DELAY:g} s")
+    return value
+
+
+_Delay = Annotated[Time, AfterValidator(_short)]
+_Period = Annotated[Time, AfterValidator(_lasting)]
+_AngleNoise = Annotated[Angle, AfterValidator(_not_negative)]
+_Share = Annotated[float, BeforeValidator(in_range(0.0, 0.95))]
+
+
+class Camera(Options):
+    """The camera: when it sees, and how it errs: normal errors of each frame, and slow ones with a memory.
+
+    The sizes are those of the tracker on degraded films of the virtual camera, see `docs/control.md`.
+    """
+
+    argument: ClassVar[str] = "camera"
+    prefixed: ClassVar[bool] = True
+
+    fps: Annotated[float, BeforeValidator(in_range(0.1, 1000.0, " frames a second"))] = 30.0
+    """Frames a second."""
+    latency: _Delay = 0.1
+    """From a frame's exposure until the controller has its numbers."""
+    dropped: _Share = 0.02
+    """Share of frames that never arrive, each by itself."""
+    fails_at: Time | None = None
+    """From when on nothing arrives any more; None: never."""
+    scale_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.002
+    """Relative standard deviation of the scale, one value for a whole run."""
+    position_noise: LengthOrZero = 1e-5
+    """Standard deviation of the place along the channel, of each frame by itself."""
+    heading_noise: _AngleNoise = 7e-4
+    """The same of the heading (yaw, as seen from above)."""
+    body_angle_noise: _AngleNoise = 3e-3
+    """The same of the body's angle."""
+    tail_phase_noise: _AngleNoise = 1e-2
+    """The same of the tail's phase."""
+    position_wander: LengthOrZero = 3e-5
+    """Standard deviation of the slow error of the place along the channel."""
+    heading_wander: _AngleNoise = 2.5e-3
+    """The same of the heading."""
+    body_angle_wander: _AngleNoise = 7e-3
+    """The same of the body's angle."""
+    tail_phase_wander: _AngleNoise = 1.8e-2
+    """The same of the tail's phase."""
+    memory: _Period = 1.0
+    """Correlation time of the slow errors."""
+
+
+class Meter(Options):
+    """Motor current and battery voltage, as a circuit on board would tell them; the paper's robot has none."""
+
+    argument: ClassVar[str] = "meter"
+    prefixed: ClassVar[bool] = True
+
+    rate: Annotated[float, BeforeValidator(in_range(0.0, 1000.0, " readings a second"))] = 10.0
+    """Readings a second; 0: no meter."""
+    latency: _Delay = 0.05
+    """From a reading until the controller has it."""
+    current_noise: Current = 1e-3
+    """Standard deviation of the current of one reading."""
+    voltage_noise: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 1e-3
+    """Relative standard deviation of the voltage of one reading."""
+    gain_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.005
+    """Relative standard deviation of the gain of current and of voltage, one value each for a whole run."""
+
+
+class Remote(Options):
+    """What carries commands to the robot: one way, repeated, and some are lost.
+
+    The defaults are those of common infrared remotes: a message lasts 68 ms and is repeated every 108 ms (NEC code).
+    """
+
+    argument: ClassVar[str] = "remote"
+    prefixed: ClassVar[bool] = True
+
+    period: _Period = 0.108
+    """Between two commands; a controller decides once in a period."""
+    delay: _Delay = 0.068
+    """From the decision until the drive follows."""
+    lost: _Share = 0.05
+    """Share of commands that never arrive, each by itself; the drive then keeps the last one."""
+
+
+class Pulse(Options):
+    """A pulse of flow through the tube: the mean flow is imposed for a while, then the ends are as before."""
+
+    argument: ClassVar[str] = "pulse"
+    prefixed: ClassVar[bool] = True
+
+    velocity: Velocity = 5e-4
+    """Mean flow while it lasts; 0: no pulse."""
+    duration: Time = 2.0
+    """How long it lasts."""
+    start: Time | None = None
+    """When it begins; None: drawn, evenly over the first nine tenths of the run, and its sense by a coin."""
+
+
+class Unknown(Options):
+    """What the controller does not know of the robot; each run draws it anew."""
+
+    argument: ClassVar[str] = "unknown"
+    prefixed: ClassVar[bool] = True
+
+    friction_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 3.0
+    """The true friction is the robot's times a factor from 1/this to this, evenly in its logarithm; 1: known."""
+    gap_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 1.0
+    """The same for the gap at which the robot is laid down; 1: known."""
+
+
+class Lab(Section):
+    """Sensors, actuators and disturbances of a controlled run."""
+
+    camera: Camera = Camera()
+    meter: Meter = Meter()
+    remote: Remote = Remote()
+    pulse: Pulse = Pulse()
+    unknown: Unknown = Unknown()
+
+    @classmethod
+    def of(cls, value: Self | str | Path | Mapping[str, Any] | None) -> Self:
+        """A lab from what a caller may give.
+
+        Args:
+            value: a lab, its tables by name, a TOML file with them, or None: the defaults.
+
+        Raises:
+            InputError: for an unknown table or field, or a wrong value.
+        """
+        if isinstance(value, cls):
+            return value
+        table = read_toml(Path(value), _WHAT) if isinstance(value, str | Path) else value or {}
+        if not isinstance(table, Mapping):
+            raise InputError(f"lab = {str(value)[:60]!r}; allowed: {_WHAT}, or its tables by name")
+        sections: dict[str, type[Options]] = {
+            name: info.annotation
+            for name, info in cls.model_fields.items()
+            if isinstance(info.annotation, type) and issubclass(info.annotation, Options)
+        }
+        for name in table:
+            if name not in sections:
+                hint = did_you_mean(str(name)[:60], sections)
+                raise InputError(f"lab.{str(name)[:60]} is not a known table{hint}; allowed: {', '.join(sections)}")
+        return cls(**{name: section.of(table.get(name)) for name, section in sections.items()})
+
+    @classmethod
+    def exact(cls) -> Self:
+        """Sensors without errors, drops and latency, a remote without delay and losses, no pulse, nothing unknown."""
+        names = (name for name in Camera.model_fields if name.endswith(("_noise", "_wander", "_error")))
+        camera = Camera.of({**dict.fromkeys(names, 0.0), "latency": 0.0, "dropped": 0.0})
+        meter = Meter.of({"current_noise": 0.0, "voltage_noise": 0.0, "gain_error": 0.0, "latency": 0.0})
+        return cls(
+            camera=camera,
+            meter=meter,
+            remote=Remote.of({"delay": 0.0, "lost": 0.0}),
+            pulse=Pulse.of({"velocity": 0.0}),
+            unknown=Unknown.of({"friction_factor": 1.0}),
+        )

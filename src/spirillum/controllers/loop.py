@@ -1,0 +1,245 @@
+"""The closed loop: plant, camera, meter, remote and controller on one clock, every event at its own time.
+
+Frames, readings, decisions, arrivals of commands and edges of the flow are events in one queue. Between two of them the
+plant takes one step, so that delays are exact and no period has to fit another. The drive is off until the first
+command arrives, when the camera has been silent for too long, and when the loop ends, for whatever reason.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from itertools import count
+from typing import Any
+
+from spirillum.controllers.lab import Lab
+from spirillum.controllers.sensors import FlowPulse, Senses
+from spirillum.controllers.signals import Controller, News, Reading, Sight
+from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.plant import Moment, Plant
+from spirillum.dynamics.tube_integration import INTERRUPTED
+
+__all__ = ["SILENCE", "Decision", "LoopRun", "run_loop"]
+
+SILENCE = 1.0
+"""Beyond its latency the camera may be silent for so long before the drive is switched off, s."""
+_AT_ONCE = 1e-9
+_LEAST_OFF = 0.05
+"""The run goes on for at least so long after the last command, s."""
+_SIGNS = 200
+"""Signs of life of a run."""
+
+
+class _Kind(IntEnum):
+    """Events; of those at one time the first here comes first."""
+
+    FLOW = 0
+    ARRIVAL = 1
+    FRAME = 2
+    READING = 3
+    DELIVERY = 4
+    DECISION = 5
+    END = 6
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a controller decided."""
+
+    time: float
+    """s."""
+    duty: float
+    """Duty that was sent."""
+    estimate: dict[str, float]
+    """What it made of the robot."""
+
+
+@dataclass
+class LoopRun:
+    """A controlled run; SI."""
+
+    moments: list[Moment] = field(default_factory=list)
+    """The robot after every event that moved it, in order of time."""
+    flows: list[float] = field(default_factory=list)
+    """Flow that is imposed up to each of them, m/s; 0: none."""
+    frames: list[tuple[float, Sight | None]] = field(default_factory=list)
+    """Times of the frames, and what was seen."""
+    readings: list[Reading] = field(default_factory=list)
+    """Readings of the meter."""
+    decisions: list[Decision] = field(default_factory=list)
+    """What was decided."""
+    lost: int = 0
+    """Commands that did not arrive."""
+    silent: float | None = None
+    """When the drive was first switched off because the camera was silent, s."""
+    ended: str = ""
+    """Why the run ended before its time; empty if it did not."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether it was interrupted."""
+        return self.ended == INTERRUPTED
+
+
+class _Loop:
+    """A run while it goes on."""
+
+    def __init__(self, plant: Plant, controller: Controller, lab: Lab, seed: int, flow: FlowPulse | None) -> None:
+        self.plant, self.controller, self.lab, self.flow = plant, controller, lab, flow
+        self.senses = Senses(lab, seed)
+        self.run = LoopRun()
+        self.duty = 0.0
+        self.imposed = 0.0
+        self.still = plant.state.flow
+        self._queue: list[tuple[float, int, int, Any]] = []
+        self._order = count()
+        self._sights: list[Sight] = []
+        self._readings: list[Reading] = []
+        self._heard = 0.0
+
+    def push(self, time: float, kind: _Kind, content: Any = None) -> None:
+        """Put an event into the queue."""
+        heapq.heappush(self._queue, (time, int(kind), next(self._order), content))
+
+    def pop(self) -> tuple[float, _Kind, Any]:
+        """The next event."""
+        time, kind, _order, content = heapq.heappop(self._queue)
+        return time, _Kind(kind), content
+
+    def advance(self, time: float) -> bool:
+        """Move the robot up to a time; whether it got there."""
+        dt = time - self.plant.state.time
+        if dt > _AT_ONCE:
+            self.run.moments.append(self.plant.step(dt, duty=self.duty))
+            self.run.flows.append(self.imposed)
+        self.run.ended = self.plant.state.ended
+        return not self.run.ended
+
+    def now(self) -> Moment:
+        """The robot as it is."""
+        return self.run.moments[-1]
+
+    def decide(self, time: float) -> bool:
+        """Ask the controller and send its command; whether it gave one."""
+        if self._sights:
+            self._heard = time
+        truth = self.now() if self.controller.knowing else None
+        asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
+        self._sights, self._readings = [], []
+        duty = float(asked)
+        if not 0.0 <= duty <= 1.0:
+            self.run.ended = f"the controller asked for a duty of {duty:g}; allowed: 0 to 1"
+            return False
+        if not self.controller.blind and time - self._heard > SILENCE + self.lab.camera.latency:
+            duty = 0.0
+            self.run.silent = time if self.run.silent is None else self.run.silent
+        self.run.decisions.append(Decision(time, duty, dict(self.controller.estimate())))
+        if self.senses.command_arrives():
+            self.push(time + self.lab.remote.delay, _Kind.ARRIVAL, duty)
+        else:
+            self.run.lost += 1
+        return True
+
+    def handle(self, time: float, kind: _Kind, content: Any) -> bool:
+        """One event; whether the run goes on."""
+        if kind is _Kind.DELIVERY:
+            (self._sights if isinstance(content, Sight) else self._readings).append(content)
+            return True
+        if kind is _Kind.ARRIVAL and content == self.duty:
+            return True
+        if (kind is not _Kind.DECISION or self.controller.knowing) and not self.advance(time):
+            return False
+        match kind:
+            case _Kind.ARRIVAL:
+                self.duty = content
+            case _Kind.FLOW:
+                self.imposed = content
+                self.plant.impose_flow(content if content else self.still)
+            case _Kind.FRAME:
+                self._frame(time)
+            case _Kind.READING:
+                reading = self.senses.reading(self.now())
+                self.run.readings.append(reading)
+                self.push(time + self.lab.meter.latency, _Kind.DELIVERY, reading)
+                self.push(time + 1.0 / self.lab.meter.rate, _Kind.READING)
+            case _Kind.DECISION:
+                self.push(time + self.lab.remote.period, _Kind.DECISION)
+                return self.decide(time)
+            case _:
+                return False
+        return True
+
+    def _frame(self, time: float) -> None:
+        sight = self.senses.sight(self.now())
+        self.run.frames.append((time, sight))
+        if sight is not None:
+            self.push(time + self.lab.camera.latency, _Kind.DELIVERY, sight)
+        self.push(len(self.run.frames) / self.lab.camera.fps, _Kind.FRAME)
+
+    def switch_off(self) -> None:
+        """The drive off, whatever has happened, and the robot followed until it stands."""
+        ended, self.duty = self.run.ended, 0.0
+        if self.plant.state.ended == INTERRUPTED:
+            self.plant.reset(replace(self.plant.state, ended=""))
+        if not self.plant.state.ended:
+            self.advance(self.plant.state.time + max(self.lab.remote.delay, _LEAST_OFF))
+        self.run.ended = ended or self.run.ended
+
+
+def run_loop(
+    plant: Plant,
+    controller: Controller,
+    lab: Lab,
+    duration: float,
+    *,
+    seed: int = 0,
+    flow: FlowPulse | None = None,
+    pace: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
+) -> LoopRun:
+    """Let a controller drive a plant.
+
+    Args:
+        plant: the robot, where its run begins; it is moved.
+        controller: a new one.
+        lab: sensors and remote.
+        duration: of the run, s.
+        seed: of all errors of sensors and remote.
+        flow: the pulse of flow of this run; None: none.
+        pace: told the time of each decision before it is taken, s; it may wait.
+        progress: told what is being computed, how much is done, and of how much.
+
+    Returns:
+        The run; with an interrupt, an end of the channel or a wrong command what was done until then. The drive is off
+        at its end.
+    """
+    loop = _Loop(plant, controller, lab, seed, flow)
+    loop.run.moments.append(plant.observe())
+    loop.run.flows.append(0.0)
+    loop.push(duration, _Kind.END)
+    loop.push(0.0, _Kind.FRAME)
+    loop.push(0.0, _Kind.DECISION)
+    if lab.meter.rate:
+        loop.push(0.0, _Kind.READING)
+    if flow is not None and flow.start < duration:
+        loop.push(flow.start, _Kind.FLOW, flow.velocity)
+        loop.push(flow.end, _Kind.FLOW, 0.0)
+    told = 0
+    try:
+        going = True
+        while going:
+            time, kind, content = loop.pop()
+            if kind is _Kind.DECISION and pace is not None:
+                pace(time)
+            going = loop.handle(time, kind, content)
+            done = int(_SIGNS * min(time / duration, 1.0))
+            if progress is not None and done > told:
+                told = done
+                progress("controlled run", done, _SIGNS)
+    except KeyboardInterrupt:
+        loop.run.ended = INTERRUPTED
+    finally:
+        loop.switch_off()
+    return loop.run

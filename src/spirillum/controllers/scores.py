@@ -1,0 +1,142 @@
+"""Scores of controllers over the same seeds, with intervals, and their differences in pairs.
+
+Shares have Wilson's interval (Wilson 1927), means the bias-corrected bootstrap's (Efron 1987). The differences to the
+task's own controller are of runs with the same robot, flow and errors of sensors: common random numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import Samples
+from spirillum.controllers.jobs import Outcome
+from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Task
+
+__all__ = ["ControllerScore", "Scores", "scored"]
+
+_LEVEL = 0.95
+_RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class ControllerScore:
+    """How a controller did over the seeds; each triple is value, low, high of a 95 % interval."""
+
+    name: str
+    runs: int
+    good: tuple[float, float, float]
+    """Share of good runs."""
+    error: tuple[float, float, float]
+    """Mean size of the task's error, SI."""
+    energy: tuple[float, float, float]
+    """Mean energy, J."""
+    against: tuple[float, float, float]
+    """Mean of this controller's size of the error less that of the task's own, run by run."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Controllers over the same seeds."""
+
+    task: Task
+    controllers: tuple[ControllerScore, ...]
+    outcomes: tuple[Outcome, ...]
+    """Every run, by controller and seed."""
+
+    @property
+    def failed(self) -> tuple[int, ...]:
+        """Seeds at which the task's own controller was not good enough."""
+        return tuple(one.seed for one in self.outcomes if one.controller == FEEDBACK and not one.score.good)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Scores as data: quantities with their intervals, and every run."""
+        unit = self.task.error_unit
+        return {
+            "level": _LEVEL,
+            "error": self.task.error_name,
+            "controllers": {
+                one.name: {
+                    "meaning": CONTROLLERS[one.name],
+                    "runs": one.runs,
+                    "good": _with_interval(one.good, "1"),
+                    "error": _with_interval(one.error, unit),
+                    "energy": _with_interval(one.energy, "J"),
+                    "error_beyond_feedback": _with_interval(one.against, unit),
+                }
+                for one in self.controllers
+            },
+            "failed_seeds": list(self.failed),
+            "runs": [
+                {
+                    "controller": one.controller,
+                    "seed": one.seed,
+                    "good": one.score.good,
+                    "error": quantity(one.score.error, unit),
+                    "energy": quantity(one.score.energy, "J"),
+                    "friction_factor": one.friction,
+                    "gap_factor": one.gap,
+                    "ended": one.ended,
+                }
+                for one in self.outcomes
+            ],
+        }
+
+
+def scored(task: Task, outcomes: Sequence[Outcome]) -> Scores:
+    """Sum up runs.
+
+    Args:
+        task: what was asked for.
+        outcomes: runs of several controllers; the task's own among them.
+    """
+    found = {
+        name: {one.seed: one for one in outcomes if one.controller == name}
+        for name in CONTROLLERS
+        if any(one.controller == name for one in outcomes)
+    }
+    own = found.get(FEEDBACK, {})
+    scores = []
+    for name, runs in found.items():
+        errors = np.array([abs(one.score.error) for one in runs.values()])
+        paired = [abs(one.score.error) - abs(own[seed].score.error) for seed, one in runs.items() if seed in own]
+        scores.append(
+            ControllerScore(
+                name=name,
+                runs=len(runs),
+                good=_share([one.score.good for one in runs.values()]),
+                error=_mean(errors),
+                energy=_mean(np.array([one.score.energy for one in runs.values()])),
+                against=_mean(np.array(paired)),
+            )
+        )
+    ordered = sorted(outcomes, key=lambda one: (list(CONTROLLERS).index(one.controller), one.seed))
+    return Scores(task, tuple(scores), tuple(ordered))
+
+
+def _share(good: Sequence[bool]) -> tuple[float, float, float]:
+    from scipy.stats import binomtest
+
+    interval = binomtest(sum(good), len(good)).proportion_ci(_LEVEL, method="wilson")
+    return sum(good) / len(good), float(interval.low), float(interval.high)
+
+
+def _mean(values: Samples) -> tuple[float, float, float]:
+    """Mean with its interval; NaN where there are too few values or one has none."""
+    from scipy.stats import bootstrap
+
+    middle = float(np.mean(values)) if values.size else np.nan
+    if values.size < 3 or not np.isfinite(values).all() or np.ptp(values) == 0.0:
+        same = middle if values.size >= 3 and np.isfinite(middle) else np.nan
+        return middle, same, same
+    found = bootstrap((values,), np.mean, confidence_level=_LEVEL, n_resamples=_RESAMPLES, rng=0).confidence_interval
+    return middle, float(found.low), float(found.high)
+
+
+def _with_interval(value: tuple[float, float, float], unit: str) -> dict[str, Any]:
+    middle, low, high = (item if np.isfinite(item) else None for item in value)
+    return quantity(middle, unit, low=low, high=high, kind="interval")

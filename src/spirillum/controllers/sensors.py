@@ -1,0 +1,123 @@
+"""Sensors and disturbances of one run: errors drawn from its seed, the same whatever the controller does.
+
+Each part has a stream of random numbers of its own, of which every frame, reading and command takes its share whether
+it arrives or not. Runs of the same seed under two controllers can so be compared in pairs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from spirillum.controllers.lab import Lab, Pulse, Unknown
+from spirillum.controllers.signals import Reading, Sight
+from spirillum.dynamics.plant import Moment
+
+__all__ = ["Drawn", "FlowPulse", "Senses", "drawn"]
+
+_STREAMS = ("unknown", "pulse", "camera", "meter", "remote")
+_SEEN = ("position", "heading", "body_angle", "tail_phase")
+_LATEST = 0.9
+"""Share of a run in which a pulse may begin."""
+
+
+@dataclass(frozen=True)
+class FlowPulse:
+    """A pulse of flow at its place in the run; SI."""
+
+    start: float
+    """s."""
+    end: float
+    """s."""
+    velocity: float
+    """Mean flow, m/s."""
+
+    def passed_after(self, time: float) -> float:
+        """Way of the mean flow that is still to come, m."""
+        return self.velocity * max(0.0, self.end - max(time, self.start))
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a run has drawn from its seed and the controller does not know."""
+
+    friction: float
+    """Factor of the friction."""
+    gap: float
+    """Factor of the gap at the start."""
+    pulse: FlowPulse | None
+    """Flow; None: none."""
+
+
+def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
+    """Draw the robot and the flow of a run.
+
+    Args:
+        unknown: what is unknown of the robot.
+        pulse: what is known of the flow.
+        seed: of the run.
+        duration: of the run, s.
+    """
+    factors = np.exp(
+        np.log([unknown.friction_factor, unknown.gap_factor]) * _stream(seed, "unknown").uniform(-1.0, 1.0, 2)
+    )
+    place, side = _stream(seed, "pulse").uniform(size=2)
+    found = None
+    if pulse.velocity and pulse.duration > 0.0:
+        start, velocity = pulse.start, pulse.velocity
+        if start is None:
+            start, velocity = _LATEST * duration * place, velocity if side < 0.5 else -velocity
+        found = FlowPulse(float(start), float(start) + pulse.duration, float(velocity))
+    return Drawn(float(factors[0]), float(factors[1]), found)
+
+
+class Senses:
+    """Camera, meter and remote of one run."""
+
+    def __init__(self, lab: Lab, seed: int) -> None:
+        self._lab = lab
+        self._camera, self._meter, self._remote = (_stream(seed, name) for name in ("camera", "meter", "remote"))
+        self._scale = 1.0 + lab.camera.scale_error * float(self._camera.standard_normal())
+        self._sizes = np.array(
+            [[getattr(lab.camera, f"{name}_{kind}") for name in _SEEN] for kind in ("noise", "wander")]
+        )
+        self._wander, self._last = self._camera.standard_normal(4), 0.0
+        self._gains = 1.0 + lab.meter.gain_error * self._meter.standard_normal(2)
+
+    def sight(self, moment: Moment) -> Sight | None:
+        """The next frame; None where it is lost."""
+        camera = self._lab.camera
+        lost = self._camera.uniform() < camera.dropped
+        noise = self._camera.standard_normal((2, 4))
+        kept = np.exp(-(moment.time - self._last) / camera.memory)
+        self._wander, self._last = kept * self._wander + np.sqrt(1.0 - kept**2) * noise[1], moment.time
+        if lost or (camera.fails_at is not None and moment.time >= camera.fails_at):
+            return None
+        errors = (self._sizes[0] * noise[0] + self._sizes[1] * self._wander).tolist()
+        return Sight(
+            moment.time,
+            self._scale * float(moment.pose.position[0]) + errors[0],
+            moment.values["yaw"] + errors[1],
+            moment.values["body_angle"] + errors[2],
+            moment.pose.tail_phase + errors[3],
+        )
+
+    def reading(self, moment: Moment) -> Reading:
+        """The next reading of current and voltage; NaN where the robot has no motor."""
+        meter = self._lab.meter
+        current, voltage = self._meter.standard_normal(2).tolist()
+        true = moment.values.get("motor_current", np.nan), moment.values.get("battery_voltage", np.nan)
+        return Reading(
+            moment.time,
+            float(self._gains[0]) * true[0] + meter.current_noise * current,
+            float(self._gains[1]) * true[1] * (1.0 + meter.voltage_noise * voltage),
+        )
+
+    def command_arrives(self) -> bool:
+        """Whether the next command reaches the robot."""
+        return bool(self._remote.uniform() >= self._lab.remote.lost)
+
+
+def _stream(seed: int, name: str) -> np.random.Generator:
+    return np.random.default_rng([seed, _STREAMS.index(name)])

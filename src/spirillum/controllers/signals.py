@@ -1,0 +1,68 @@
+"""What goes between the robot, its sensors and its controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from spirillum.dynamics.plant import Moment
+
+__all__ = ["Controller", "News", "Reading", "Sight"]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the camera has seen on one frame; SI."""
+
+    time: float
+    """When the frame was taken, s."""
+    position: float
+    """x of the body's mid-length, m."""
+    heading: float
+    """Yaw, rad."""
+    body_angle: float
+    """Unwrapped, rad."""
+    tail_phase: float
+    """Of the tail against the body, unwrapped, rad."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the meter has told; SI."""
+
+    time: float
+    """When it was read, s."""
+    current: float
+    """A."""
+    voltage: float
+    """V."""
+
+
+@dataclass(frozen=True)
+class News:
+    """What a controller knows when it decides."""
+
+    time: float
+    """Now, s."""
+    sights: tuple[Sight, ...] = ()
+    """Those that have arrived since the last decision, in the order of their frames."""
+    readings: tuple[Reading, ...] = ()
+    """The same of the meter."""
+    truth: Moment | None = field(default=None, compare=False)
+    """The robot itself, for a controller that knows everything; else None."""
+
+
+class Controller(Protocol):
+    """Decides once in a period of the remote; new for each run."""
+
+    blind: bool
+    """Whether it goes on without a camera; else the drive is switched off when the camera is silent."""
+    knowing: bool
+    """Whether it is told the truth."""
+
+    def decide(self, news: News) -> float:
+        """Duty that is asked for from now on, 0 (off) to 1."""
+
+    def estimate(self) -> Mapping[str, float]:
+        """What it makes of the robot, by name, SI; the same names every time."""
