@@ -7,14 +7,21 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import angle, loaded_robot
-from spirillum.cli.options import Json, RobotArgument, Settings, starting
+from spirillum.cli.inputs import angle, loaded_robot, placement_from
+from spirillum.cli.options import (
+    Calibration,
+    Friction,
+    Gap,
+    ImposedFlow,
+    Json,
+    Pitch,
+    RobotArgument,
+    Settings,
+    complete_auto_models,
+    starting,
+)
 
 __all__ = ["export"]
-
-
-def _complete_models(incomplete: str) -> list[str]:
-    return starting(("rft", "slender"), incomplete)
 
 
 def _complete_units(incomplete: str) -> list[str]:
@@ -24,7 +31,7 @@ def _complete_units(incomplete: str) -> list[str]:
 def export(
     robot: RobotArgument,
     target: Annotated[
-        Path, typer.Argument(metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, or .mjcf (also .xml).")
+        Path, typer.Argument(metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), or .fmu.")
     ],
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     fineness: Annotated[float, typer.Option(help="Triangles along every line, relative to the normal ones.")] = 1.0,
@@ -37,12 +44,21 @@ def export(
     ] = False,
     no_sidecar: Annotated[bool, typer.Option("--no-sidecar", help="Leave it out beside .urdf and .mjcf.")] = False,
     model: Annotated[
-        str, typer.Option(autocompletion=_complete_models, help="Model of that resistance: slender or rft.")
-    ] = "slender",
+        str | None,
+        typer.Option(
+            autocompletion=complete_auto_models,
+            help="Model of that resistance: slender or rft; of an .fmu any model; else slender, and auto for .fmu.",
+        ),
+    ] = None,
+    friction: Friction = None,
+    calibration: Calibration = None,
+    gap: Gap = None,
+    pitch: Pitch = None,
+    flow: ImposedFlow = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Write the robot's shape, masses and resistance for a printer, Blender, ParaView, MuJoCo or another simulator.
+    """Write the robot for a printer, Blender, ParaView, MuJoCo, or a simulator of robots or systems.
 
     Example: `spirillum export biorob2012-wide robot.stl`
     """
@@ -60,5 +76,8 @@ def export(
         unit=unit,
         sidecar=sidecar if sidecar or no_sidecar else None,
         model=model,
+        friction=friction,
+        calibration=calibration,
+        placement=placement_from(gap, None, pitch, None, None, flow) or None,
     )
     renderer.show(found.to_dict(), json=json)

@@ -26,6 +26,7 @@ KINDS_OF_FILES = {
     ".urdf": "a robot description",
     ".mjcf": "a MuJoCo model",
     ".xml": "a MuJoCo model",
+    ".fmu": "a co-simulation unit (FMI 3.0)",
 }
 """Endings of the files that can be written."""
 STL_UNITS = {"mm": 1e-3, "m": 1.0}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spirillum.answer import as_json, envelope, quantity
+from spirillum.dynamics.held_model import PARAMETERS, HeldModel, held_model
 from spirillum.errors import InputError
 from spirillum.exports.contents import KINDS_OF_FILES, STL_UNITS, Content, check_masses, contents_of, printable_solid
 from spirillum.exports.mjcf import FLUID_WARNING
@@ -19,7 +20,9 @@ from spirillum.files import output_folder, output_target, protected, whole_files
 from spirillum.robot.links import Links, links_of
 from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["Export", "Written", "export"]
@@ -55,6 +58,8 @@ class Export:
     """Of an STL file: its unit, volume, number of triangles and of bodies, and whether it is watertight."""
     warnings: tuple[str, ...]
     """What to be careful about, a sentence each."""
+    held: HeldModel | None = None
+    """Of an FMU: the equations in it."""
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum export --json`."""
@@ -84,6 +89,8 @@ class Export:
         }
         if self.solid is not None:
             content["solid"] = dict(self.solid)
+        if self.held is not None:
+            content |= _equations(self.held)
         return envelope("export", content, self.warnings)
 
 
@@ -95,13 +102,17 @@ def export(
     fineness: float = 1.0,
     unit: str | None = None,
     sidecar: bool | None = None,
-    model: str = "slender",
+    model: str | None = None,
+    friction: str | None = None,
+    calibration: str | Path | None = None,
+    placement: Placement | Mapping[str, Any] | None = None,
 ) -> Export:
     """Write the robot for another program; the ending of the file says for which.
 
     `.stl` is one closed body in mm for a printer, `.glb` a coloured scene, `.vtp` a surface for ParaView. `.urdf` and
     `.mjcf` (or `.xml`) are descriptions of two links with mesh files beside them in a folder `<name>-meshes`, and
-    with the resistance in `<name>.resistance.json`. All files are made before the first takes its place.
+    with the resistance in `<name>.resistance.json`. `.fmu` is a co-simulation unit of the robot held to its channel's
+    axis, compiled for this machine by its C compiler. All files are made before the first takes its place.
 
     Args:
         robot: a preset's name, a robot file, its tables, or a loaded robot.
@@ -110,45 +121,81 @@ def export(
         fineness: number of triangles along every line, relative to the normal one, 0.1 to 20.
         unit: of an STL file, `mm` (as None) or `m`.
         sidecar: whether to write the resistance beside the file; None: with `.urdf` and `.mjcf` only.
-        model: whose resistance, `slender` or `rft`.
+        model: whose resistance, `slender` (as None) or `rft`; of an `.fmu` any model, or `auto` (as None).
+        friction: of an `.fmu`, reading of the friction; None: the robot's own.
+        calibration: of an `.fmu`, calibration file whose factors replace the robot's.
+        placement: of an `.fmu` with `tube`, where the robot is held; with a `flow`, also 0, the flow is an input.
 
     Raises:
         InputError: for wrong input, a file that cannot be written, masses that a description needs and the robot
-            lacks, or a robot outside the model's domain.
+            lacks, a robot outside the model's domain, or an `.fmu` without a C compiler.
     """
     inputs = [robot] if isinstance(robot, (str, Path)) else []
-    with protected(*inputs):
+    with protected(*inputs, calibration):
         target = output_target(path, KINDS_OF_FILES, "robot.stl")
-    described = target.suffix in _DESCRIPTIONS
+    angle, of_held = parse_option("phase", phase, KINDS["angle"]), (friction, calibration, placement)
+    if target.suffix == ".fmu":
+        if angle or fineness != 1.0 or unit is not None or sidecar is not None:
+            raise InputError("phase, fineness, unit or sidecar with .fmu; allowed: only for the robot's shape")
+        held = held_model(robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
+        return _unit_of(held, target)
+    if any(given is not None for given in of_held):
+        raise InputError(f"friction, calibration or placement with {target.suffix}; allowed: only with .fmu")
+    wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
         raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")
-    wanted = described if sidecar is None else sidecar
-    if model != "slender" and not wanted:
+    if model not in (None, "slender") and not wanted:
         raise InputError(f"model = {model!r} without a file for the resistance; allowed: only with the sidecar")
-    ready, angle = load(robot), parse_option("phase", phase, KINDS["angle"])
+    return _shape_of(load(robot), target, angle, fineness, unit or "mm", (model or "slender") if wanted else None)
+
+
+def _shape_of(robot: Robot, target: Path, angle: float, fineness: float, unit: str, resistance: str | None) -> Export:
+    """A file of the robot's shape, written, with the resistance of a model beside it unless that is None."""
+    described = target.suffix in _DESCRIPTIONS
     if described:
-        check_masses(ready, target)
+        check_masses(robot, target)
     # Descriptions and scenes turn the rotor by its joint, so its own shape stays at phase 0.
     still = described or target.suffix == ".glb"
-    pieces = robot_mesh(ready, phase=0.0 if still else angle, fineness=fineness)
-    beside = sidecar_of(ready, model, angle if described else 0.0) if wanted else {}
+    pieces = robot_mesh(robot, phase=0.0 if still else angle, fineness=fineness)
+    beside = {} if resistance is None else sidecar_of(robot, resistance, angle if described else 0.0)
     solid = None
     if target.suffix == ".stl":
-        printable, solid = printable_solid(ready, pieces, unit or "mm")
+        printable, solid = printable_solid(robot, pieces, unit)
         contents = {target.name: printable}
     else:
-        contents = contents_of(ready, target, pieces, angle)
+        contents = contents_of(robot, target, pieces, angle)
     if beside:
         holds = "masses, joint and 12x12 resistance"
         contents[f"{target.stem}.resistance.json"] = Content(as_json(beside).encode(), holds)
     _commit(target, {name: content.data for name, content in contents.items()})
     files = tuple(Written(target.parent / name, content.holds) for name, content in contents.items())
-    warnings = [*ready.warnings, *beside.get("warnings", [])]
+    warnings = [*robot.warnings, *beside.get("warnings", [])]
     if solid is not None and not (solid["watertight"] and solid["bodies"] == 1):
         warnings.append(f"{target.name} is not one watertight body; a printer may refuse it")
     if target.suffix in (".mjcf", ".xml"):
         warnings.append(FLUID_WARNING)
-    return Export(ready, angle, files, pieces, links_of(ready), solid, tuple(warnings))
+    return Export(robot, angle, files, pieces, links_of(robot), solid, tuple(warnings))
+
+
+def _unit_of(held: HeldModel, target: Path) -> Export:
+    """An FMU, written."""
+    from spirillum.exports.fmu.build import fmu_bytes
+
+    robot = held.robot
+    _commit(target, {target.name: fmu_bytes(held)})
+    files = (Written(target, f"{KINDS_OF_FILES['.fmu']} with its C source"),)
+    return Export(robot, 0.0, files, (), links_of(robot), None, tuple(held.prediction.warnings), held)
+
+
+def _equations(held: HeldModel) -> dict[str, Any]:
+    """Where the numbers of an FMU are from, and which they are."""
+    numbers = zip(PARAMETERS, held.values, strict=True)
+    return {
+        **held.prediction.answered_by,
+        "friction": held.prediction.friction,
+        "inputs": ["remote", "duty", *(["mean_flow"] if held.flow is not None else [])],
+        "parameters": {item.name: quantity(value, item.unit, meaning=item.meaning) for item, value in numbers},
+    }
 
 
 def _commit(target: Path, contents: Mapping[str, bytes]) -> None:

@@ -28,6 +28,14 @@ def table(answer: Answer, console: Console) -> None:
         size = " x ".join(f"{1e3 * value:.4g}" for value in solid["size"]["value"])
         console.print(f"{size} mm, {1e6 * solid['volume']['value']:.4g} ml", highlight=False)
         return
+    if "parameters" in answer:
+        rows = grid(
+            f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}", "parameter", "value", "unit"
+        )
+        for name, item in answer["parameters"].items():
+            rows.add_row(name, f"{item['value']:.6g}", item["unit"])
+        console.print(rows)
+        return
     rows = grid(f"{answer['robot']}: links", "quantity", "value", "unit", "SI")
     for name, link in answer["links"].items():
         add_quantities(rows, {f"{name} {key}": link[key] for key in ("mass", "displaced_volume")})

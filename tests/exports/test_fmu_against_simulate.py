@@ -1,0 +1,186 @@
+"""The exported FMU: valid for FMPy, run by FMPy and by a plain C program as `simulate` runs the robot."""
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.exports.fmu import build
+from spirillum.exports.fmu.units import base_units
+from spirillum.quantities import QUANTITIES, unit_of
+
+fmpy: Any = pytest.importorskip("fmpy")
+
+COMPILER = next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))), None)
+needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler is installed")
+WIDE = "biorob2012-wide"
+FIELDS = {"tail.handedness": "left", "friction.effective": "2e-6 N m s/rad"}
+TABLE_II = sp.load(WIDE, **FIELDS)
+PLACED = {"gap": "0.5 mm", "pitch": 0.0, "flow": 1e-3}
+
+
+@pytest.fixture(scope="module")
+def units(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """FMUs of a robot without walls, and of one in an imposed flow."""
+    folder = tmp_path_factory.mktemp("units")
+    sp.export(TABLE_II, folder / "plain.fmu", model="rft")
+    sp.export(WIDE, folder / "flow.fmu", model="tube", placement=PLACED)
+    return {"plain": folder / "plain.fmu", "flow": folder / "flow.fmu"}
+
+
+def simulated(path: Path, inputs: dict[str, list[Any]], *, stop: float, step: float, **more: Any) -> Any:
+    """A run of an FMU by FMPy; inputs are rows by name, `time` among them."""
+    kinds = [(name, bool if name == "remote" else float) for name in inputs]
+    signals = np.array(list(zip(*inputs.values(), strict=True)), dtype=kinds)
+    return fmpy.simulate_fmu(
+        str(path), stop_time=stop, step_size=step, output_interval=step, input=signals, debug_logging=True, **more
+    )
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["plain", "flow"])
+def test_fmpy_finds_no_problem(units: dict[str, Path], name: str) -> None:
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(units[name])) == []
+    description = fmpy.read_model_description(str(units[name]))
+    inputs = [item.name for item in description.modelVariables if item.causality == "input"]
+    assert inputs == ["remote", "duty", *(["mean_flow"] if name == "flow" else [])]
+    for item in description.modelVariables:
+        if item.name in QUANTITIES and item.name != "time":
+            assert item.unit == unit_of(item.name)
+
+
+@needs_compiler
+def test_run_by_fmpy_is_that_of_simulate(units: dict[str, Path]) -> None:
+    run = sp.simulate(TABLE_II, model="rft", motion="held", timing={"duration": 0.2, "on": [(0.0, 0.1)]})
+    names = [str(name) for name in run.data_vars if name in {"position", "battery_voltage", "motor_rotation_rate"}]
+    names += ["tail_angle", "body_angle", "motor_current", "motor_torque", "forward_velocity", "battery_charge_used"]
+    switched = {"time": [0.0, 0.1, 0.1, 0.2], "remote": [True, True, False, False], "duty": [1.0] * 4}
+    found = simulated(units["plain"], switched, stop=0.2, step=0.005, output=names)
+    assert len(found) == 41
+    for name in names:
+        values = run[name].values
+        scale = float(np.abs(values).max())
+        assert found[name][-1] == pytest.approx(float(values[-1]), abs=1e-6 * scale), name
+
+
+@needs_compiler
+def test_steps_of_any_length_give_the_same_run(units: dict[str, Path]) -> None:
+    on = {"time": [0.0, 0.2], "remote": [True, True], "duty": [0.6, 0.6]}
+    many, few = (simulated(units["plain"], on, stop=0.2, step=step) for step in (0.001, 0.1))
+    for name in ("position", "motor_current", "battery_charge_used", "body_angle"):
+        assert many[name][-1] == pytest.approx(few[name][-1], rel=1e-8)
+
+
+@needs_compiler
+def test_steady_state_in_an_imposed_flow_is_that_of_predict(units: dict[str, Path]) -> None:
+    steady = sp.predict(WIDE, model="tube", placement=PLACED)
+    found = simulated(units["flow"], {"time": [0.0], "remote": [True]}, stop=0.5, step=0.1)
+    for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current", "electrical_power"):
+        assert found[name][-1] == pytest.approx(getattr(steady, name), rel=1e-7), name
+
+
+@needs_compiler
+def test_parameters_can_be_set(units: dict[str, Path]) -> None:
+    weak = sp.load(WIDE, **FIELDS, **{"battery.voltage": "3.2 V"})
+    run = sp.simulate(weak, model="rft", motion="held", timing={"duration": 0.1})
+    on = {"time": [0.0], "remote": [True]}
+    found = simulated(units["plain"], on, stop=0.1, step=0.05, start_values={"battery.voltage": 3.2})
+    assert found["position"][-1] == pytest.approx(float(run["position"][-1]), rel=1e-6)
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="dlopen")
+def test_plain_c_program_loads_it(units: dict[str, Path], tmp_path: Path) -> None:
+    host = tmp_path / "host"
+    source = Path(__file__).parent / "fmu_host.c"
+    subprocess.run([str(COMPILER), "-std=gnu99", "-o", str(host), str(source), "-ldl", "-lm"], check=True)
+    with zipfile.ZipFile(units["plain"]) as archive:
+        library = next(name for name in archive.namelist() if name.startswith("binaries/"))
+        archive.extract(library, tmp_path)
+        description = archive.read("modelDescription.xml").decode()
+    token = re.findall('instantiationToken="([^"]*)"', description)[0]
+    done = subprocess.run([str(host), str(tmp_path / library), token], capture_output=True, text=True, check=True)
+    first, *others = done.stdout.splitlines()
+    time, position, tail_angle, current, charge = map(float, first.split())
+    run = sp.simulate(TABLE_II, model="rft", motion="held", timing={"duration": 0.2, "on": [(0.0, 0.1)]})
+    assert time == pytest.approx(0.2)
+    assert position == pytest.approx(float(run["position"][-1]), rel=1e-6)
+    assert tail_angle == pytest.approx(float(run["tail_angle"][-1]), rel=1e-6)
+    assert current == pytest.approx(float(run["motor_current"][-1]), abs=1e-7)
+    assert charge == pytest.approx(float(run["battery_charge_used"][-1]), rel=1e-6)
+    assert others == [
+        "3: an input or parameter is no number",
+        "3: the step is no positive time",
+        "3: the step does not begin where the last one ended",
+        "3: the instantiation token is that of another FMU",
+        "9",
+    ]
+
+
+@needs_compiler
+def test_state_can_be_kept(units: dict[str, Path]) -> None:
+    from fmpy import extract, instantiate_fmu, read_model_description
+
+    description = read_model_description(str(units["plain"]))
+    folder = extract(str(units["plain"]))
+    robot = instantiate_fmu(folder, description, "CoSimulation")
+    robot.enterInitializationMode(startTime=0.0)
+    robot.exitInitializationMode()
+    robot.doStep(0.0, 0.05)
+    kept = robot.getFMUState()
+    robot.doStep(0.05, 0.05)
+    first = robot.getFloat64([10, 18])
+    robot.setFMUState(robot.deserializeFMUState(robot.serializeFMUState(kept)))
+    robot.doStep(0.05, 0.05)
+    np.testing.assert_array_equal(first, robot.getFloat64([10, 18]))
+    robot.terminate()
+    robot.freeInstance()
+    shutil.rmtree(folder)
+
+
+@needs_compiler
+def test_same_robot_gives_the_same_bytes_of_text(units: dict[str, Path], tmp_path: Path) -> None:
+    sp.export(TABLE_II, tmp_path / "again.fmu", model="rft")
+    with zipfile.ZipFile(units["plain"]) as first, zipfile.ZipFile(tmp_path / "again.fmu") as second:
+        assert first.namelist() == second.namelist()
+        for name in first.namelist():
+            if not name.startswith("binaries/"):
+                assert first.read(name) == second.read(name), name
+
+
+def test_units_are_their_si_bases() -> None:
+    assert base_units("m/(s N m)") == {"s": 1, "kg": -1, "m": -1}
+    assert base_units("V s/rad") == {"kg": 1, "m": 2, "s": -2, "A": -1, "rad": -1}
+    assert base_units("1") == {}
+
+
+def test_without_a_compiler_nothing_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build.shutil, "which", lambda _name: None)
+    with pytest.raises(sp.InputError, match="no C compiler is installed"):
+        sp.export(WIDE, tmp_path / "robot.fmu", model="rft")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"phase": 0.3}, "only for the robot's shape"),
+        ({"sidecar": True}, "only for the robot's shape"),
+        ({"model": "nonsense"}, "nonsense"),
+        ({"model": "rft", "placement": {"flow": 1e-3}}, "does not compute the channel's walls"),
+    ],
+)
+def test_wrong_options_are_a_sentence(tmp_path: Path, options: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(sp.InputError, match=sentence):
+        sp.export(WIDE, tmp_path / "robot.fmu", **options)
+    with pytest.raises(sp.InputError, match=r"only with \.fmu"):
+        sp.export(WIDE, tmp_path / "robot.stl", friction="none")
