@@ -65,24 +65,26 @@ def test_a_robot_that_swims_backwards_stops_alike(toy: Any) -> None:
 
 def test_the_followers_error_is_what_it_says() -> None:
     """On its own model: the surprise over its standard deviation has mean 0 and size 1."""
-    lab, dt = Lab.of({"camera": {"position_wander": "0 mm", "position_noise": "0.03 mm"}}), 1.0 / 30.0
+    lab, dt = Lab.of({"camera": {"position_wander": "0.03 mm", "position_noise": "0.01 mm"}}), 1.0 / 30.0
     found = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
         follower = Follower(lab, SPEED)
         follower.send(0.0, 1.0)
         x, speed, drift = 0.0, SPEED * (1.0 + 0.3 * rng.standard_normal()), 0.0
+        slow, kept = 3e-5 * rng.standard_normal(), np.exp(-dt)
         for number in range(1, 301):
             time = dt * number
             x += dt * (speed * (time > 0.068) + drift)
             speed += 0.15 * SPEED * np.sqrt(dt) * rng.standard_normal()
             left = np.exp(-dt / 2.0)
             drift = left * drift + 3e-4 * np.sqrt(1 - left**2) * rng.standard_normal()
-            follower.see(Sight(time, x + 3e-5 * rng.standard_normal(), 0.0, 0.0, 0.0))
+            slow = kept * slow + 3e-5 * np.sqrt(1 - kept**2) * rng.standard_normal()
+            follower.see(Sight(time, x + slow + 1e-5 * rng.standard_normal(), 0.0, 0.0, 0.0))
         mean, spread = follower.ahead(10.0)
-        found.append((mean - (x, speed, drift)) / np.sqrt(np.diag(spread)))
+        found.append((mean - (x, speed, drift, slow)) / np.sqrt(np.diag(spread)))
     assert np.abs(np.mean(found, axis=0)).max() < 0.5
-    assert np.std(found, axis=0) == pytest.approx(np.ones(3), abs=0.3)
+    assert np.std(found, axis=0) == pytest.approx(np.ones(4), abs=0.3)
 
 
 def test_a_stray_sight_is_left_out() -> None:

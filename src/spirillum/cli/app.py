@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from spirillum.cli.calibrate_commands import calibrate, rank_models, suggest
+from spirillum.cli.control_commands import control
 from spirillum.cli.design_commands import design
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
@@ -347,7 +348,7 @@ def citation(
 
 _TASKS = {
     "Predict": (predict, compare_models, study, prepare, resistance),
-    "Move": (simulate, settle, magnetic_sweep),
+    "Move": (simulate, settle, control, magnetic_sweep),
     "Look": (page, show, film, flow),
     "Measure": (render, virtual_experiment, measure),
     "Learn": (calibrate, rank_models, suggest),

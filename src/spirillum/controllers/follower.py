@@ -1,8 +1,9 @@
 """Where a robot is and how fast, from late and noisy sights: a Kalman filter with the commands that are under way.
 
-The state is place x, speed s at full duty and drift w of the fluid:
+The state is place x, speed s at full duty, drift w of the fluid, and the camera's slow error b with its memory T:
 
-    dx/dt = u(t) s + w,   ds = sigma_s dB,   dw = -w/tau dt + sigma_w sqrt(2/tau) dB',   y_k = x(t_k) + noise,
+    dx/dt = u(t) s + w,   ds = sigma_s dB,   dw = -w/tau dt + sigma_w sqrt(2/tau) dB',
+    db = -b/T dt + sigma_b sqrt(2/T) dB'',   y_k = x(t_k) + b(t_k) + noise,
 
 with the duty u that acts at t, which was sent a delay before (Kalman 1960). Frames are used at the time of their
 exposure; what has been sent since moves the state on to the time at which a command that is decided now will act: the
@@ -44,13 +45,14 @@ class Follower:
             speed: predicted at full duty, m/s; its own uncertainty is as large.
             start: place at time 0, m.
         """
-        self._noise = max(np.hypot(lab.camera.position_noise, lab.camera.position_wander), 1e-6) ** 2
+        self._noise = max(lab.camera.position_noise, 1e-6) ** 2
+        self._wander, self._memory = lab.camera.position_wander, lab.camera.memory
         self._delay = lab.remote.delay
         self._walk = (_SPEED_WALK * abs(speed)) ** 2
         self._sent: deque[tuple[float, float]] = deque([(0.0, 0.0)])
         self._time, self._strays = 0.0, 0
-        self._mean: Samples = np.array([start, speed, 0.0])
-        self._spread: Samples = np.diag([1e-3, abs(speed), _DRIFT]) ** 2
+        self._mean: Samples = np.array([start, speed, 0.0, 0.0])
+        self._spread: Samples = np.diag([1e-3, abs(speed), _DRIFT, self._wander]) ** 2
 
     def send(self, time: float, duty: float) -> None:
         """Note a command that is sent now."""
@@ -63,17 +65,17 @@ class Follower:
         self._time = sight.time
         while len(self._sent) > 1 and self._sent[1][0] <= self._time:
             self._sent.popleft()
-        surprise, size = sight.position - self._mean[0], self._spread[0, 0] + self._noise
+        along = self._spread[:, 0] + self._spread[:, 3]
+        surprise, size = sight.position - self._mean[0] - self._mean[3], along[0] + along[3] + self._noise
         if surprise**2 > _STRAY**2 * size and self._strays < _STRAYS:
             self._strays += 1
             return
         self._strays = 0
-        gain = self._spread[:, 0] / size
-        self._mean = self._mean + gain * surprise
-        self._spread = self._spread - np.outer(gain, self._spread[0])
+        self._mean = self._mean + along * surprise / size
+        self._spread = self._spread - np.outer(along, along) / size
 
     def ahead(self, time: float) -> tuple[Samples, Samples]:
-        """Mean (x, s, w) and covariance at a time, with the commands that have been sent; SI."""
+        """Mean (x, s, w, b) and covariance at a time, with the commands that have been sent; SI."""
         return self._moved(time)
 
     def duty_at(self, time: float) -> float:
@@ -90,9 +92,11 @@ class Follower:
         return mean, spread
 
     def _stepped(self, mean: Samples, spread: Samples, dt: float, duty: float) -> tuple[Samples, Samples]:
-        left = np.exp(-dt / _DRIFT_MEMORY)
-        moves = np.array([[1.0, duty * dt, _DRIFT_MEMORY * (1.0 - left)], [0.0, 1.0, 0.0], [0.0, 0.0, left]])
+        left, kept = np.exp(-dt / _DRIFT_MEMORY), np.exp(-dt / self._memory)
+        moves = np.diag([1.0, 1.0, left, kept])
+        moves[0, 1], moves[0, 2] = duty * dt, _DRIFT_MEMORY * (1.0 - left)
         spread = moves @ spread @ moves.T
         spread[1, 1] += self._walk * dt
         spread[2, 2] += _DRIFT**2 * (1.0 - left**2)
+        spread[3, 3] += self._wander**2 * (1.0 - kept**2)
         return moves @ mean, spread

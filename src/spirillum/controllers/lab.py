@@ -179,6 +179,25 @@ class Lab(Section):
         return cls(**{name: section.of(table.get(name)) for name, section in sections.items()})
 
     @classmethod
+    def read(cls, path: str | Path | None, changes: Mapping[str, Any]) -> Self:
+        """A lab from its file with some fields changed.
+
+        Args:
+            path: TOML file; None: the defaults.
+            changes: values by dotted name, as ``{"camera.latency": "50 ms"}``.
+
+        Raises:
+            InputError: for a file that cannot be read, an unknown table or field, or a wrong value.
+        """
+        tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
+        for name, value in changes.items():
+            table, dot, entry = name.partition(".")
+            if not dot or not isinstance(tables.get(table, {}), dict):
+                raise InputError(f"lab: {name[:60]!r} is no field; allowed: TABLE.FIELD, such as camera.latency")
+            tables[table] = {**tables.get(table, {}), entry: value}
+        return cls.of(tables)
+
+    @classmethod
     def exact(cls) -> Self:
         """Sensors without errors, drops and latency, a remote without delay and losses, no pulse, nothing unknown."""
         names = (name for name in Camera.model_fields if name.endswith(("_noise", "_wander", "_error")))

@@ -103,9 +103,14 @@ class StopAtTask(Task):
         if not way * start < way * self.goal < way * last:
             low, high = sorted((start, last))
             beyond = way * self.goal >= way * last
-            why = "where its end of the channel stops the robot" if beyond else "for the robot cannot swim backwards"
+            why = "where the end of the channel stops the robot" if beyond else "for the robot cannot swim backwards"
             raise InputError(
                 f"task.at = {show(self.goal, 'mm')}; allowed: between {show(low, 'mm')} and {show(high, 'mm')}, {why}"
+            )
+        if self.tolerance >= abs(self.goal - start):
+            raise InputError(
+                f"task.tolerance = {show(self.tolerance, 'mm')}; allowed: less than the "
+                f"{show(abs(self.goal - start), 'mm')} to the goal"
             )
 
     def _time_there(self, plant: Plant, speed: float, progress: Progress | None) -> float:

@@ -1,0 +1,161 @@
+"""The command `spirillum control`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.options import Eccentricity, Ends, Gap, Json, Pitch, RobotArgument, Settings, starting
+
+if TYPE_CHECKING:
+    from spirillum.controllers.lab import Lab
+
+__all__ = ["control"]
+
+_TASK = "Task"
+_LAB = "Laboratory"
+_SCORES = "Seeds and scores"
+_PICTURES = "Pictures"
+
+
+def _complete_tasks(incomplete: str) -> list[str]:
+    from spirillum.controllers.registry import TASKS
+
+    return starting(tuple(TASKS), incomplete)
+
+
+def _complete_controllers(incomplete: str) -> list[str]:
+    from spirillum.controllers.task import CONTROLLERS
+
+    return starting(tuple(CONTROLLERS), incomplete)
+
+
+def control(
+    robot: RobotArgument,
+    task: Annotated[
+        str, typer.Option(autocompletion=_complete_tasks, help="What to do: stop-at.", rich_help_panel=_TASK)
+    ] = "stop-at",
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH", help="stop-at: where to stop, x of the body's mid-length.", rich_help_panel=_TASK
+        ),
+    ] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(metavar="LENGTH", help="stop-at: how far beside it is good, else 1mm.", rich_help_panel=_TASK),
+    ] = None,
+    duration: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="Length of a run, else from the predicted speed.", rich_help_panel=_TASK),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="Write the run too: NetCDF (.nc).")
+    ] = None,
+    controller: Annotated[
+        str,
+        typer.Option(
+            autocompletion=_complete_controllers,
+            help="feedback, or what it is judged against: nothing, open-loop, knowing.",
+            rich_help_panel=_TASK,
+        ),
+    ] = "feedback",
+    lab: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="TOML file: camera, meter, remote, pulse, unknown; else usual ones.",
+            rich_help_panel=_LAB,
+        ),
+    ] = None,
+    with_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="FIELD=VALUE",
+            help="A field of the lab, such as camera.latency=50ms; repeatable.",
+            rich_help_panel=_LAB,
+        ),
+    ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Run at the pace of the clock on the wall.", rich_help_panel=_LAB)
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Of all that is drawn.", rich_help_panel=_SCORES)] = 0,
+    seeds: Annotated[
+        int, typer.Option(help="Score all controllers over so many seeds, too.", rich_help_panel=_SCORES)
+    ] = 0,
+    workers: Annotated[int, typer.Option(help="Processes for the scores.", rich_help_panel=_SCORES)] = 1,
+    model: Annotated[str, typer.Option(help="Hydrodynamic model: tube, slender, rft; or auto.")] = "auto",
+    gap: Gap = None,
+    eccentricity: Eccentricity = None,
+    pitch: Pitch = None,
+    ends: Ends = None,
+    roughness: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Roughness of the wall, else 1e-4 of the body's radius.")
+    ] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
+    ] = None,
+    settings: Settings = None,
+    json: Json = False,
+) -> None:
+    """Control a robot in a closed loop: late and noisy camera, on/off remote, flow, unknown friction; and score it.
+
+    Example: `spirillum control biorob2012-wide --task stop-at --at 5mm -o run.nc --plot run.png`
+    """
+    from spirillum.cli import renderer
+    from spirillum.controllers.control import control as answer
+    from spirillum.files import PICTURES, netcdf_target, output_target, protected, write_dataset
+
+    target = None if output is None else netcdf_target(output)
+    picture = None if plot is None else output_target(plot, PICTURES, "run.png")
+    fields = {"at": at, "tolerance": tolerance, "duration": duration}
+    place = placement_from(gap, eccentricity, pitch, None, ends, None)
+    with protected(lab), renderer.progress_bar(quiet=json) as progress:
+        found = answer(
+            loaded_robot(robot, settings),
+            {"kind": task, **{name: value for name, value in fields.items() if value is not None}},
+            lab=_lab(lab, with_),
+            controller=controller,
+            seed=seed,
+            seeds=seeds,
+            plant={"model": model, "placement": place, "roughness": roughness},
+            workers=workers,
+            live=live,
+            progress=progress,
+        )
+        files: dict[str, Any] = {"file": None if output is None else str(output)}
+        if target is not None:
+            write_dataset(found.dataset, target)
+        if picture is not None:
+            from spirillum.view.figures.control import control_figure
+            from spirillum.view.figures.style import save_as
+
+            save_as(control_figure(found), picture)
+            files["plot"] = str(plot)
+    renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
+    if found.interrupted:
+        raise KeyboardInterrupt
+
+
+def _lab(path: Path | None, changes: list[str] | None) -> Lab:
+    """The lab of a file with fields changed.
+
+    Raises:
+        InputError: if one is wrong.
+    """
+    from spirillum.controllers.lab import Lab
+    from spirillum.errors import InputError
+    from spirillum.robot.load import parse_setting
+
+    found = {}
+    for text in changes or []:
+        if "=" not in text:
+            raise InputError(f"--with {text[:60]!r} is not FIELD=VALUE; for example --with camera.latency=50ms")
+        name, value = parse_setting(text)
+        found[name] = value
+    return Lab.read(path, found)
