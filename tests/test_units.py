@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from spirillum.errors import InputError
-from spirillum.units import KINDS, USUAL, _factor, _registry, parse_quantity, show, shown_in
+from spirillum.units import KINDS, USUAL, _factor, _registry, among, display_unit, parse_quantity, show, shown_in
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,11 @@ def test_shown_in_display_units(value: float, unit: str, shown: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "unit", ["mm", "um", "m/s", "mm/s", "rad/s", "Hz", "kg", "g", "mN", "mN m", "mW", "mA", "deg", "min"]
+    "unit",
+    [
+        *("mm", "um", "m/s", "mm/s", "nm/s", "rad/s", "Hz", "kg", "g", "mg", "ug", "pg", "mN", "uN", "nN", "pN", "fN"),
+        *("mN m", "uN m", "nN m", "pN m", "pN um", "pN nm", "mW", "uW", "nW", "pW", "fW", "aW", "mA", "deg", "min"),
+    ],
 )
 def test_display_units_agree_with_units_that_are_read(unit: str) -> None:
     """The table of display units and the registry give the same factor where both know the unit."""
@@ -203,6 +207,20 @@ def test_display_units_agree_with_units_that_are_read(unit: str) -> None:
         except InputError:
             continue
         assert shown_in(si, unit) == pytest.approx(0.5, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [(1e-4, "N m", "0.1 mN m"), (6.5e-19, "N m", "650 pN nm"), (5.57e-16, "W", "0.557 fW"), (2e-8, "W", "0.02 uW")],
+)
+def test_units_scale_with_the_robot(value: float, unit: str, shown: str) -> None:
+    assert show(value, display_unit(value, unit)) == shown
+
+
+def test_a_zero_has_the_unit_of_what_stands_beside_it() -> None:
+    assert among(0.0, "W", [5.57e-16, None, 0.0]) == "fW"
+    assert among(0.0, "W", []) == "mW"
+    assert among(2.0, "W", [5.57e-16]) == "mW"
 
 
 NUMBERS = ["1", "2", "18", "-3.5", "1e5", "1e-300", "99999", ".", "nan", "inf", "٣"]

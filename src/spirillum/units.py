@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
@@ -23,6 +24,7 @@ __all__ = [
     "KINDS",
     "USUAL",
     "Kind",
+    "among",
     "display_unit",
     "for_people",
     "in_unit",
@@ -52,33 +54,53 @@ _SI: dict[str, float] = {
     "m/s": 1.0,
     "mm/s": 1e-3,
     "um/s": 1e-6,
+    "nm/s": 1e-9,
     "rad/s": 1.0,
     "Hz": Hz,
     "kg": 1.0,
     "g": 1e-3,
+    "mg": 1e-6,
+    "ug": 1e-9,
+    "pg": 1e-15,
     "N": 1.0,
     "mN": 1e-3,
+    "uN": 1e-6,
+    "nN": 1e-9,
+    "pN": 1e-12,
+    "fN": 1e-15,
     "N m": 1.0,
     "mN m": 1e-3,
+    "uN m": 1e-6,
+    "nN m": 1e-9,
+    "pN m": 1e-12,
+    "pN um": 1e-18,
+    "pN nm": 1e-21,
     "N m s/rad": 1.0,
     "W": 1.0,
     "mW": 1e-3,
+    "uW": 1e-6,
+    "nW": 1e-9,
+    "pW": 1e-12,
+    "fW": 1e-15,
+    "aW": 1e-18,
     "A": 1.0,
     "mA": 1e-3,
     "V": 1.0,
     "deg": math.pi / 180,
     "ml": 1e-6,
+    "ul": 1e-9,
+    "um^3": 1e-18,
     "mT": 1e-3,
     "s": 1.0,
     "mm/turn": 1e-3 / (2 * math.pi),
     "um/turn": 1e-6 / (2 * math.pi),
+    "nm/turn": 1e-9 / (2 * math.pi),
     "m/rad": 1.0,
     "min": 60.0,
     "turn": 2 * math.pi,
     "%": 1e-2,
     "cm": 1e-2,
     "nm": 1e-9,
-    "mg": 1e-6,
     "kg/m^3": 1.0,
     "mPa s": 1e-3,
     "mV": 1e-3,
@@ -305,16 +327,16 @@ _FOR_PEOPLE = {
 _LARGE = {"s": (120.0, "min"), "rad": (4 * math.pi, "turn")}
 """SI unit to the size from which on values are read in another unit, and that unit."""
 _SMALL = {
-    "m/s": (1e-4, "um/s"),
-    "m": (1e-5, "um"),
-    "m/rad": (1e-7, "um/turn"),
-    "kg": (1e-6, "kg"),
-    "m^3": (1e-12, "m^3"),
-    "N": (1e-8, "N"),
-    "N m": (1e-8, "N m"),
-    "W": (1e-8, "W"),
+    "m/s": ((1e-7, "nm/s"), (1e-4, "um/s")),
+    "m": ((1e-8, "nm"), (1e-5, "um")),
+    "m/rad": ((1e-10, "nm/turn"), (1e-7, "um/turn")),
+    "kg": ((1e-12, "pg"), (1e-9, "ug"), (1e-6, "mg")),
+    "m^3": ((1e-12, "um^3"), (1e-9, "ul")),
+    "N": ((1e-14, "fN"), (1e-11, "pN"), (1e-8, "nN"), (1e-5, "uN")),
+    "N m": ((1e-17, "pN nm"), (1e-14, "pN um"), (1e-11, "pN m"), (1e-8, "nN m"), (1e-5, "uN m")),
+    "W": ((1e-17, "aW"), (1e-14, "fW"), (1e-11, "pW"), (1e-8, "nW"), (1e-5, "uW")),
 }
-"""SI unit to the size below which values are read in another unit, and that unit."""
+"""SI unit to the sizes below which values are read in another unit, least first, and that unit."""
 
 
 def for_people(unit: str) -> str:
@@ -326,9 +348,19 @@ def display_unit(value: float | None, unit: str) -> str:
     """The unit in which people read an SI `value` of that size; None counts as neither small nor large."""
     if value is not None and unit in _LARGE and abs(value) >= _LARGE[unit][0]:
         return _LARGE[unit][1]
-    if value and unit in _SMALL and abs(value) < _SMALL[unit][0]:
-        return _SMALL[unit][1]
+    if value:
+        for below, shown in _SMALL.get(unit, ()):
+            if abs(value) < below:
+                return shown
     return for_people(unit)
+
+
+def among(value: float | None, unit: str, others: Iterable[float | None]) -> str:
+    """The unit in which people read an SI `value` beside `others` of the same unit: a zero takes that of the least."""
+    if value != 0:
+        return display_unit(value, unit)
+    sizes = [abs(other) for other in others if other]
+    return display_unit(min(sizes, default=0.0), unit)
 
 
 def in_unit(value: float | None, unit: str, shown: str) -> str:

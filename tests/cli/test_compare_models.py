@@ -31,22 +31,28 @@ def test_the_document_holds_every_model_and_nothing_else_is_printed(run: Callabl
 
 
 def test_the_table_shows_numbers_differences_and_errors(run: Callable[..., Any], monkeypatch) -> None:
-    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("COLUMNS", "80")
     outcome = run("compare-models", WIDE, *TWO, "--tail-rate", "1.2Hz")
     found = sp.compare_models(WIDE, models=["sbt", "rft"], tail_rate="1.2 Hz")
-    (row,) = [line for line in outcome.out.splitlines() if line.startswith(" forward velocity")]
+    everything = run("compare-models", WIDE, *TWO, "--tail-rate", "1.2Hz", "--all")
+    (row,) = [line for line in everything.out.splitlines() if line.startswith(" forward velocity, mm/s")]
     for answer in found.predictions.values():
+        (own,) = [line for line in outcome.out.splitlines() if line.startswith(f" {answer.model.name} ")]
         assert f"{1e3 * answer.forward_velocity:.4g}" in row
+        assert f"{1e3 * answer.forward_velocity:.4g}" in own
         assert f"known error of {answer.model.name}: " in outcome.out
-    assert f"{100 * found.relative_difference('rft', 'forward_velocity'):+.1f}%" in row
-    assert "vs sbt" in outcome.out
+    assert f"{100 * found.relative_difference('rft', 'forward_velocity'):+.1f}%" in own
+    assert "against sbt" in everything.out
+    tables = [line for line in (everything.out + outcome.out).splitlines() if "│" in line or "┃" in line]
+    assert max(map(len, tables)) <= 80
+    assert "…" not in "".join(tables)
     assert "motor residual torque" not in outcome.out  # no model has one here
 
 
 def test_a_refusing_model_is_a_line(run: Callable[..., Any]) -> None:
     outcome = run("compare-models", WIDE, *TWO, "--set", "tail.wire_diameter=6 mm")
     assert outcome.code == 0
-    (line,) = [line for line in outcome.out.splitlines() if line.startswith("no answer: ")]
+    (line,) = [line for line in outcome.out.splitlines() if line.startswith("no answer by rft: ")]
     assert "reversing the thrust" in line
 
 

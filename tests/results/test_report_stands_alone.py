@@ -78,8 +78,8 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, Any]:
 
 def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Page, Any]) -> None:
     folder = paper[0]
-    assert sorted(path.name for path in folder.iterdir()) == ["claims.json", "figures", "report.html"]
-    names = ["bound", "drop", "fig5-wide", "fig6-narrow", "robot"]
+    assert sorted(path.name for path in folder.iterdir()) == ["claims.json", "figures", "ranking.csv", "report.html"]
+    names = ["bound", "drop", "fig5-wide", "fig6-narrow", "ranking", "robot"]
     assert sorted(path.name for path in (folder / "figures").iterdir()) == sorted(
         f"{name}.{suffix}" for name in names for suffix in ("png", "svg")
     )
@@ -88,14 +88,14 @@ def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Pa
 def test_pictures_are_inside_and_described(paper: tuple[Path, Page, Any]) -> None:
     folder, page, _ = paper
     images = page.all("img")
-    assert len(images) == 5
+    assert len(images) == 6
     for image in images:
         kind, _, data = (image["src"] or "").partition(";base64,")
         assert kind == "data:image/svg+xml"
         assert base64.b64decode(data, validate=True).startswith(b"<?xml")
         assert len(image["alt"] or "") > 40
     first = (images[0]["src"] or "").partition(";base64,")[2]
-    assert base64.b64decode(first) == (folder / "figures" / "robot.svg").read_bytes()
+    assert base64.b64decode(first) == (folder / "figures" / "ranking.svg").read_bytes()
 
 
 def test_page_needs_nothing_from_elsewhere(paper: tuple[Path, Page, Any]) -> None:

@@ -18,6 +18,7 @@ from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
 from spirillum.cli.options import (
     Accuracy,
+    All,
     Calibration,
     Eccentricity,
     Ends,
@@ -125,6 +126,7 @@ def predict(
         float | None,
         typer.Option(help="Model tube, free: coefficient of dry friction where asperities touch; else 0.1."),
     ] = None,
+    all_of_it: All = False,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -153,7 +155,7 @@ def predict(
             in_tube={"friction_coefficient": friction_coefficient},
             progress=progress,
         )
-    renderer.show(result.to_dict(), json=json)
+    renderer.show(result.to_dict(), json=json, all_of_it=all_of_it)
 
 
 def compare_models(
@@ -177,6 +179,7 @@ def compare_models(
     flow: ImposedFlow = None,
     tolerance: Tolerance = None,
     phases: Phases = None,
+    all_of_it: All = False,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -208,7 +211,7 @@ def compare_models(
 
         save_as(comparison_figure(result), target)
     file = None if output is None else str(output)
-    renderer.show(renderer.with_files(result.to_dict(), file=file), json=json)
+    renderer.show(renderer.with_files(result.to_dict(), file=file), json=json, all_of_it=all_of_it)
 
 
 def resistance(
@@ -292,10 +295,11 @@ def study(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for --predicted.")] = 2,
     calibration: Calibration = None,
     posterior: Posterior = None,
+    rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = 10,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Run a study of many robots: dataset, figures, report. A rerun resumes.
+    """Run a study of many robots: which is best, dataset, figures, report. A rerun resumes.
 
     Example: `spirillum study -o my-study`
     """
@@ -318,7 +322,7 @@ def study(
             posterior=posterior,
             progress=progress,
         )
-    renderer.show(study_answer(dataset, output), json=json)
+    renderer.show(study_answer(dataset, output), json=json, rows=rows)
 
 
 def schema(

@@ -11,6 +11,7 @@ __all__ = [
     "MODEL_PANEL",
     "PLACE_PANEL",
     "Accuracy",
+    "All",
     "Calibration",
     "Eccentricity",
     "Ends",
@@ -195,6 +196,7 @@ Settings = Annotated[
         "--set", metavar="PATH=VALUE", help="Set a field of the robot, such as tail.wavelength=20mm; repeatable."
     ),
 ]
+All = Annotated[bool, typer.Option("--all", help="All quantities instead of those that matter most.")]
 Json = Annotated[bool, typer.Option("--json", help="JSON for machines instead of tables for people.")]
 Output = Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="File for the result (NetCDF).")]
 Picture = Annotated[

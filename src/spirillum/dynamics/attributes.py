@@ -24,7 +24,7 @@ def run_attributes(prediction: Prediction) -> dict[str, Any]:
         "effective_friction": prediction.effective_friction,
         "calibrated": int(prediction.calibrated),
         "error_estimate": prediction.error_estimate,
-        "known_error": prediction.model.stated_error(prediction.robot.model),
+        "known_error": prediction.known_error,
         "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
         "references": " ".join(prediction.references),
         "versions": versions(),

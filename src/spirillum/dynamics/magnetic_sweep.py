@@ -258,7 +258,7 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: 
             "model": held.model.name,
             "turns": float(turns),
             "settings": json.dumps(held.robot.model_dump(), sort_keys=True),
-            "known_error": held.model.stated_error(held.robot.model),
+            "known_error": held.known_error,
             "integrator": INTEGRATOR,
             "references": " ".join(held.references),
             "warnings": "\n".join([*held.robot.warnings, *_unsettled(rates, settled, turns)]),

@@ -53,6 +53,10 @@ class ResistanceModel(ABC):
         """What the model leaves out with these options, and what that costs."""
         return self.known_error
 
+    def own_error(self, batch: RobotBatch) -> str:
+        """What the model leaves out of the robot of a batch of one, and what that costs it."""
+        return self.stated_error(batch.options)
+
     @abstractmethod
     def domain(self, batch: RobotBatch) -> list[Limit]:
         """Requirements of the theory: outside them an answer is NaN in a batch and an `InputError` alone."""

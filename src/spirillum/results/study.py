@@ -17,6 +17,7 @@ from spirillum.papers.registry import claims_of, predictions_of
 from spirillum.results.study_report import write_report
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
+from spirillum.studies.ranking import ranking_of
 from spirillum.studies.run import Progress, computed_study, study_fingerprint
 from spirillum.studies.spec import load_study
 
@@ -120,6 +121,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "folder": str(output),
         "files": sorted(str(path.relative_to(output)) for path in output.rglob("*") if path.is_file()),
         "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        "ranking": ranking_of(dataset).to_dict(),
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),
         "claims": verdicts,
         **({"predictions": third} if foretold else {}),

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from spirillum.citations import REFERENCES
 from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.quantities import unit_of
 from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
+from spirillum.studies.ranking import Best, RankedRobot, StudyRanking
+from spirillum.units import among, display_unit, in_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FRICTION_MEANINGS", "content"]
+__all__ = ["FRICTION_MEANINGS", "MOST_RANKED", "content", "shown_ranking"]
 
 FRICTION_MEANINGS = {
     "none": "no friction: the tail turns against the fluid alone, so that a motor's rates and speeds are upper bounds",
@@ -23,8 +27,61 @@ FRICTION_MEANINGS = {
 }
 """A line of meaning for each reading of the friction."""
 
+MOST_RANKED = 10
 MOST_CALIBRATIONS = 40
 MOST_WARNINGS = 100
+
+
+def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, Any]:
+    """The ranking as people read it: what it rests on, the best robots, a row for each of the first.
+
+    Args:
+        ranking: the ranking.
+        most: rows.
+    """
+    sizes = {name: [robot.values[name] for robot in ranking.robots] for name in ranking.quantities}
+    units = {name: among(max(values, key=abs), unit_of(name), values) for name, values in sizes.items() if values}
+    first = ranking.robots[:most]
+    return {
+        "message": ranking.message,
+        "basis": f"model {ranking.model}, friction reading {ranking.friction}"
+        + (", the channel's walls not computed" if ranking.walls else ""),
+        "kind": ranking.kind,
+        "best": [_best_words(best) for best in ranking.best],
+        "header": [
+            "robot",
+            *(f"{_RANKED[name]}, {units[name]}".removesuffix(", 1") for name in units),
+        ],
+        "rows": [[robot.name, *(_ranked_cell(robot, name, units[name]) for name in units)] for robot in first],
+        "more": len(ranking.robots) - len(first),
+    }
+
+
+_RANKED = {
+    "forward_velocity": "speed",
+    "hydrodynamic_efficiency": "efficiency",
+    "motor_current": "current",
+    "shaft_power": "power",
+}
+
+
+def _best_words(best: Best) -> str:
+    """Which robot is the best by a quantity, and how surely."""
+    if best.alike:
+        return f"{best.what}: no difference that counts (all within {100 * best.spread:.1g} %)"
+    sure = f", at {best.places} of {best.of_places} places" if best.of_places else ""
+    value = best.robot.values[best.quantity]
+    shown = display_unit(value, unit_of(best.quantity))
+    size = f"{in_unit(value, unit_of(best.quantity), shown)} {shown}".removesuffix(" 1")
+    return f"{best.what}: {best.robot.name} ({size}{sure})"
+
+
+def _ranked_cell(robot: RankedRobot, name: str, unit: str) -> str:
+    """Value and ends of a quantity of a robot, in a unit."""
+    value, low, high = (in_unit(of[name], unit_of(name), unit) for of in (robot.values, robot.low, robot.high))
+    if math.isnan(robot.values[name]):
+        return "-"
+    return value if math.isnan(robot.low[name]) else f"{value} ({low} to {high})"
 
 
 def content(dataset: xr.Dataset) -> dict[str, Any]:

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.files import write_text
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
+from spirillum.quantities import unit_of
 from spirillum.results.page import draw_pictures, page
-from spirillum.results.study_content import content
+from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_robot import robot_picture
+from spirillum.studies.ranking import StudyRanking, ranking_of
 from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.ranking import ranking_picture
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,12 +49,39 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
     claims, predictions = ([claim.to_dict() for claim in found(dataset)] for found in (claims_of, predictions_of))
     text = json.dumps(claims + predictions, indent=2, allow_nan=False, ensure_ascii=False)
     write_text(folder / "claims.json", text + "\n", replace="any")
-    names = {"pictures": embedded, "claims": claims, "predictions": predictions, **content(dataset)}
+    ranking = ranking_of(dataset)
+    write_text(folder / "ranking.csv", _ranking_rows(ranking), replace="any")
+    names = {
+        "ranking": shown_ranking(ranking),
+        "pictures": embedded,
+        "claims": claims,
+        "predictions": predictions,
+        **content(dataset),
+    }
     write_text(folder / "report.html", page("report.html.jinja", **names))
     tell("report", steps, steps)
 
 
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
-    """The robot first, then the figures of the study."""
+    """The ranking first, then the robot and the figures of the study."""
+    ranking = ranking_of(dataset)
     robot = robot_picture(dataset)
-    return {**({"robot": robot} if robot else {}), **figures_of(dataset)}
+    first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
+    return {**first, **({"robot": robot} if robot else {}), **figures_of(dataset)}
+
+
+def _ranking_rows(ranking: StudyRanking) -> str:
+    """The ranking as CSV, all of its robots; SI."""
+    names = ranking.quantities
+    header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of(name)]}" for name in names for end in _ENDS)]
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow([title.rstrip("_") for title in header])
+    for rank, robot in enumerate(ranking.robots, start=1):
+        values = [of[name] for name in names for of in (robot.values, robot.low, robot.high)]
+        writer.writerow([rank, robot.name, *("" if math.isnan(value) else repr(value) for value in values)])
+    return table.getvalue()
+
+
+_ENDS = ("", "_low", "_high")
+_COLUMN = {"m/s": "m_s", "1": "", "A": "A", "W": "W"}

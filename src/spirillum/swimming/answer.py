@@ -11,7 +11,7 @@ import numpy as np
 from spirillum.arrays import Flags, PerRobot
 from spirillum.quantities import QUANTITIES, Quantity
 
-__all__ = ["LEVEL", "STEADY", "Intervals", "Swimming"]
+__all__ = ["HEADLINE", "LEVEL", "STEADY", "Intervals", "Swimming", "headline"]
 
 LEVEL = 0.95
 """Level of the intervals."""
@@ -56,6 +56,24 @@ class Swimming:
 
 STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.name != "valid")
 """The quantities of steady swimming, in their order."""
+
+
+HEADLINE: tuple[str, ...] = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_current",
+    "step_out_rate",
+    "hydrodynamic_efficiency",
+    "tail_torque",
+)
+"""The quantities that matter most, most first: an answer shows the first five of them that apply."""
+_SHOWN = 5
+
+
+def headline(answer: Mapping[str, Any]) -> list[str]:
+    """Names of the five quantities of a robot's JSON that matter most."""
+    return [name for name in HEADLINE if answer[name]["value"] is not None][:_SHOWN]
 
 
 @dataclass(frozen=True)

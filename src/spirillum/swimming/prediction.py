@@ -25,7 +25,8 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import GAP_SHARE
-from spirillum.swimming.answer import STEADY, Intervals, Swimming
+from spirillum.shown import Shown
+from spirillum.swimming.answer import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.band import Band, band_of
 from spirillum.swimming.cautions import accuracy_limits, calibration_warnings, no_band_warnings
 from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
@@ -51,7 +52,7 @@ _GAP_STEP = 1.02
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(Shown):
     """Steady swimming of one robot, SI, rates signed about +x.
 
     The quantities are attributes (`prediction.forward_velocity`); NaN where one does not apply.
@@ -99,6 +100,13 @@ class Prediction:
         """Keys of the references that it rests on."""
         return self.model.references
 
+    @property
+    def known_error(self) -> str:
+        """What the model leaves out of this robot, and what that costs it."""
+        if self.lying is not None:
+            return "walls, weight and contact are computed, nothing is fitted; roughness and dry friction are assumed"
+        return self.model.own_error(self.batch)
+
     @cached_property
     def placement(self) -> dict[str, Any]:
         """Where the model places the robot; what a band goes over has `low`, `high` and `kind` too."""
@@ -126,6 +134,15 @@ class Prediction:
             motion=self.motion,
             flow=self.batch.placement.flow,
         )
+
+    def __dir__(self) -> list[str]:
+        """Attributes, the quantities among them."""
+        return sorted({*super().__dir__(), *_QUANTITIES})
+
+    def _shown(self) -> tuple[dict[str, Any], list[str]]:
+        """See `Shown`: the quantities that matter most, without what other models say."""
+        answer = self.to_dict(others=False)
+        return answer, headline(answer)
 
     def to_dict(self, *, others: bool = True) -> dict[str, Any]:
         """The answer of `spirillum predict --json`.
@@ -156,7 +173,7 @@ class Prediction:
                 self.error_estimate,
                 "1",
                 **({} if self.model.error_against is None else {"against": self.model.error_against}),
-                statement=self.model.stated_error(self.robot.model),
+                statement=self.known_error,
             ),
             "references": list(self.references),
         }

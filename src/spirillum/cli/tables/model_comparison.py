@@ -1,11 +1,14 @@
-"""Table of `compare-models`: a row for each quantity, a column for each model with its difference."""
+"""Table of `compare-models`: a row for each model, or with `--all` a row for each quantity."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
+from spirillum.swimming.answer import headline
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -13,45 +16,88 @@ __all__ = ["table"]
 
 _LEFT_OUT = ("propulsive_power", "overall_efficiency", "cost_of_transport")
 """What follows from other rows, and stands in the JSON only."""
+_SHORT = {
+    "forward_velocity": "speed",
+    "tail_rotation_rate": "tail",
+    "body_rotation_rate": "body",
+    "motor_current": "current",
+    "step_out_rate": "step-out",
+    "hydrodynamic_efficiency": "efficiency",
+    "tail_torque": "torque",
+}
+"""Names for the heads of narrow columns."""
 
 
-def table(answer: Answer, console: Console) -> None:
-    """Table of `compare-models`: a row for each quantity, a column for each model with its difference."""
-    reference = answer["reference"]
+def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
+    """Table of `compare-models`: the quantities that matter most, a row for each model, or all of them."""
     models = [item for item in answer["models"] if item["answered"]]
-    rows = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "quantity")
-    for item in models:
-        name = item["model"]
-        rows.add_column(name if name == reference else f"{name}, vs {reference}", justify="right")
-    rows.add_column("unit", no_wrap=True)
-    for name in models[0]["relative_difference"]:
-        if name in _LEFT_OUT:
-            continue
-        values = [item[name]["value"] for item in models]
-        known = [value for value in values if value is not None]
-        if not known:
-            continue
-        unit = models[0][name]["unit"]
-        shown = display_unit(max(known, key=abs), unit)
-        cells = []
-        for item, value in zip(models, values, strict=True):
-            cell = in_unit(value, unit, shown)
-            if item["model"] != reference:
-                cell += f" {_difference(item['relative_difference'][name]['value']):>7}"
-            cells.append(cell)
-        rows.add_row(name.replace("_", " "), *cells, "" if shown == "1" else shown)
-    rows.add_row("calibrated", *("yes" if item["calibrated"] else "no" for item in models), "")
-    console.print(rows)
+    if all_of_it:
+        _all_quantities(answer, models, console)
+    else:
+        _side_by_side(answer, models, console)
     for item in answer["models"]:
         console.print(escape(_own_error(item)), highlight=False, soft_wrap=True)
     if answer["file"]:
         console.print(f"picture in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 
 
+def _side_by_side(answer: Answer, models: Sequence[Answer], console: Console) -> None:
+    reference = answer["reference"]
+    names = [name for name in headline(next(m for m in models if m["model"] == reference)) if _known(models, name)]
+    rows = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "model")
+    for name in names:
+        unit = _shown_unit(models, name)
+        rows.add_column(_SHORT[name] + (f"\n{unit}" if unit != "1" else ""), justify="right")
+        if name == names[0]:
+            rows.add_column(f"against\n{reference}", justify="right")
+    for item in models:
+        cells = [in_unit(item[name]["value"], item[name]["unit"], _shown_unit(models, name)) for name in names]
+        against = "" if item["model"] == reference else _difference(item["relative_difference"][names[0]]["value"])
+        name = f"{item['model']}*" if item["calibrated"] else str(item["model"])
+        rows.add_row(name, cells[0], against, *cells[1:])
+    console.print(rows)
+    if any(item["calibrated"] for item in models):
+        console.print("*: with calibration factors", highlight=False)
+    console.print("all quantities: --all", highlight=False)
+
+
+def _all_quantities(answer: Answer, models: Sequence[Answer], console: Console) -> None:
+    """A row for each quantity: first the values, then how far they are from the reference model's."""
+    reference, names = answer["reference"], models[0]["relative_difference"]
+    known = [name for name in names if name not in _LEFT_OUT and _known(models, name)]
+    values = grid(f"{answer['robot']}: models side by side, friction {answer['friction']}", "quantity")
+    others = grid(f"against {reference}", "quantity")
+    for item in models:
+        values.add_column(item["model"], justify="right", no_wrap=True)
+        if item["model"] != reference:
+            others.add_column(item["model"], justify="right", no_wrap=True)
+    for name in known:
+        unit = _shown_unit(models, name)
+        cells = [in_unit(item[name]["value"], item[name]["unit"], unit) for item in models]
+        words = name.replace("_", " ")
+        values.add_row(words + (f", {unit}" if unit != "1" else ""), *cells)
+        apart = [item["relative_difference"][name]["value"] for item in models if item["model"] != reference]
+        others.add_row(words, *map(_difference, apart))
+    values.add_row("calibrated", *("yes" if item["calibrated"] else "no" for item in models))
+    console.print(values)
+    if len(models) > 1:
+        console.print(others)
+
+
+def _known(models: Sequence[Answer], name: str) -> bool:
+    return any(item[name]["value"] is not None for item in models)
+
+
+def _shown_unit(models: Sequence[Answer], name: str) -> str:
+    """The unit of a quantity for all models: that of the largest value."""
+    sizes = [abs(item[name]["value"]) for item in models if item[name]["value"]]
+    return display_unit(max(sizes, default=None), models[0][name]["unit"])
+
+
 def _own_error(item: Answer) -> str:
     """A model's error in words, with its own estimate where it has one, or why there is no answer."""
     if not item["answered"]:
-        return f"no answer: {item['reason']}"
+        return f"no answer by {item['model']}: {item['reason']}"
     error = item["error_estimate"]
     estimate = (
         ""

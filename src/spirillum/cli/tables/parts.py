@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from spirillum.shown import rows_of
 from spirillum.units import display_unit, in_unit
 
 __all__ = [
@@ -45,22 +46,16 @@ def friendly(value: float | None, unit: str) -> tuple[str, str]:
     return in_unit(value, unit, shown), "" if value is None or shown == "1" else shown
 
 
-def add_quantities(table: Table, items: Mapping[str, Any]) -> None:
-    """A row for each quantity that has a value: name, value, unit, SI."""
-    for name, item in items.items():
-        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
-            value, unit = friendly(item["value"], item["unit"])
-            si = "" if unit in ("", item["unit"]) else f"{item['value']:.6g} {item['unit']}"
-            table.add_row(name.replace("_", " "), value, unit, si)
+def add_quantities(table: Table, items: Mapping[str, Any], only: Iterable[str] | None = None) -> None:
+    """A row for each quantity that has a value, or of `only` these: name, value, unit, SI."""
+    for row in rows_of(items, only):
+        table.add_row(row.name, row.value, row.unit, row.si)
 
 
-def add_bands(table: Table, items: Mapping[str, Any]) -> None:
-    """A row for each quantity that has a value: name, value, low and high of its band, unit."""
-    for name, item in items.items():
-        if isinstance(item, Mapping) and "unit" in item and item["value"] is not None:
-            unit = display_unit(item["value"], item["unit"])
-            numbers = [in_unit(item.get(key), item["unit"], unit) for key in ("value", "low", "high")]
-            table.add_row(name.replace("_", " "), *numbers, "" if unit == "1" else unit)
+def add_bands(table: Table, items: Mapping[str, Any], only: Iterable[str] | None = None) -> None:
+    """A row for each quantity that has a value, or of `only` these: name, value, low and high of its band, unit."""
+    for row in rows_of(items, only):
+        table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
 
 
 def show_placement(placement: Answer, console: Console) -> None:

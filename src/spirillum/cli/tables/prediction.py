@@ -16,24 +16,30 @@ from spirillum.cli.tables.parts import (
     show_reason,
     show_unsteady,
 )
+from spirillum.shown import rows_of
+from spirillum.swimming.answer import headline
 
 __all__ = ["table"]
 
 
-def table(answer: Answer, console: Console) -> None:
-    """Table of `predict`."""
+def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
+    """Table of `predict`: the five quantities that matter most, or all of them."""
     show_unsteady(answer, console)
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
+    only = None if all_of_it else headline(answer)
     if "band" in answer or "kind" in answer["forward_velocity"]:
         rows = grid(title, "quantity", "value", "low", "high", "unit")
-        add_bands(rows, quantities)
+        add_bands(rows, quantities, only)
     else:
         rows = grid(title, "quantity", "value", "unit", "SI")
-        add_quantities(rows, quantities)
+        add_quantities(rows, quantities, only)
     console.print(rows)
+    more = len(rows_of(quantities)) - rows.row_count
+    if more:
+        console.print(f"and {more} more quantities: --all", highlight=False)
     show_placement(answer["placement"], console)
     if "lying" in answer:
         show_lying(answer["lying"], console)

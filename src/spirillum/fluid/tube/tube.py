@@ -186,8 +186,8 @@ class Tube(SwimmerModel):
     title = "tube"
     references = ("happel1983", "cortez2001", "pozrikidis1992", "dagan1982", "biorob2012")
     known_error = (
-        "no calibrated factor: the walls are computed; what the paper does not tell, the gap under the body and its "
-        "pitch, decides much of the answer"
+        "no calibrated factor: the walls are computed; the gap under the body and the body's pitch, which are seldom "
+        "known, decide much of the answer"
     )
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
@@ -197,6 +197,17 @@ class Tube(SwimmerModel):
     def __init__(self, coarser: float = 1.0) -> None:
         """Resolve the flow to each robot's `model.tube.tolerance`, or more coarsely by a factor."""
         self._coarser = coarser
+
+    def own_error(self, batch: RobotBatch) -> str:
+        """See `ResistanceModel.own_error`: the numerics state theirs; what is left is the place that nobody gave."""
+        placement = batch.placement
+        unknown = ["the gap under the body"] if placement.gap is None and placement.eccentricity is None else []
+        unknown += ["the body's pitch"] if placement.pitch is None else []
+        walls = "walls are computed, nothing is fitted"
+        if not unknown:
+            return f"{walls}; gap and pitch are taken as given: what they are uncertain by comes on top"
+        decide = "decides" if len(unknown) == 1 else "decide"
+        return f"{walls}; {' and '.join(unknown)}, not given here, {decide} much of the answer"
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""

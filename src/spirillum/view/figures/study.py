@@ -112,7 +112,7 @@ def _left_out(shown: StudyView, wavelengths: int, channels: int) -> str:
         parts.append(f"{MOST_TAILS} of {sizes['amplitude']} amplitudes")
     if channels < sizes["channel"]:
         parts.append(f"{channels} of {sizes['channel']} channels")
-    return f"StudyView: {', '.join(parts)}; the dataset holds all." if parts else ""
+    return f"Shown: {', '.join(parts)}; the dataset holds all." if parts else ""
 
 
 def _channel_picture(shown: StudyView, channel: int, wavelengths: list[int], page: str, left_out: str) -> Picture:

@@ -1,0 +1,132 @@
+"""Answers as people read them: rows with units, as text for `print` and as a table for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from html import escape
+from typing import Any, NamedTuple
+
+from spirillum.units import among, in_unit
+
+__all__ = ["Row", "Shown", "html_of", "rows_of", "text_of"]
+
+
+class Row(NamedTuple):
+    """A quantity as people read it."""
+
+    name: str
+    """Its name in words."""
+    value: str
+    low: str
+    """Least value of its band or interval; empty without one."""
+    high: str
+    unit: str
+    """Unit of the three; empty for pure numbers."""
+    si: str
+    """The value in SI, where that is another unit."""
+
+
+def rows_of(items: Mapping[str, Any], only: Iterable[str] | None = None) -> list[Row]:
+    """A row for each quantity of an answer that has a single value.
+
+    Args:
+        items: an answer, or a part of one; what is no quantity is passed over.
+        only: names of the quantities to show; None: all.
+    """
+    known = {name: item for name, item in items.items() if _is_quantity(item) and item["value"] is not None}
+    return [_row(name, known[name], known) for name in (known if only is None else only) if name in known]
+
+
+def _is_quantity(item: Any) -> bool:
+    if not (isinstance(item, Mapping) and "unit" in item and "value" in item and isinstance(item["unit"], str)):
+        return False
+    return item["value"] is None or isinstance(item["value"], (int, float))
+
+
+def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]]) -> Row:
+    own = item["unit"]
+    shown = among(item["value"], own, [other["value"] for other in known.values() if other["unit"] == own])
+    value, low, high = ("" if item.get(key) is None else in_unit(item[key], own, shown) for key in _ENDS)
+    plain = "" if shown == "1" else shown
+    si = "" if plain in ("", own) else f"{item['value']:.6g} {own}"
+    return Row(name.replace("_", " "), value, low, high, plain, si)
+
+
+_ENDS = ("value", "low", "high")
+
+
+class Shown:
+    """What every answer gives to `print` and to notebooks: its quantities with units, and its warnings."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer as data, as the command of the same name prints it with `--json`."""
+        raise NotImplementedError
+
+    def _shown(self) -> tuple[Mapping[str, Any], Iterable[str] | None]:
+        """The answer as data, and the names of the quantities to show; None: all."""
+        return self.to_dict(), None
+
+    def __str__(self) -> str:
+        """The answer as text, for `print`."""
+        return text_of(*self._shown())
+
+    def _repr_html_(self) -> str:
+        """The answer as a table, for notebooks."""
+        return html_of(*self._shown())
+
+
+def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
+    """An answer as text: a title, a line for each quantity, what is to be said of it, its warnings."""
+    rows = rows_of(answer, only)
+    width = max((len(row.name) for row in rows), default=0)
+    lines = [_title(answer)]
+    for row in rows:
+        ends = f"  ({row.low} to {row.high})" if row.low and row.low != row.high else ""
+        lines.append(f"  {row.name:<{width}}  {row.value} {row.unit}{ends}".rstrip())
+    if len(rows) < (whole := len(rows_of(answer))):
+        lines.append(f"  and {whole - len(rows)} more: dir(answer), answer.to_dict()")
+    lines += [f"  {name}: {text}" for name, text in _words(answer)]
+    lines += [f"warning: {warning}" for warning in answer.get("warnings", ())]
+    return "\n".join(lines)
+
+
+def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
+    """An answer as a table in HTML; everything in it is escaped."""
+    rows = rows_of(answer, only)
+    banded = any(row.low for row in rows)
+    header = ("quantity", "value", *(("low", "high") if banded else ()), "unit")
+    cells = [(row.name, row.value, *((row.low, row.high) if banded else ()), row.unit) for row in rows]
+    body = "".join(
+        f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in line)}</tr>"
+        for line in [*cells, *((name, text, *([""] * (len(header) - 2))) for name, text in _words(answer))]
+    )
+    head = "".join(f"<th>{name}</th>" for name in header)
+    warnings = "".join(f"<p><b>warning:</b> {escape(warning)}</p>" for warning in answer.get("warnings", ()))
+    title = escape(_title(answer))
+    return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{warnings}"
+
+
+def _title(answer: Mapping[str, Any]) -> str:
+    """Whose answer it is, of which kind, by which model."""
+    kind = str(answer["schema"]).removeprefix("spirillum.").partition("/")[0].replace("-", " ")
+    said = [f"{name} {answer[name]}" for name in ("model", "friction") if isinstance(answer.get(name), str)]
+    if isinstance(answer.get("calibrated"), bool):
+        said.append("calibrated" if answer["calibrated"] else "not calibrated")
+    words = ", ".join([kind, *said])
+    return f"{answer['robot']}: {words}" if isinstance(answer.get("robot"), str) else words
+
+
+_LONGEST = 100
+_TOLD = ("schema", "robot", "model", "friction", "model_reason", "motion", "form")
+
+
+def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What an answer says in a few words or in plain numbers: files, counts, verdicts."""
+    return [
+        (name.replace("_", " "), str(item))
+        for name, item in answer.items()
+        if name not in _TOLD
+        and isinstance(item, (str, int))
+        and not isinstance(item, bool)
+        and len(str(item)) < _LONGEST
+    ]

@@ -1,0 +1,229 @@
+"""Which robot of a study is best: fastest, most efficient, with the least current, and how surely.
+
+One model and one reading of the friction rank all robots: the model that computes the channel's walls where the study
+has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
+study has it. Bands and intervals are those of the study. A band goes over places that robots may share, such as a gap:
+at how many of them the fastest robot is the fastest says more than how far the bands overlap.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import Values
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.quantities import unit_of
+from spirillum.units import display_unit, in_unit, show
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Best", "RankedRobot", "StudyRanking", "ranking_of"]
+
+_ALIKE = 0.01
+_MOST = 1000
+"""Robots in an answer."""
+
+
+class RankedRobot(NamedTuple):
+    """A robot of a study with the quantities that rank it, SI; NaN for what does not apply."""
+
+    name: str
+    """Its name, or its channel and tail."""
+    values: Mapping[str, float]
+    low: Mapping[str, float]
+    """Least values of bands or lower limits of intervals; NaN without one."""
+    high: Mapping[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in JSON."""
+        ends = {
+            name: {"low": self.low[name], "high": self.high[name]} if np.isfinite(self.low[name]) else {}
+            for name in self.values
+        }
+        return {
+            "robot": self.name,
+            **{name: quantity(value, unit_of(name), **ends[name]) for name, value in self.values.items()},
+        }
+
+
+class Best(NamedTuple):
+    """The best robot by one quantity."""
+
+    what: str
+    """`fastest`, `most efficient`, `least current` or `least power`."""
+    quantity: str
+    robot: RankedRobot
+    places: int
+    """Number of places of the band at which it is the best; 0 without a band."""
+    of_places: int
+    """Number of places at which the robots have answers."""
+    spread: float
+    """Largest less least value of all robots, over that of the best."""
+
+    @property
+    def alike(self) -> bool:
+        """Whether the quantity hardly tells the robots apart."""
+        return self.spread < _ALIKE
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in JSON."""
+        found: dict[str, Any] = {"what": self.what, "quantity": self.quantity, "robot": self.robot.name}
+        found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
+        return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
+
+
+@dataclass(frozen=True)
+class StudyRanking:
+    """The robots of a study, the fastest first."""
+
+    model: str
+    """The model that ranks them."""
+    friction: str
+    """The reading of the friction with which it does."""
+    walls: bool
+    """Whether the walls of a channel that robots are in are left out."""
+    kind: str
+    """What low and high are: `band`, `interval`, or empty where there are none."""
+    robots: tuple[RankedRobot, ...]
+    """Robots that have an answer, the fastest first."""
+    best: tuple[Best, ...]
+    """The best of them by each quantity."""
+
+    @property
+    def message(self) -> str:
+        """What the ranking says, in a sentence."""
+        if not self.robots:
+            return "no robot has an answer"
+        first = self.best[0]
+        speed, unit = first.robot.values["forward_velocity"], "forward_velocity"
+        low, high = first.robot.low[unit], first.robot.high[unit]
+        shown = display_unit(speed, "m/s")
+        band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
+        return f"fastest: {first.robot.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the quantities."""
+        return tuple(self.robots[0].values) if self.robots else ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in JSON; at most a thousand robots."""
+        return {
+            "model": self.model,
+            "friction": self.friction,
+            "walls_left_out": self.walls,
+            "low_and_high": self.kind or "none",
+            "best": [best.to_dict() for best in self.best],
+            "robots": [robot.to_dict() for robot in self.robots[:_MOST]],
+        }
+
+
+def ranking_of(dataset: xr.Dataset) -> StudyRanking:
+    """The ranking of a study's robots.
+
+    Args:
+        dataset: what `spirillum.study` returns.
+    """
+    settings = json.loads(str(dataset.attrs.get("settings", "{}")))
+    robots = settings.get("robots", [])
+    walled = any(robot.get("channel") for robot in robots)
+    model = _model([str(name) for name in dataset["model"].values])
+    own = [str((robot.get("friction") or {}).get("reading")) for robot in robots]
+    reading = _reading([str(name) for name in dataset["friction"].values], own)
+    chosen = dataset.sel(model=model, friction=reading)
+    names = list(_names(dataset))
+    known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
+    values = {name: _flat(chosen, name, names) for name in known}
+    low, high, kind = _ends(chosen, known, names)
+    order = np.argsort(-values["forward_velocity"], kind="stable")
+    order = order[np.isfinite(values["forward_velocity"][order])]
+    ranked = {
+        int(index): RankedRobot(
+            names[index], *({name: float(of[name][index]) for name in known} for of in (values, low, high))
+        )
+        for index in order
+    }
+    best = tuple(_best(chosen, name, values[name], ranked) for name in known if np.isfinite(values[name]).any())
+    left_out = walled and not SWIMMER_MODELS[model].placed
+    return StudyRanking(model, reading, left_out, kind if ranked else "", tuple(ranked.values()), best)
+
+
+def _model(names: list[str]) -> str:
+    walled = [name for name in names if name in SWIMMER_MODELS and SWIMMER_MODELS[name].placed]
+    solved = [name for name in names if name in SWIMMER_MODELS and not SWIMMER_MODELS[name].closed_form]
+    return (walled or solved or names)[0]
+
+
+def _reading(names: list[str], own: list[str]) -> str:
+    return next((name for name in names if name in own), names[0])
+
+
+def _cost(chosen: xr.Dataset) -> str:
+    """The current where there is a motor, else the power at the shaft."""
+    return "motor_current" if bool(np.isfinite(chosen["motor_current"].values).any()) else "shaft_power"
+
+
+def _names(dataset: xr.Dataset) -> Iterator[str]:
+    """Names of the robots in the flat order of the study."""
+    if "robot" in dataset.dims:
+        yield from (str(name) for name in dataset["robot"].values)
+        return
+    several = dataset.sizes["channel"] > 1
+    for channel in dataset["channel"].values:
+        for wavelength in dataset["wavelength"].values:
+            for amplitude in dataset["amplitude"].values:
+                unit = "um" if float(wavelength) < 1e-4 else "mm"
+                tail = f"{show(float(wavelength), unit).removesuffix(f' {unit}')} x {show(float(amplitude), unit)}"
+                yield f"{channel}, {tail}" if several else tail
+
+
+def _flat(chosen: xr.Dataset, name: str, names: list[str]) -> Values:
+    found: Values = np.asarray(chosen[name].values, dtype=float).reshape(len(names))
+    return found
+
+
+def _ends(chosen: xr.Dataset, known: list[str], names: list[str]) -> tuple[dict[str, Values], dict[str, Values], str]:
+    """Ends of the band or of the interval of each quantity, and which of them they are."""
+    found: list[dict[str, Values]] = []
+    kind = ""
+    for end in ("low", "high"):
+        ends = {}
+        for name in known:
+            of = {"band": f"{name}_{end}", "interval": f"{name}_interval_{end}"}
+            there = [
+                word for word, item in of.items() if item in chosen and bool(np.isfinite(chosen[item].values).any())
+            ]
+            ends[name] = _flat(chosen, of[there[0]], names) if there else np.full(len(names), np.nan)
+            kind = kind or (there[0] if there else "")
+        found.append(ends)
+    return found[0], found[1], kind
+
+
+_WORDS = {
+    "forward_velocity": ("fastest", 1.0),
+    "hydrodynamic_efficiency": ("most efficient", 1.0),
+    "motor_current": ("least current", -1.0),
+    "shaft_power": ("least power", -1.0),
+}
+"""Quantity to its word and to the sign by which the largest is the best."""
+
+
+def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, RankedRobot]) -> Best:
+    word, sign = _WORDS[name]
+    among = np.array(list(ranked))
+    winner = int(among[np.nanargmax(sign * values[among])])
+    spread = float(np.ptp(values[among][np.isfinite(values[among])]) / max(abs(values[winner]), 1e-300))
+    places = chosen.get(f"{name}_at_place")
+    if places is None:
+        return Best(word, name, ranked[winner], 0, 0, spread)
+    there = sign * np.asarray(places.values, dtype=float).reshape(values.size, -1)
+    there = there[:, np.isfinite(there).all(axis=0)]
+    wins = int(np.count_nonzero(np.argmax(there, axis=0) == winner)) if there.shape[1] else 0
+    return Best(word, name, ranked[winner], wins, there.shape[1], spread)

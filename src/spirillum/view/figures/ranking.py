@@ -1,0 +1,92 @@
+"""The headline figure of a study: its best robots in a row each, the fastest on top."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from spirillum.arrays import Values
+from spirillum.quantities import unit_of
+from spirillum.studies.ranking import RankedRobot, StudyRanking
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain
+
+__all__ = ["ranking_picture"]
+
+MOST = 12
+"""Robots in the figure."""
+_WIDTH, _ROW, _ENDS = 6.9, 0.24, 1.0  # inches
+_TITLES = {
+    "forward_velocity": "speed",
+    "hydrodynamic_efficiency": "efficiency",
+    "motor_current": "current",
+    "shaft_power": "power at the shaft",
+}
+
+
+def ranking_picture(ranking: StudyRanking) -> Picture:
+    """The headline figure: speed, efficiency and current of the fastest robots, with their bands.
+
+    Args:
+        ranking: of at least one robot.
+    """
+    count = len(ranking.robots)
+    which = f"The {min(MOST, count)} fastest of {count} robots" if count > MOST else f"All {count} robots"
+    lines = {"band": " Lines: the band over gap and pitch.", "interval": " Lines: 95 % intervals."}
+    walls = " The channel's walls are not computed." if ranking.walls else ""
+    caption = (
+        f"{which}, by model {ranking.model} with friction reading {ranking.friction}; filled: the best of its column."
+        f"{lines.get(ranking.kind, '')}{walls}"
+    )
+    title = ranking.message[:1].upper() + ranking.message[1:]
+    return Picture.of(plain(title, 120), caption, f"{plain(title, 120)}. {which}.", lambda: _drawn(ranking))
+
+
+def _drawn(ranking: StudyRanking) -> Figure:
+    robots = ranking.robots[:MOST]
+    names = [name for name in ranking.quantities if any(np.isfinite(robot.values[name]) for robot in robots)]
+    figure = new_figure(_WIDTH, _ENDS + _ROW * len(robots))
+    panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
+    for panel, name in zip(panels[0], names, strict=True):
+        _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike})
+    first = panels[0][0]
+    first.set_yticks(range(len(robots)), [plain(robot.name, 34) for robot in robots])
+    first.set_ylim(len(robots) - 0.4, -0.6)
+    title = ranking.message[:1].upper() + ranking.message[1:]
+    figure.suptitle(plain(title, 90), x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
+    figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.04 / figure.get_figheight()))
+    return figure
+
+
+def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, str]) -> None:
+    """One quantity of all robots: points, and lines over their bands."""
+    values, low, high = (_of(robots, which, name) for which in ("values", "low", "high"))
+    scale = _scale(np.concatenate([values, high]), unit_of(name))
+    rows = np.arange(len(robots))
+    colour = COLOURS["blue"]
+    panel.hlines(rows, scale(low), scale(high), color=colour, linewidth=2.2, alpha=0.35)
+    winner = np.array([robot.name == best.get(name) for robot in robots])
+    for chosen, face in ((winner, colour), (~winner, "white")):
+        panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
+    panel.set_xlabel(f"{_TITLES[name]}, {scale.unit}".removesuffix(", 1"))
+    panel.xaxis.set_major_locator(MaxNLocator(4))
+    panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))))
+    panel.tick_params(axis="y", length=0)
+    for side in ("top", "right", "left"):
+        panel.spines[side].set_visible(False)
+
+
+def _scale(values: Values, unit: str) -> Scale:
+    """A unit that makes ticks short: shares below a hundredth as powers of ten."""
+    largest = float(np.nanmax(np.abs(values)))
+    if unit != "1" or largest >= 0.01 or largest == 0.0:
+        scale = Scale.of(values, unit)
+        return Scale(1e-3, "mA") if scale.unit == "A" and largest < 1.0 else scale
+    power = int(np.floor(np.log10(largest)))
+    return Scale(10.0**power, f"$10^{{{power}}}$")
+
+
+def _of(robots: tuple[RankedRobot, ...], which: str, name: str) -> Values:
+    return np.array([getattr(robot, which)[name] for robot in robots])

@@ -1,0 +1,74 @@
+"""The ranking of a study: the fastest first, bands at the same places, units that fit the robots."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.results.study_report import write_report
+from spirillum.studies.ranking import ranking_of
+
+GRID = {
+    "models": ["rft", "sbt"],
+    "friction": ["none", "rotor"],
+    "grid": {
+        "wavelengths": ["10 mm", "25 mm"],
+        "amplitudes": ["1.5 mm", "3.5 mm"],
+        "channels": {"wide": "biorob2012-wide", "narrow": "biorob2012-narrow"},
+    },
+}
+
+
+def test_ranking_is_that_of_the_dataset_with_one_model_and_the_robots_own_reading() -> None:
+    dataset = sp.study(GRID)
+    found = ranking_of(dataset)
+    assert (found.model, found.friction, found.walls, found.kind) == ("rft", "rotor", True, "")
+    speeds = [robot.values["forward_velocity"] for robot in found.robots]
+    own = dataset["forward_velocity"].sel(model="rft", friction="rotor").values.ravel()
+    assert speeds == sorted(own[np.isfinite(own)], reverse=True)
+    assert found.robots[0].name in ("wide, 10 x 1.5 mm", "wide, 25 x 1.5 mm", "wide, 25 x 3.5 mm")
+    best = {item.what: item.robot for item in found.best}
+    assert best["fastest"] is found.robots[0]
+    name = "hydrodynamic_efficiency"
+    assert best["most efficient"].values[name] == max(robot.values[name] for robot in found.robots)
+    assert best["least current"].values["motor_current"] == min(r.values["motor_current"] for r in found.robots)
+
+
+def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
+    dataset = sp.study(GRID)
+    shape = dataset["forward_velocity"].shape
+    names = ("forward_velocity", "hydrodynamic_efficiency")
+    factors = np.array([0.5, 1.0, 2.0])  # of robots at three places: alike for all but the last one
+    for name in names:
+        there = dataset[name].values[..., None] * factors
+        there.reshape(-1, *shape[-2:], 3)[-1, ..., 2] *= 1e3
+        dataset[f"{name}_at_place"] = ((*dataset[name].dims, "place"), there)
+        dataset[f"{name}_low"], dataset[f"{name}_high"] = 0.5 * dataset[name], 2.0 * dataset[name]
+    found = ranking_of(dataset)
+    fastest = found.best[0]
+    assert (found.kind, fastest.places, fastest.of_places) == ("band", 2, 3)
+    assert found.robots[0].low["forward_velocity"] == pytest.approx(0.5 * found.robots[0].values["forward_velocity"])
+    assert "(" in found.message
+
+
+def test_report_starts_with_the_ranking(tmp_path: Path) -> None:
+    dataset = sp.study(GRID)
+    found = ranking_of(dataset)
+    write_report(dataset, tmp_path, lambda *_: None)
+    rows = list(csv.DictReader((tmp_path / "ranking.csv").read_text(encoding="utf-8").splitlines()))
+    assert [row["rank"] for row in rows] == [str(n + 1) for n in range(len(found.robots))]
+    assert float(rows[0]["forward_velocity_m_s"]) == found.robots[0].values["forward_velocity"]
+    assert rows[0]["forward_velocity_high_m_s"] == ""
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.index('id="ranking"') < page.index('id="figures"') < page.index('id="settings"')
+    assert (tmp_path / "figures" / "ranking.png").stat().st_size > 5_000
+
+
+def test_robots_without_a_motor_are_ranked_by_power_and_equal_ones_are_called_so() -> None:
+    found = ranking_of(sp.study({"models": ["sbt"], "friction": ["none"], "robots": ["ecoli"]}))
+    assert [item.what for item in found.best] == ["fastest", "most efficient", "least power"]
+    assert all(item.alike for item in found.best)
+    assert found.message == "fastest: ecoli, 18.94 um/s" or found.message.endswith("um/s")
+    assert found.walls is False
