@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     from spirillum.interfaces.python_control import LinearSystem as LinearSystem
     from spirillum.interfaces.python_control import control_system as control_system
     from spirillum.interfaces.python_control import linear_system as linear_system
+    from spirillum.live.answer import Tracked as Tracked
     from spirillum.live.observation import Observation as Observation
+    from spirillum.live.session import track as track
     from spirillum.live.tracker import LiveTracker as LiveTracker
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
@@ -90,6 +92,7 @@ _HOME = {
     "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.swimming.answer",
+    "Tracked": "spirillum.live.answer",
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
@@ -118,6 +121,7 @@ _HOME = {
     "study": "spirillum.results.study",
     "suggest": "spirillum.calibration.suggest",
     "swim": "spirillum.swimming.steady",
+    "track": "spirillum.live.session",
     "virtual_experiment": "spirillum.virtual.experiment",
 }
 

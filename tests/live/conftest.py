@@ -43,6 +43,7 @@ def pictures(swimmer: Any) -> list[tuple[float, Any]]:
 @pytest.fixture(scope="session")
 def filmed(swimmer: Any, pictures: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its film; the setup lies beside it."""
+    object.__setattr__(swimmer, "pictures", lambda: iter(pictures))  # drawn once
     path = tmp_path_factory.mktemp("live") / "swimmer.mp4"
     swimmer.write(path)
     return path

@@ -52,6 +52,7 @@ from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
 from spirillum.cli.setup_commands import setup_app
 from spirillum.cli.show_commands import film, show
+from spirillum.cli.track_commands import track
 from spirillum.cli.virtual_commands import render, virtual_experiment
 
 __all__ = ["app"]
@@ -354,7 +355,7 @@ _TASKS = {
     "Predict": (predict, compare_models, study, prepare, resistance),
     "Move": (simulate, settle, control, magnetic_sweep),
     "Look": (page, show, film, flow),
-    "Measure": (render, virtual_experiment, measure),
+    "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),
     "Design": (design,),
     "Files": (export, schema, citation),

@@ -12,6 +12,7 @@ from spirillum.errors import InputError
 from spirillum.live.observation import Observation
 from spirillum.live.watch import CameraWatch, Readings, motion_flags
 from spirillum.live.windows import Window, periodic_error
+from spirillum.measurement.flags import SYNTHETIC, says_synthetic
 from spirillum.measurement.systematic import (
     DRIFT_ANGLE,
     DRIFT_BARE,
@@ -72,7 +73,7 @@ class Following:
         start = learnt.known.start
         self.scale, size_flags = checked_scale(learnt.sight.scale, start.body, learnt.known.size)
         self.roll, rolled = (0.0, ()) if ruled else self._roll()
-        self.always = (*learnt.sight.flags, *size_flags, *rolled)
+        self.always = (*learnt.sight.flags, *size_flags, *rolled, *_synthetic(video))
         self.moved: tuple[Flag, ...] = ()
         self.flags: tuple[Flag, ...] = (*self.always, *learnt.flags)
         self.next_check = -math.inf
@@ -220,6 +221,12 @@ class Following:
         if not self.follower.record.time:
             raise InputError(f"{name} has no frame after the robot was learnt; allowed: a longer one")
         return trial_of(track_of(self.video, self.setup, sight, known, self.follower.record, flags), self.robot, name)
+
+
+def _synthetic(video: Video) -> tuple[Flag, ...]:
+    """That the pictures are computed, where they say so."""
+    sentence = "the pictures say of themselves that they are synthetic: nothing here is measured"
+    return (Flag(SYNTHETIC, sentence),) if says_synthetic(video.words) else ()
 
 
 def _without_spoiled(seen: Observation) -> Observation:

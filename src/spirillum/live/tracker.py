@@ -22,7 +22,7 @@ from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame, Video
 
-__all__ = ["LiveTracker"]
+__all__ = ["LiveTracker", "seconds"]
 
 _SAMPLES = 24
 """Frames from which the robot is learnt, as for a film."""
@@ -45,6 +45,7 @@ class LiveTracker:
         window: str | float = 2.0,
         learn_from: str | Path | None = None,
         name: str = "live",
+        words: str = "",
     ) -> None:
         """Get ready.
 
@@ -55,6 +56,7 @@ class LiveTracker:
             window: time over which rates are taken, with its unit or a float in s.
             learn_from: a film of the same robot before the same camera; the tracker then begins with the first frame.
             name: of the source, for sentences.
+            words: what the source says of itself, such as that it is synthetic.
 
         Raises:
             InputError: for wrong input, or a film in which neither ruler nor robot is found.
@@ -67,8 +69,8 @@ class LiveTracker:
             self._folder = Path(setup).parent
         self.robot = load(robot) if robot is not None else own
         assert self.robot is not None  # noqa: S101 - the setup names one
-        self.name = name
-        self._learn, self._window = _seconds("learn", learn), _seconds("window", window)
+        self.name, self._words = name, words
+        self._learn, self._window = seconds("learn", learn), seconds("window", window)
         self._samples: list[Frame] = []
         self._wanted: list[float] = []
         self._size: tuple[int, int] | None = None
@@ -148,7 +150,7 @@ class LiveTracker:
         samples, self._samples, self._wanted = self._samples, [], []
         assert self._size is not None  # noqa: S101 - a frame has told
         try:
-            self._begin(Video(Path(self.name), self._size, None, None), samples)
+            self._begin(Video(Path(self.name), self._size, None, None, words=self._words), samples)
         except InputError as error:
             self._reason = str(error)
 
@@ -161,8 +163,18 @@ class LiveTracker:
         self._robot_is = Following(video, self.setup, self.robot, learnt, self._window)
 
 
-def _seconds(name: str, value: str | float) -> float:
+def seconds(name: str, value: str | float, most: float = 600.0) -> float:
+    """A time from a user.
+
+    Args:
+        name: of the option.
+        value: with its unit, or a float in s.
+        most: the longest one, s.
+
+    Raises:
+        InputError: if it is none, shorter than 0.1 s, or too long.
+    """
     found = parse_option(name, value, KINDS["time"])
-    if not 0.1 <= found <= 600.0:
-        raise InputError(f"{name} = {found:g} s; allowed: 0.1 s to 600 s")
+    if not 0.1 <= found <= most:
+        raise InputError(f"{name} = {found:g} s; allowed: 0.1 s to {most:g} s")
     return float(found)

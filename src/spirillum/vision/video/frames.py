@@ -23,7 +23,7 @@ from spirillum.vision.video.pictures import read_image
 from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.read_ahead import ahead
 
-__all__ = ["FILMS", "PICTURES", "Frame", "Video", "open_video"]
+__all__ = ["FILMS", "PICTURES", "Frame", "Video", "converter", "open_video"]
 
 FILMS = (".mp4", ".avi", ".mov", ".mkv", ".m4v", ".webm")
 """Endings of films."""
@@ -155,7 +155,7 @@ class Video:
 
     def _film(self) -> Iterator[tuple[int, float, Any]]:
         """Index, time and a function that gives the picture, of every frame that can be decoded."""
-        last, origin, rgb = None, None, _converter()
+        last, origin, rgb = None, None, converter()
         for index, frame in enumerate(self._decoded()):
             if (frame.width, frame.height)[:: _turn(frame)] != self.size:
                 self._note("unreadable-frames", "the film changes its size on the way: frames of another are left out")
@@ -206,7 +206,7 @@ class Video:
         with _opened(self.path) as container, suppress(av.error.FFmpegError, ValueError):  # what can be read has to do
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
-            decoded, now, origin, rgb = container.decode(stream), -1.0, None, _converter()
+            decoded, now, origin, rgb = container.decode(stream), -1.0, None, converter()
             for wanted in times:
                 if now >= wanted:
                     continue
@@ -371,7 +371,7 @@ def _turn(frame: Any) -> int:
     return -1 if _quarters(frame) % 2 else 1
 
 
-def _converter() -> Callable[[Any], np.ndarray]:
+def converter() -> Callable[[Any], np.ndarray]:
     """A function that gives a decoded frame's picture, for one thread: what converts is set up once, not every time."""
     av = required("av", _PURPOSE, "video")
     reformatter = av.video.reformatter.VideoReformatter()

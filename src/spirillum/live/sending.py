@@ -1,0 +1,52 @@
+"""One JSON object a line, as text or as UDP datagrams."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from spirillum.errors import InputError
+
+__all__ = ["Datagrams", "line_of"]
+
+_LOOPBACK = "127.0.0.1"
+_WHAT = "PORT or HOST:PORT, a port from 1 to 65535; without a host, this computer"
+
+
+def line_of(answer: Mapping[str, Any]) -> str:
+    """An answer as JSON in one line; refuses NaN."""
+    return json.dumps(answer, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+
+
+class Datagrams:
+    """Sends each line as one datagram; one that nobody takes is lost, as the next one is newer."""
+
+    def __init__(self, address: str) -> None:
+        """Find the receiver.
+
+        Args:
+            address: `PORT` on this computer, or `HOST:PORT`.
+
+        Raises:
+            InputError: for anything else, or a host that is not known.
+        """
+        host, colon, port = address.rpartition(":")
+        if not (port.isascii() and port.isdigit() and 1 <= int(port[:6]) <= 65535) or (colon and not host):
+            raise InputError(f"udp = {address[:60]!r}; allowed: {_WHAT}")
+        try:
+            found = socket.getaddrinfo(host.strip("[]") or _LOOPBACK, int(port), type=socket.SOCK_DGRAM)[0]
+        except OSError as error:
+            raise InputError(f"udp = {address[:60]!r}: the host is not known ({error}); allowed: {_WHAT}") from error
+        self._socket, self._to = socket.socket(found[0], socket.SOCK_DGRAM), found[4]
+
+    def send(self, line: str) -> None:
+        """Send a line."""
+        with suppress(OSError):
+            self._socket.sendto(line.encode(), self._to)
+
+    def close(self) -> None:
+        """No more lines."""
+        self._socket.close()

@@ -1,0 +1,217 @@
+"""From a source to observations: pictures come, the tracker looks, and what it says goes out."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from spirillum.answer import quantity
+from spirillum.errors import InputError
+from spirillum.live.answer import Tracked
+from spirillum.live.handover import at_own_pace, newest
+from spirillum.live.observation import Observation
+from spirillum.live.sending import Datagrams, line_of
+from spirillum.live.sources import Arrived, Source, source_of
+from spirillum.live.tracker import LiveTracker, seconds
+from spirillum.robot.load import load
+from spirillum.vision.setup import load_setup
+
+__all__ = ["observation_line", "track"]
+
+PACES = ("real", "fast")
+_CLOCK_ERROR, _CLOCK_JITTER = 0.02, 0.3
+"""Relative difference of the source's clock from this computer's, and time (s), that are allowed."""
+
+OnObservation = Callable[[Observation, float | None], None]
+"""Called with every observation and its latency, s (None with the pace `fast`)."""
+
+
+def track(
+    source: str | Path,
+    setup: str | Path,
+    *,
+    pace: str = "real",
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
+    learn: str | float = 3.0,
+    window: str | float = 2.0,
+    learn_from: str | Path | None = None,
+    udp: str | None = None,
+    duration: str | float | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    on_observation: OnObservation | None = None,
+) -> Tracked:
+    """Track a robot live: in front of a camera, in a stream, or in a film at its own pace.
+
+    Args:
+        source: a film or folder of images, `camera:0`, or the address of a stream.
+        setup: the setup file.
+        pace: `real`: pictures that come while the tracker is busy are dropped; `fast`: all pictures of a film, as fast
+            as it goes.
+        size: width and height that a camera is asked for, pixels.
+        fps: frames a second that it is asked for.
+        learn: time from which the robot's appearance is learnt, with its unit or a float in s.
+        window: time over which the rates of each frame are taken.
+        learn_from: a film of the same robot before the same camera, instead of the first seconds.
+        udp: `PORT` or `HOST:PORT` to which each observation is sent as JSON in a datagram; without a host, to this
+            computer.
+        duration: time after which it ends; None: with the source, or an interrupt.
+        overrides: dotted fields of the robot, as for `spirillum.load`.
+        on_observation: called with every observation and its latency, s (None with the pace `fast`).
+
+    Returns:
+        How it went, and speed and rates over all of it; if the source stopped on its way, `stopped` says why.
+
+    Raises:
+        InputError: for wrong input, or a source that is not there.
+    """
+    if pace not in PACES:
+        raise InputError(f"pace = {str(pace)[:40]!r}; allowed: {', '.join(PACES)}")
+    length = None if duration is None else seconds("duration", duration, most=1e7)
+    chosen, _ = load_setup(setup)
+    between = chosen.start, chosen.end
+    opened = source_of(str(source), size=size, fps=fps, rate=chosen.camera.frames_per_second, between=between)
+    if pace == "fast" and opened.kind != "film":
+        raise InputError(f"pace = 'fast' with {opened.name}; allowed: 'real', as a {opened.kind} has its own pace")
+    tracker = LiveTracker(
+        setup, _robot(setup, chosen.robot.file, overrides), learn=learn, window=window, learn_from=learn_from,
+        name=opened.name, words=opened.words,
+    )  # fmt: skip
+    log = _Log(opened, pace, tracker, length)
+    out = None if udp is None else Datagrams(udp)
+
+    def tell(said: Observation, latency: float | None) -> None:
+        if out is not None:
+            out.send(line_of(observation_line(said, latency)))
+        if on_observation is not None:
+            on_observation(said, latency)
+
+    try:
+        log.run(tell)
+    finally:
+        if out is not None:
+            out.close()
+    return log.answer()
+
+
+def observation_line(said: Observation, latency: float | None) -> dict[str, Any]:
+    """An observation as JSON, with its latency before its warnings."""
+    answer = said.to_dict()
+    warnings = answer.pop("warnings")
+    more = {} if latency is None else {"latency": quantity(latency, "s")}
+    return {**answer, **more, "warnings": warnings}
+
+
+def _robot(setup: str | Path, file: str, overrides: Mapping[str, Any] | None) -> Any:
+    """The robot with changed fields; None: as it is."""
+    if not overrides:
+        return None
+    beside = Path(setup).parent / file
+    return load(beside if beside.is_file() else file, **overrides)
+
+
+def _paced(source: Source, pace: str) -> Iterator[Arrived]:
+    if pace == "fast":
+        return source.frames()
+    return newest(at_own_pace(source.frames()) if source.kind == "film" else source.frames())
+
+
+@dataclass
+class _Log:
+    """What has been looked at so far."""
+
+    source: Source
+    pace: str
+    tracker: LiveTracker
+    length: float | None
+    frames: int = 0
+    tracked: int = 0
+    dropped: int = 0
+    learnt: float = math.nan
+    begun: float = 0.0
+    stopped: str = ""
+    interrupted: bool = False
+    latencies: list[float] = field(default_factory=list)
+    _next: int = 0
+    _first: tuple[float, float] | None = None
+    _notes: dict[str, str] = field(default_factory=dict)
+
+    def run(self, tell: OnObservation) -> None:
+        """Look at all frames; what stops it on the way is noted, if anything was looked at.
+
+        Raises:
+            InputError: if the source does not begin.
+            KeyboardInterrupt: if it was interrupted before.
+        """
+        try:
+            with closing(_paced(self.source, self.pace)) as frames:
+                for frame in frames:
+                    tell(*self.looked_at(frame))
+                    if self.length is not None and frame.time - self.begun >= self.length:
+                        return
+        except (InputError, KeyboardInterrupt) as error:
+            if not self.frames:
+                raise
+            self.interrupted = isinstance(error, KeyboardInterrupt)
+            self.stopped = "" if self.interrupted else str(error)
+
+    def looked_at(self, frame: Arrived) -> tuple[Observation, float | None]:
+        """What the tracker says of a frame, and after how long, s."""
+        missed = frame.index - self._next
+        self._next = frame.index + 1
+        self.dropped += missed
+        self.tracker.left_out(missed)
+        known = self.tracker.learnt
+        if self._first is None:
+            self._first, self.begun = (frame.time, frame.clock), frame.time
+        said = self.tracker.update(frame.image, frame.time)
+        latency = None if self.pace == "fast" else time.perf_counter() - frame.clock
+        self.frames += 1
+        if known and math.isnan(self.learnt):
+            self.learnt = frame.time
+        if known and latency is not None:
+            self.latencies.append(latency)
+        self.tracked += said.seen
+        self._compare_clocks(frame)
+        return said, latency
+
+    def _compare_clocks(self, frame: Arrived) -> None:
+        """Say it if the source's clock runs otherwise than this computer's, as it does where frames are lost."""
+        assert self._first is not None  # noqa: S101 - the first frame has set it
+        if self.source.kind == "film":
+            return
+        own, ours = frame.time - self._first[0], frame.clock - self._first[1]
+        if abs(own - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
+            self._notes["clock"] = (
+                f"{self.source.name}: {own:.1f} s by the times of the frames were {ours:.1f} s by this computer's: "
+                "frames are lost, or the rate is another than stated; all rates are wrong by that factor"
+            )
+        else:
+            self._notes.pop("clock", None)
+
+    def answer(self) -> Tracked:
+        """The answer."""
+        trial = None
+        notes = list(self._notes.values())
+        try:
+            trial = self.tracker.summary()
+        except InputError as error:
+            self.stopped = f"{self.stopped}; {error}" if self.stopped else str(error)
+        return Tracked(
+            source=self.source.name,
+            pace=self.pace,
+            frames=self.frames,
+            tracked=self.tracked,
+            dropped=self.dropped,
+            learnt=self.learnt,
+            latencies=tuple(self.latencies),
+            trial=trial,
+            notes=tuple(notes),
+            stopped=self.stopped,
+            interrupted=self.interrupted,
+        )

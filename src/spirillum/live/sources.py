@@ -1,0 +1,180 @@
+"""Where pictures come from: a film, a camera, or a stream of the network."""
+
+from __future__ import annotations
+
+import re
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
+from spirillum.vision.video.frames import converter, open_video
+
+__all__ = ["Arrived", "Source", "source_of"]
+
+Kind = Literal["film", "camera", "stream"]
+
+_ALLOWED = "a film, a folder of images, camera:0 (or another number or name), or rtsp://, http://, tcp://, udp://..."
+_DEVICES = {"linux": ("v4l2", "/dev/video{}"), "darwin": ("avfoundation", "{}"), "win32": ("dshow", "video={}")}
+"""Format and name of a camera on each system, as FFmpeg calls them."""
+_PROTOCOLS = {
+    "rtsp": "rtsp,rtp,udp,tcp",
+    "http": "http,tcp",
+    "https": "https,tls,tcp",
+    "tcp": "tcp",
+    "udp": "udp",
+}
+"""What a stream may use: its own protocol, no files and no playlists."""
+_FORMATS = "rtsp,mpegts,mpjpeg,mjpeg,matroska,webm,mov,mp4,h264,hevc,flv"
+_SILENT = 5.0
+"""Time without a picture after which a camera or stream has stopped, s."""
+
+
+class Arrived(NamedTuple):
+    """A picture that has come."""
+
+    index: int
+    """Its number, from 0."""
+    time: float
+    """When it was taken, by the source's own clock, s from the first one."""
+    image: np.ndarray
+    """8-bit RGB, (height, width, 3)."""
+    clock: float
+    """When it came, by this computer's clock, s."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source of pictures that was opened once, to see that it is there."""
+
+    name: str
+    """For sentences."""
+    kind: Kind
+    """`film`, `camera` or `stream`."""
+    options: Mapping[str, Any] = field(repr=False)
+    """How it is opened: see `source_of`."""
+    words: str = ""
+    """What a film says of itself, such as that it is synthetic."""
+
+    def frames(self) -> Iterator[Arrived]:
+        """Its pictures until it ends.
+
+        Raises:
+            InputError: if it cannot be opened, stops in the middle, or changes its format or size.
+        """
+        if self.kind == "film":
+            video = open_video(self.options["path"], self.options["rate"])
+            start, end = self.options["between"]
+            for number, frame in enumerate(video.frames(start, end)):
+                yield Arrived(number, frame.time, frame.image, time.perf_counter())
+            return
+        yield from _pictures(self)
+
+
+def source_of(
+    word: str,
+    *,
+    size: tuple[int, int] | None = None,
+    fps: float | None = None,
+    rate: float | None = None,
+    between: tuple[float, float | None] = (0.0, None),
+) -> Source:
+    """The source that a word names.
+
+    Args:
+        word: a film or folder, `camera:0` or `/dev/video0`, or the address of a stream.
+        size: width and height that a camera is asked for, pixels.
+        fps: frames a second that it is asked for.
+        rate: frames a second of a folder's images, or in place of a film's own times.
+        between: first and last time of a film that count, s.
+
+    Raises:
+        InputError: for another word, or options that the source does not have.
+    """
+    scheme = word.partition("://")[0].lower() if "://" in word else ""
+    device = re.fullmatch(r"camera:(.+)", word) or re.fullmatch(r"/dev/video(\d+)", word)
+    if device is None and (size or fps):
+        raise InputError(f"size or fps is given with {word[:80]}; allowed: only with a camera")
+    if device is not None:
+        kind, place = _DEVICES.get(sys.platform, _DEVICES["linux"])
+        asked = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
+        asked |= {} if fps is None else {"framerate": f"{fps:g}"}
+        options = {"file": place.format(device[1]), "format": kind, "options": asked, "size": size}
+        return Source(word, "camera", options)
+    if scheme:
+        if scheme not in _PROTOCOLS:
+            raise InputError(f"source = {word[:80]!r}; allowed: {_ALLOWED}")
+        quick = {"flags": "low_delay", "analyzeduration": "1000000"}  # in microseconds
+        asked = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
+        return Source(_without_secrets(word), "stream", {"file": word, "format": None, "options": asked, "size": None})
+    video = open_video(word, rate)  # says what is wrong with a film
+    return Source(video.name, "film", {"path": word, "rate": rate, "between": between}, video.words)
+
+
+def _without_secrets(word: str) -> str:
+    """An address without name and password."""
+    return re.sub(r"//[^/@]*@", "//", word)[:120]
+
+
+def _pictures(source: Source) -> Iterator[Arrived]:
+    """Pictures of a camera or stream, with the least delay."""
+    av = required("av", "tracking a camera", "video")
+    count, last, origin, size = 0, -1.0, None, source.options["size"]
+    rgb, begun = converter(), 0.0
+    try:
+        with av.open(
+            source.options["file"],
+            format=source.options["format"],
+            options=dict(source.options["options"]),
+            timeout=(2.0 * _SILENT, _SILENT),
+        ) as container:
+            if not container.streams.video:
+                raise InputError(f"{source.name} has no pictures; allowed: {_ALLOWED}")
+            for packet in container.demux(container.streams.video[0]):
+                came = time.perf_counter()
+                for frame in packet.decode():
+                    size = _checked_size(source.name, (frame.width, frame.height), size)
+                    begun = begun or came
+                    stamp = came - begun if frame.time is None else float(frame.time)
+                    origin = stamp if origin is None else origin
+                    if stamp - origin > last:
+                        last = stamp - origin
+                        yield Arrived(count, last, rgb(frame), came)
+                    count += 1
+    except (av.error.FFmpegError, ValueError, OSError) as error:
+        reason = str(getattr(error, "strerror", None) or error)[:120]
+        reason = f"no picture for {_SILENT:g} s" if isinstance(error, av.error.ExitError) else reason
+        if not count:
+            raise InputError(f"{source.name} cannot be opened ({reason}); allowed: {_ALLOWED}") from error
+        raise InputError(f"{source.name} stopped after {count} frames ({reason}): what was tracked is kept") from error
+    if not count:
+        raise InputError(f"{source.name} gave no picture; allowed: {_ALLOWED}")
+    if source.kind == "camera":
+        raise InputError(f"{source.name} stopped after {count} frames: what was tracked is kept")
+
+
+def _checked_size(name: str, size: tuple[int, int], asked: tuple[int, int] | None) -> tuple[int, int]:
+    """The size of the pictures.
+
+    Raises:
+        InputError: if it is absurd, or another one than was asked for, or than before.
+    """
+    if size == asked:
+        return size
+    if asked is not None:
+        raise InputError(
+            f"{name} gives pictures of {size[0]} x {size[1]} pixels in place of {asked[0]} x {asked[1]}: what was "
+            "tracked is kept"
+        )
+    if min(size) < SMALLEST_SIDE or size[0] * size[1] > MOST_PIXELS:
+        raise InputError(
+            f"{name} has pictures of {size[0]} x {size[1]} pixels; allowed: sides of at least {SMALLEST_SIDE} and at "
+            f"most {MOST_PIXELS // 1_000_000} million pixels"
+        )
+    return size

@@ -1,0 +1,165 @@
+"""Where pictures come from, what goes out, and what is said when something stops."""
+
+import io
+import json
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from spirillum.cli import main
+from spirillum.errors import InputError
+from spirillum.live import session, sources
+from spirillum.live.handover import at_own_pace, newest
+from spirillum.live.sending import Datagrams
+from spirillum.live.session import track
+from spirillum.live.sources import Arrived, source_of
+
+av = pytest.importorskip("av")
+pytest.importorskip("cv2")
+RATES = {"forward_velocity": 4e-3, "body_rotation_rate": -0.9, "tail_rotation_rate": 5.0}
+
+
+def setup_of(film):
+    return film.with_name("swimmer.setup.toml")
+
+
+def test_a_film_gives_a_line_for_every_frame_and_one_for_all(filmed, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["track", str(filmed), "--setup", str(setup_of(filmed)), "--pace", "fast", "--learn", "2s"])
+    assert left.value.code == 0
+    *lines, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [line["frame"] for line in lines] == list(range(72))
+    assert lines[0]["state"] == "learning"
+    assert lines[-1]["state"] == "tracking"
+    assert lines[-1]["position"]["unit"] == "m"
+    assert "latency" not in lines[-1]
+    assert last["schema"] == "spirillum.track/1"
+    assert last["frames"] == 72
+    assert last["frames_dropped"] == 0
+    for name, true in RATES.items():
+        assert last[name]["low"] < true < last[name]["high"]
+
+
+def test_lines_go_out_as_datagrams_to_this_computer(filmed):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(20.0)
+        track(filmed, setup_of(filmed), pace="fast", udp=str(receiver.getsockname()[1]), duration=0.2)
+        assert json.loads(receiver.recv(65536))["frame"] == 0
+        assert json.loads(receiver.recv(65536))["frame"] == 1
+    for word in ("0", "70000", "x", ":9", "host:", ""):
+        with pytest.raises(InputError, match="allowed: PORT or HOST:PORT"):
+            Datagrams(word)
+
+
+def stream_of(pictures, fps):
+    """Pictures as an MPEG transport stream, one packet each."""
+    file = io.BytesIO()
+    with av.open(file, "w", format="mpegts") as container:
+        stream = container.add_stream("libx264", rate=round(fps), options={"crf": "14", "tune": "zerolatency"})
+        stream.height, stream.width, stream.pix_fmt = *pictures[0][1].shape[:2], "yuv420p"
+        for _, picture in pictures:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        container.mux(stream.encode())
+    return file.getvalue()
+
+
+def served(listening, data, seconds):
+    """Send bytes to the first who asks, spread over a time."""
+    there, _ = listening.accept()
+    with there:
+        parts = np.array_split(np.frombuffer(data, np.uint8), 40)
+        for part in parts:
+            there.sendall(part.tobytes())
+            time.sleep(seconds / len(parts))
+
+
+def test_a_stream_of_the_network_is_tracked_by_its_own_times(filmed, pictures):
+    data = stream_of(pictures, 12.0)
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        server = threading.Thread(target=served, args=(listening, data, 2.0), daemon=True)
+        server.start()
+        found = track(f"tcp://127.0.0.1:{listening.getsockname()[1]}", setup_of(filmed), learn_from=filmed)
+        server.join(10.0)
+    assert found.tracked + found.dropped > 60
+    assert found.trial.quantities["forward_velocity"].value == pytest.approx(4e-3, rel=0.03)
+    assert any("this computer's" in note for note in found.notes)  # three times too fast
+
+
+@pytest.fixture
+def camera(monkeypatch, filmed):
+    """`camera:swimmer` is the film, as a camera's driver would give it."""
+    monkeypatch.setattr(sources, "_DEVICES", {"linux": ("lavfi", "movie={}")})
+    monkeypatch.setattr(sources.sys, "platform", "linux")
+    monkeypatch.chdir(filmed.parent)
+    return "camera:swimmer.mp4"
+
+
+def test_a_camera_that_stops_keeps_what_was_tracked(camera, filmed, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["track", camera, "--setup", str(setup_of(filmed)), "--learn-from", str(filmed)])
+    out, err = capsys.readouterr()
+    assert left.value.code == 2
+    assert err == "spirillum: camera:swimmer.mp4 stopped after 72 frames: what was tracked is kept\n"
+    last = json.loads(out.splitlines()[-1])
+    assert last["frames_tracked"] > 0
+    assert last["frames"] + last["frames_dropped"] == 72
+
+
+def test_another_size_than_asked_for_is_said(monkeypatch, filmed):
+    monkeypatch.setattr(sources, "_DEVICES", {"linux": ("lavfi", "testsrc=size=96x64:rate=30:{}")})
+    monkeypatch.setattr(sources.sys, "platform", "linux")
+    source = source_of("camera:duration=1")
+    assert next(source.frames()).image.shape == (64, 96, 3)
+    asked = sources.Source(source.name, "camera", {**source.options, "size": (64, 64)})
+    with pytest.raises(InputError, match="pictures of 96 x 64 pixels in place of 64 x 64"):
+        next(asked.frames())
+
+
+def test_sources_that_are_not_there_get_a_sentence(filmed):
+    setup = setup_of(filmed)
+    for word, said in (
+        ("camera:97", "camera:97 cannot be opened"),
+        ("tcp://127.0.0.1:1", "cannot be opened"),
+        ("ftp://somewhere/a.mp4", "allowed: a film, a folder of images, camera:0"),
+        ("nowhere.mp4", "nowhere.mp4 does not exist"),
+    ):
+        with pytest.raises(InputError, match=said):
+            track(word, setup)
+    with pytest.raises(InputError, match="pace = 'slow'; allowed: real, fast"):
+        track(filmed, setup, pace="slow")
+    with pytest.raises(InputError, match="allowed: only with a camera"):
+        track(filmed, setup, fps=30.0)
+    with pytest.raises(InputError, match="'fast' with tcp"):
+        track("tcp://127.0.0.1:1", setup, pace="fast")
+    assert "secret" not in source_of("rtsp://me:secret@host/x").name
+
+
+def arrivals(count, step):
+    for k in range(count):
+        yield Arrived(k, step * k, np.zeros(0), time.perf_counter())
+
+
+def test_the_newest_pictures_are_taken_and_the_last_ones_never_lost():
+    taken = []
+    for frame in newest(at_own_pace(arrivals(40, 0.005))):
+        taken.append(frame.index)
+        time.sleep(0.02)
+    assert taken == sorted(taken)
+    assert taken[-1] == 39
+    assert len(taken) < 30  # four times too slow
+    assert [frame.index for frame in newest(at_own_pace(arrivals(3, 0.0)))][-1] == 2
+
+
+def test_what_a_source_raises_comes_after_its_pictures():
+    def stops():
+        yield from arrivals(2, 0.0)
+        raise InputError("unplugged")
+
+    seen = []
+    with pytest.raises(InputError, match="unplugged"):
+        seen.extend(frame.index for frame in newest(stops()))
+    assert session.PACES == ("real", "fast")
