@@ -146,12 +146,12 @@ def arrivals(count, step):
 def test_the_newest_pictures_are_taken_and_the_last_ones_never_lost():
     taken = []
     for frame in newest(at_own_pace(arrivals(40, 0.005))):
-        taken.append(frame.index)
+        taken.append(frame.number)
         time.sleep(0.02)
     assert taken == sorted(taken)
     assert taken[-1] == 39
     assert len(taken) < 30  # four times too slow
-    assert [frame.index for frame in newest(at_own_pace(arrivals(3, 0.0)))][-1] == 2
+    assert [frame.number for frame in newest(at_own_pace(arrivals(3, 0.0)))][-1] == 2
 
 
 def test_what_a_source_raises_comes_after_its_pictures():
@@ -161,5 +161,5 @@ def test_what_a_source_raises_comes_after_its_pictures():
 
     seen = []
     with pytest.raises(InputError, match="unplugged"):
-        seen.extend(frame.index for frame in newest(stops()))
+        seen.extend(frame.number for frame in newest(stops()))
     assert session.PACES == ("real", "fast")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from threading import Condition, Thread
 
 from spirillum.live.sources import Arrived
@@ -15,7 +15,7 @@ _WAITING = 2
 """Pictures that may wait: more would only make them old."""
 
 
-def at_own_pace(frames: Iterator[Arrived]) -> Iterator[Arrived]:
+def at_own_pace(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
     """A film's pictures, each when it is due."""
     begun = None
     for frame in frames:
@@ -26,7 +26,7 @@ def at_own_pace(frames: Iterator[Arrived]) -> Iterator[Arrived]:
         yield frame._replace(clock=due)
 
 
-def newest(frames: Iterator[Arrived]) -> Iterator[Arrived]:
+def newest(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
     """Pictures as they come, taken by a thread of their own; the oldest are dropped where they come too fast.
 
     Args:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -115,7 +115,7 @@ def _robot(setup: str | Path, file: str, overrides: Mapping[str, Any] | None) ->
     return load(beside if beside.is_file() else file, **overrides)
 
 
-def _paced(source: Source, pace: str) -> Iterator[Arrived]:
+def _paced(source: Source, pace: str) -> Generator[Arrived, None, None]:
     if pace == "fast":
         return source.frames()
     return newest(at_own_pace(source.frames()) if source.kind == "film" else source.frames())
@@ -162,8 +162,8 @@ class _Log:
 
     def looked_at(self, frame: Arrived) -> tuple[Observation, float | None]:
         """What the tracker says of a frame, and after how long, s."""
-        missed = frame.index - self._next
-        self._next = frame.index + 1
+        missed = frame.number - self._next
+        self._next = frame.number + 1
         self.dropped += missed
         self.tracker.left_out(missed)
         known = self.tracker.learnt

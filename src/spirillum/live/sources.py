@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -39,7 +39,7 @@ _SILENT = 5.0
 class Arrived(NamedTuple):
     """A picture that has come."""
 
-    index: int
+    number: int
     """Its number, from 0."""
     time: float
     """When it was taken, by the source's own clock, s from the first one."""
@@ -62,7 +62,7 @@ class Source:
     words: str = ""
     """What a film says of itself, such as that it is synthetic."""
 
-    def frames(self) -> Iterator[Arrived]:
+    def frames(self) -> Generator[Arrived, None, None]:
         """Its pictures until it ends.
 
         Raises:
@@ -122,7 +122,7 @@ def _without_secrets(word: str) -> str:
     return re.sub(r"//[^/@]*@", "//", word)[:120]
 
 
-def _pictures(source: Source) -> Iterator[Arrived]:
+def _pictures(source: Source) -> Generator[Arrived, None, None]:
     """Pictures of a camera or stream, with the least delay."""
     av = required("av", "tracking a camera", "video")
     count, last, origin, size = 0, -1.0, None, source.options["size"]
