@@ -58,6 +58,8 @@ if TYPE_CHECKING:
     from spirillum.swimming.preparation import prepare as prepare
     from spirillum.swimming.preparation import prepare_all as prepare_all
     from spirillum.swimming.steady import swim as swim
+    from spirillum.view.figures.plot import Plot as Plot
+    from spirillum.view.figures.plot import plot as plot
     from spirillum.view.scene3d.film import Film as Film
     from spirillum.view.scene3d.film import film as film
     from spirillum.view.scene3d.show import Picture3D as Picture3D
@@ -83,6 +85,7 @@ _HOME = {
     "Observation": "spirillum.live.observation",
     "Picture3D": "spirillum.view.scene3d.show",
     "Plant": "spirillum.dynamics.plant",
+    "Plot": "spirillum.view.figures.plot",
     "Prediction": "spirillum.swimming.prediction",
     "Prepared": "spirillum.swimming.preparation",
     "Ranking": "spirillum.calibration.ranking",
@@ -109,6 +112,7 @@ _HOME = {
     "magnetic_sweep": "spirillum.dynamics.magnetic_sweep",
     "measure": "spirillum.results.measurement",
     "page": "spirillum.pages.launch",
+    "plot": "spirillum.view.figures.plot",
     "predict": "spirillum.dynamics.prediction",
     "prepare": "spirillum.swimming.preparation",
     "prepare_all": "spirillum.swimming.preparation",
@@ -146,4 +150,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted((*_HOME, "__version__"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -33,7 +33,11 @@ def rows_of(items: Mapping[str, Any], only: Iterable[str] | None = None) -> list
         items: an answer, or a part of one; what is no quantity is passed over.
         only: names of the quantities to show; None: all.
     """
-    known = {name: item for name, item in items.items() if _is_quantity(item) and item["value"] is not None}
+    known = {
+        name: item
+        for name, item in items.items()
+        if name != "error_estimate" and _is_quantity(item) and item["value"] is not None
+    }
     return [_row(name, known[name], known) for name in (known if only is None else only) if name in known]
 
 
@@ -76,34 +80,54 @@ class Shown:
 
 
 def text_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
-    """An answer as text: a title, a line for each quantity, what is to be said of it, its warnings."""
+    """An answer as text: a title, a line for each quantity, what is to be said of it, its warnings.
+
+    Args:
+        answer: an envelope, see `spirillum.answer.envelope`.
+        only: names of the quantities to show; None: all, and those of its parts.
+    """
     rows = rows_of(answer, only)
-    width = max((len(row.name) for row in rows), default=0)
-    lines = [_title(answer)]
-    for row in rows:
-        ends = f"  ({row.low} to {row.high})" if row.low and row.low != row.high else ""
-        lines.append(f"  {row.name:<{width}}  {row.value} {row.unit}{ends}".rstrip())
+    lines = [_title(answer), *_lines(rows, "  ")]
     if len(rows) < (whole := len(rows_of(answer))):
         lines.append(f"  and {whole - len(rows)} more: dir(answer), answer.to_dict()")
     lines += [f"  {name}: {text}" for name, text in _words(answer)]
+    for title, part in _parts(answer) if only is None else ():
+        lines += [f"  {title}", *_lines(part, "    ")]
+    lines += [f"{name}: {text}" for name, text in _errors(answer)]
     lines += [f"warning: {warning}" for warning in answer.get("warnings", ())]
     return "\n".join(lines)
 
 
+def _lines(rows: Sequence[Row], indent: str) -> list[str]:
+    width = max((len(row.name) for row in rows), default=0)
+    return [f"{indent}{row.name:<{width}}  {_with_ends(row)}" for row in rows]
+
+
+def _with_ends(row: Row) -> str:
+    ends = f" ({row.low} to {row.high})" if row.low and row.low != row.high else ""
+    return f"{row.value} {row.unit}".rstrip() + ends
+
+
 def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
-    """An answer as a table in HTML; everything in it is escaped."""
-    rows = rows_of(answer, only)
-    banded = any(row.low for row in rows)
+    """An answer as a table in HTML; everything in it is escaped. Arguments as `text_of`."""
+    parts = [("", rows_of(answer, only)), *(_parts(answer) if only is None else ())]
+    banded = any(row.low for _, rows in parts for row in rows)
     header = ("quantity", "value", *(("low", "high") if banded else ()), "unit")
-    cells = [(row.name, row.value, *((row.low, row.high) if banded else ()), row.unit) for row in rows]
-    body = "".join(
-        f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in line)}</tr>"
-        for line in [*cells, *((name, text, *([""] * (len(header) - 2))) for name, text in _words(answer))]
-    )
+    lines = []
+    for title, rows in parts:
+        lines += [f'<tr><th colspan="{len(header)}">{escape(title)}</th></tr>'] if title else []
+        lines += [_cells((row.name, row.value, *((row.low, row.high) if banded else ()), row.unit)) for row in rows]
     head = "".join(f"<th>{name}</th>" for name in header)
+    said = "".join(
+        f"<p><b>{escape(name)}:</b> {escape(text)}</p>" for name, text in (*_words(answer), *_errors(answer))
+    )
     warnings = "".join(f"<p><b>warning:</b> {escape(warning)}</p>" for warning in answer.get("warnings", ()))
-    title = escape(_title(answer))
-    return f"<table><caption>{title}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{warnings}"
+    table = f"<thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody>"
+    return f"<table><caption>{escape(_title(answer))}</caption>{table}</table>{said}{warnings}"
+
+
+def _cells(texts: Iterable[str]) -> str:
+    return f"<tr>{''.join(f'<td>{escape(text)}</td>' for text in texts)}</tr>"
 
 
 def _title(answer: Mapping[str, Any]) -> str:
@@ -116,7 +140,7 @@ def _title(answer: Mapping[str, Any]) -> str:
     return f"{answer['robot']}: {words}" if isinstance(answer.get("robot"), str) else words
 
 
-_LONGEST = 100
+_LONGEST, _MOST, _OF_A_LIST = 100, 10, 5
 _TOLD = ("schema", "robot", "model", "friction", "model_reason", "motion", "form")
 
 
@@ -130,3 +154,31 @@ def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
         and not isinstance(item, bool)
         and len(str(item)) < _LONGEST
     ]
+
+
+def _parts(answer: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
+    """Parts of an answer with quantities of their own: tables, and the first items of lists."""
+    found = []
+    for name, item in answer.items():
+        title = name.replace("_", " ")
+        if isinstance(item, Mapping) and not _is_quantity(item):
+            found.append((title, rows_of(item)))
+        elif isinstance(item, list):
+            tables = [table for table in item[:_MOST] if isinstance(table, Mapping)]
+            found += [(f"{title}: {_name(table, n)}", rows_of(table)[:_OF_A_LIST]) for n, table in enumerate(tables)]
+    return [(title, rows) for title, rows in found if rows]
+
+
+def _name(table: Mapping[str, Any], number: int) -> str:
+    return next((str(item) for item in table.values() if isinstance(item, str)), str(number + 1))
+
+
+def _errors(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """A model's own estimate of its error, and its known error in words."""
+    error = answer.get("error_estimate")
+    if not (isinstance(error, Mapping) and "statement" in error):
+        return []
+    own = (
+        [] if error["value"] is None else [("error estimate", f"{100 * error['value']:.2g} % of the forward velocity")]
+    )
+    return [*own, ("known error", str(error["statement"]))]

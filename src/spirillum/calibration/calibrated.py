@@ -16,6 +16,7 @@ from spirillum.calibration.least_squares import LeastSquares
 from spirillum.calibration.paper_method import PaperFit
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
+from spirillum.shown import Shown
 
 __all__ = ["MEANINGS", "Calibrated"]
 
@@ -28,7 +29,7 @@ MEANINGS: dict[Quantity, tuple[str, str]] = {
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class Calibrated(Shown):
     """What a calibration found."""
 
     problem: Problem

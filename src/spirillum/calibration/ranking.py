@@ -28,6 +28,7 @@ from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
 from spirillum.robot.load import PAPER_ROBOTS
+from spirillum.shown import Shown
 
 __all__ = ["Ranked", "Ranking", "rank_models", "ranked_fits"]
 
@@ -75,7 +76,7 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Ranking:
+class Ranking(Shown):
     """Models from the best to the worst."""
 
     ranked: tuple[Ranked, ...]

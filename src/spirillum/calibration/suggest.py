@@ -36,6 +36,7 @@ from spirillum.robot.limits import broken
 from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
 from spirillum.swimming.steady import requirements
@@ -65,7 +66,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Suggestion:
+class Suggestion(Shown):
     """Candidates from the most to the least telling."""
 
     posterior: PosteriorFile

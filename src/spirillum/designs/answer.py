@@ -13,6 +13,7 @@ from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.designs.evaluation import Evaluation, Objective
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.answer import LEVEL, STEADY
 
 __all__ = ["Alternative", "Design", "Profile", "Uncertainty"]
@@ -75,7 +76,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class Design:
+class Design(Shown):
     """The best values of some fields of a robot, SI."""
 
     robot: Robot

@@ -25,6 +25,7 @@ from spirillum.kernels import contacts, rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.lying import Lying
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.units import KINDS, parse_option
@@ -40,7 +41,7 @@ _SAMPLES = 400
 
 
 @dataclass(frozen=True)
-class Settling:
+class Settling(Shown):
     """How a robot settles, SI; azimuths about +x from the lowest place."""
 
     prediction: Prediction

@@ -22,6 +22,7 @@ from spirillum.robot.load import load
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
 
@@ -41,7 +42,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Shown):
     """What was written, and the numbers of its geometry."""
 
     robot: Robot

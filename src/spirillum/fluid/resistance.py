@@ -21,6 +21,7 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["Resistance", "resistance"]
@@ -32,7 +33,7 @@ _LINKS = ("body", "rotor")
 
 
 @dataclass(frozen=True)
-class Resistance:
+class Resistance(Shown):
     """F = -B V for one part or both links: force and torque against velocity and rotation, never calibrated."""
 
     robot: Robot
@@ -56,6 +57,13 @@ class Resistance:
     def references(self) -> tuple[str, ...]:
         """Keys of the references that it rests on."""
         return self.model.references
+
+    def __str__(self) -> str:
+        """The matrix in SI below what it is of, for `print`."""
+        rows = np.array2string(
+            self.matrix, formatter={"float_kind": lambda value: f"{value:11.4g}"}, max_line_width=200
+        )
+        return f"{super().__str__()}\nmatrix, SI (forces N, torques N m, over m/s and rad/s):\n{rows}"
 
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum resistance --json`."""

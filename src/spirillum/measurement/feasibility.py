@@ -13,6 +13,7 @@ from spirillum.errors import InputError
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.units import KINDS, Hz, parse_option
 from spirillum.vision.setup import Setup, load_setup, stripes_of
 from spirillum.vision.track.colours import pattern_period
@@ -77,7 +78,7 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Feasibility:
+class Feasibility(Shown):
     """The feasibility of an experiment."""
 
     robot: Robot

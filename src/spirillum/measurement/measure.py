@@ -26,6 +26,7 @@ from spirillum.measurement.trials import RATE_NAMES, Trial, trial_of
 from spirillum.measurement.untracked import Untracked, untracked
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup, load_setup
 from spirillum.vision.track.follow import Watcher, follow
@@ -40,7 +41,7 @@ TABLE = "observations.csv"
 
 
 @dataclass(frozen=True)
-class Measurement:
+class Measurement(Shown):
     """What was measured of a robot in one or several trials."""
 
     trials: tuple[Trial, ...]

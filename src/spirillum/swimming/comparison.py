@@ -18,7 +18,8 @@ from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.answer import STEADY
+from spirillum.shown import Shown
+from spirillum.swimming.answer import STEADY, headline
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import friction_reading
 
@@ -28,7 +29,7 @@ _UNITS: dict[str, str] = {item.name: item.unit for item in STEADY}
 
 
 @dataclass(frozen=True)
-class ModelComparison:
+class ModelComparison(Shown):
     """Steady swimming of one robot as each model predicts it, SI, rates signed about +x."""
 
     robot: Robot
@@ -94,6 +95,13 @@ class ModelComparison:
             "models": [entries[name] for name in self.models],
         }
         return envelope("model-comparison", content, self.warnings)
+
+    def _shown(self) -> tuple[dict[str, Any], None]:
+        """See `Shown`: the quantities that matter most, model by model."""
+        answer = self.to_dict()
+        models = [item for item in answer["models"] if item["answered"]]
+        short = [{"model": item["model"], **{name: item[name] for name in headline(item)}} for item in models]
+        return {**answer, "models": short}, None
 
     def _answered(self, name: str, answer: Prediction) -> dict[str, Any]:
         """One model's prediction, without what stands once for all models."""

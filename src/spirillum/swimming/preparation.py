@@ -21,6 +21,7 @@ from spirillum.kernels.tube_table import range_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.prediction import prepared
 
 __all__ = ["Prepared", "preparations_answer", "prepare", "prepare_all"]
@@ -33,7 +34,7 @@ _NOT_KEPT = (
 
 
 @dataclass(frozen=True)
-class Prepared:
+class Prepared(Shown):
     """A robot and the table of its tube; SI."""
 
     robot: Robot

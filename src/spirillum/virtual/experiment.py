@@ -33,6 +33,7 @@ from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.units import Hz
 from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation
@@ -81,7 +82,7 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class VirtualExperiment:
+class VirtualExperiment(Shown):
     """A virtual experiment that was written."""
 
     folder: Path

@@ -16,6 +16,7 @@ from spirillum.errors import InputError
 from spirillum.files import protected, whole_files, write_dataset
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.version import versions
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
@@ -41,7 +42,7 @@ _LEAST_DEPTH = 1e-6
 
 
 @dataclass(frozen=True)
-class VirtualTrial:
+class VirtualTrial(Shown):
     """A virtual trial that was written."""
 
     path: Path

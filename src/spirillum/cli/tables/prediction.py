@@ -28,16 +28,15 @@ def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
-    quantities = {name: item for name, item in answer.items() if name != "error_estimate"}
     only = None if all_of_it else headline(answer)
     if "band" in answer or "kind" in answer["forward_velocity"]:
         rows = grid(title, "quantity", "value", "low", "high", "unit")
-        add_bands(rows, quantities, only)
+        add_bands(rows, answer, only)
     else:
         rows = grid(title, "quantity", "value", "unit", "SI")
-        add_quantities(rows, quantities, only)
+        add_quantities(rows, answer, only)
     console.print(rows)
-    more = len(rows_of(quantities)) - rows.row_count
+    more = len(rows_of(answer)) - rows.row_count
     if more:
         console.print(f"and {more} more quantities: --all", highlight=False)
     show_placement(answer["placement"], console)

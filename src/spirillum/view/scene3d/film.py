@@ -17,6 +17,7 @@ from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
 from spirillum.view.scene3d.encode import FILMS, film_writer
 from spirillum.view.scene3d.inset import CrossSection
@@ -40,7 +41,7 @@ _LARGEST_TURN = 0.25
 
 
 @dataclass(frozen=True)
-class Film:
+class Film(Shown):
     """A film that was written."""
 
     path: Path

@@ -17,6 +17,7 @@ from spirillum.errors import InputError
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.units import KINDS, parse_option
 from spirillum.view.scene3d.camera import Camera, Margins, View, checked_view, fitted
 
@@ -34,7 +35,7 @@ _MOST_FINER = 5_000_000
 
 
 @dataclass(frozen=True)
-class Picture3D:
+class Picture3D(Shown):
     """A picture of a robot."""
 
     robot: Robot

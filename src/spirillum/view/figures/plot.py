@@ -1,0 +1,138 @@
+"""`spirillum.plot`: the figure of any answer, by its kind.
+
+Answers are data and know no figures; this module knows both.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from spirillum.calibration.calibrated import Calibrated
+from spirillum.designs.answer import Design
+from spirillum.dynamics.settling import Settling
+from spirillum.errors import InputError
+from spirillum.fields.flow import Flow
+from spirillum.files import PICTURES, output_target
+from spirillum.measurement.measure import Measurement
+from spirillum.robot.robot import Robot
+from spirillum.studies.ranking import ranking_of
+from spirillum.swimming.comparison import ModelComparison
+from spirillum.swimming.prediction import Prediction
+from spirillum.view.figures.style import DPI, save_as, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Plot", "plot"]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure that notebooks show by themselves."""
+
+    figure: Figure = field(repr=False)
+    """The figure of matplotlib."""
+
+    def save(self, path: str | Path) -> Path:
+        """Write the figure as PNG, PDF or SVG, and give its path.
+
+        Raises:
+            InputError: for another ending, or a folder that cannot be written to.
+        """
+        target = output_target(Path(path), PICTURES, "figure.png")
+        save_as(self.figure, target)
+        return target
+
+    def _repr_png_(self) -> bytes:
+        """The figure for notebooks."""
+        picture = io.BytesIO()
+        with styled():
+            self.figure.savefig(picture, format="png", dpi=DPI // 2)
+        return picture.getvalue()
+
+
+def plot(answer: Any) -> Plot:
+    """Draw an answer: the figure that its command draws, or the one that says most.
+
+    Args:
+        answer: a robot (`sp.load`), a prediction (its robot in its place, to scale), or what `compare_models`, `study`,
+            `simulate`, `magnetic_sweep`, `settle`, `design`, `flow`, `measure` or `calibrate` returns.
+
+    Raises:
+        InputError: for anything else.
+    """
+    import xarray as xr
+
+    with styled():
+        return Plot(_of_dataset(answer) if isinstance(answer, xr.Dataset) else _of_answer(answer))
+
+
+_ALLOWED = (
+    "a robot, or what predict, compare_models, study, simulate, magnetic_sweep, settle, design, flow, measure or "
+    "calibrate returns"
+)
+
+
+def _of_answer(answer: Any) -> Figure:
+    if isinstance(answer, (Robot, Prediction)):
+        from spirillum.view.figures.robot import robot_figure
+
+        return robot_figure(answer if isinstance(answer, Robot) else answer.robot)
+    if isinstance(answer, ModelComparison):
+        from spirillum.view.figures.comparison import comparison_figure
+
+        return comparison_figure(answer)
+    if isinstance(answer, Settling):
+        from spirillum.view.figures.settling import settling_figure
+
+        return settling_figure(answer)
+    if isinstance(answer, Design):
+        from spirillum.view.figures.design import design_figure
+
+        return design_figure(answer)
+    if isinstance(answer, Flow):
+        from spirillum.view.figures.flow import flow_figure
+
+        return flow_figure(answer, answer.plane("xz"))
+    return _of_data(answer)
+
+
+def _of_data(answer: Any) -> Figure:
+    """The first figure of what was measured or fitted."""
+    if isinstance(answer, Measurement):
+        from spirillum.view.figures.measurement import measurement_figures
+
+        pictures = measurement_figures(answer)
+        if pictures:
+            return next(iter(pictures.values())).figure()
+        raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")
+    if isinstance(answer, Calibrated):
+        from spirillum.view.figures.calibration import calibration_figures
+
+        return next(iter(calibration_figures(answer).values()))
+    raise InputError(f"answer = {type(answer).__name__} has no figure; allowed: {_ALLOWED}")
+
+
+def _of_dataset(dataset: xr.Dataset) -> Figure:
+    """A run over time, a sweep over the field's rate, or the ranking of a study."""
+    if "time" in dataset.dims and "position" in dataset:
+        from spirillum.view.figures.trajectory import trajectory_figure
+
+        return trajectory_figure(dataset)
+    if "field_rate" in dataset.dims:
+        from spirillum.view.figures.magnetic import magnetic_figure
+
+        return magnetic_figure(dataset)
+    if {"model", "friction"} <= set(dataset.dims) and "forward_velocity" in dataset:
+        from spirillum.view.figures.ranking import ranking_picture
+
+        ranking = ranking_of(dataset)
+        if ranking.robots:
+            return ranking_picture(ranking).figure()
+        raise InputError("answer = a study without answers; allowed: one with some (its variable `outside` says why)")
+    raise InputError(f"answer = a dataset that has no figure; allowed: {_ALLOWED}")

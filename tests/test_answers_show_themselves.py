@@ -1,0 +1,68 @@
+"""Answers in Python: text and HTML with units, tab completion, figures."""
+
+import pytest
+
+import spirillum as sp
+from spirillum.shown import html_of, text_of
+
+ANSWER = {
+    "schema": "spirillum.some-kind/1",
+    "robot": "<b>mine</b>",
+    "forward_velocity": {"value": 2e-5, "unit": "m/s", "low": 1e-5, "high": 3e-5},
+    "friction_power": {"value": 0.0, "unit": "W"},
+    "shaft_power": {"value": 5e-16, "unit": "W"},
+    "absent": {"value": None, "unit": "m"},
+    "matrix": {"value": [[1.0]], "unit": [["N"]]},
+    "trials": [{"name": "first", "advance": {"value": 1e-3, "unit": "m"}}],
+    "warnings": ["1 < 2"],
+}
+
+
+def test_text_has_units_ends_parts_and_warnings() -> None:
+    lines = text_of(ANSWER).splitlines()
+    assert lines[0] == "<b>mine</b>: some kind"
+    assert lines[1].split() == ["forward", "velocity", "20", "um/s", "(10", "to", "30)"]
+    assert lines[2].split()[-2:] == ["0", "fW"]
+    assert "  trials: first" in lines
+    assert lines[-1] == "warning: 1 < 2"
+    assert not any("absent" in line or "matrix" in line for line in lines)
+
+
+def test_html_is_escaped() -> None:
+    page = html_of(ANSWER)
+    assert "&lt;b&gt;mine&lt;/b&gt;" in page
+    assert "<b>mine" not in page
+    assert "1 &lt; 2" in page
+    assert page.count("<td>um/s</td>") == 1
+
+
+def test_prediction_shows_five_quantities_and_completes_all() -> None:
+    answer = sp.predict("biorob2012-wide", model="sbt")
+    lines = str(answer).splitlines()
+    assert [line.split()[0] for line in lines[1:6]] == ["forward", "tail", "body", "motor", "hydrodynamic"]
+    assert f"{1e3 * answer.forward_velocity:.4g} mm/s" in lines[1]
+    assert {"battery_run_time", "cost_of_transport", "to_dict"} <= set(dir(answer))
+    assert "<table>" in answer._repr_html_()
+
+
+def test_comparison_and_resistance_print_their_numbers() -> None:
+    found = sp.compare_models("biorob2012-wide", models=["sbt", "rft"])
+    assert str(found).count("mm/s") == 2
+    matrix = sp.resistance("biorob2012-wide", part="body")
+    assert f"{matrix.matrix[0, 0]:.4g}" in str(matrix)
+
+
+def test_public_names_and_nothing_else() -> None:
+    assert dir(sp) == sorted([*sp.__all__, "__version__"])
+    assert all(getattr(sp, name) is not None for name in ("predict", "plot", "study"))
+
+
+def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
+    drawn = sp.plot(sp.compare_models("biorob2012-wide", models=["sbt", "rft"]))
+    assert drawn._repr_png_().startswith(b"\x89PNG")
+    assert drawn.save(tmp_path / "models.pdf").read_bytes().startswith(b"%PDF")
+    study = {"models": ["sbt"], "friction": ["rotor"], "robots": ["biorob2012-wide", "biorob2012-narrow"]}
+    assert len(sp.plot(sp.study(study)).figure.axes) == 3
+    assert sp.plot(sp.load("biorob2012-wide")).figure.axes
+    with pytest.raises(sp.InputError, match="answer = int has no figure"):
+        sp.plot(3)
