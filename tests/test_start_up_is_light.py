@@ -27,6 +27,7 @@ HEAVY = (
     "uvicorn",
     "websockets",
     "control",
+    "gymnasium",
 )
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from spirillum.designs.answer import Design as Design
     from spirillum.designs.design import design as design
     from spirillum.dynamics.flow_of_run import flow_of_run as flow_of_run
+    from spirillum.dynamics.held_plants import HeldPlants as HeldPlants
     from spirillum.dynamics.magnetic_sweep import magnetic_sweep as magnetic_sweep
     from spirillum.dynamics.plant import Plant as Plant
     from spirillum.dynamics.prediction import predict as predict
@@ -77,6 +78,7 @@ _HOME = {
     "Feasibility": "spirillum.measurement.feasibility",
     "Film": "spirillum.view.scene3d.film",
     "Flow": "spirillum.fields.flow",
+    "HeldPlants": "spirillum.dynamics.held_plants",
     "InputError": "spirillum.errors",
     "LinearSystem": "spirillum.interfaces.python_control",
     "LiveTracker": "spirillum.live.tracker",

@@ -1,0 +1,116 @@
+"""Robots drawn around one that is held to its axis: from stated ranges of its numbers, or from a posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import PerRobot, Samples
+from spirillum.dynamics.held_model import PARAMETERS, HeldModel, held_model
+from spirillum.errors import InputError, did_you_mean
+from spirillum.fitted.posterior_file import read_posterior
+from spirillum.robot.robot import Robot
+from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
+from spirillum.swimming.steady import calibrated_balance
+
+__all__ = ["FACTORS", "checked_ranges", "drawn_numbers", "posterior_numbers"]
+
+FACTORS = ("friction", "viscosity")
+"""Ranges that are factors of the robot's own value, drawn evenly in their logarithm."""
+_NAMES = tuple(item.name for item in PARAMETERS)
+_FIRST_RESPONSE = _NAMES.index("forward_velocity_per_torque")
+_FIXED = ("polarity", *_NAMES[_FIRST_RESPONSE:])
+"""Numbers that follow from others and cannot be drawn alone."""
+
+
+def checked_ranges(ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
+    """Ranges by name, each low and high: `friction` and `viscosity` as factors, others of `PARAMETERS` in SI.
+
+    Raises:
+        InputError: for an unknown name, or what is no range.
+    """
+    allowed = [*FACTORS, *(name for name in _NAMES if name not in _FIXED)]
+    found = {}
+    for name, given in (ranges or {}).items():
+        if name not in allowed:
+            raise InputError(
+                f"ranges.{str(name)[:60]} is not a number that can be drawn{did_you_mean(str(name)[:60], allowed)}; "
+                f"allowed: {', '.join(allowed)}"
+            )
+        pair = list(given) if isinstance(given, (tuple, list)) else []
+        numbers = len(pair) == 2 and all(isinstance(item, Real) and np.isfinite(float(item)) for item in pair)
+        if not numbers or pair[0] > pair[1] or (name in FACTORS and pair[0] <= 0):
+            raise InputError(f"ranges.{name} = {str(given)[:60]}; allowed: low and high, numbers, for factors above 0")
+        found[name] = (float(pair[0]), float(pair[1]))
+    return found
+
+
+def drawn_numbers(
+    held: HeldModel, count: int, rng: np.random.Generator, ranges: Mapping[str, tuple[float, float]]
+) -> Samples:
+    """Numbers of robots drawn from ranges, (count, len(PARAMETERS)).
+
+    Args:
+        held: the robot.
+        count: how many.
+        rng: source of chance.
+        ranges: as `checked_ranges` gives them.
+    """
+    numbers = np.tile(np.array(held.values), (count, 1))
+    factors = {name: np.ones(count) for name in FACTORS}
+    for name, (low, high) in ranges.items():
+        if name in FACTORS:
+            factors[name] = np.exp(rng.uniform(np.log(low), np.log(high), count))
+        else:
+            numbers[:, _NAMES.index(name)] = rng.uniform(low, high, count)
+    if any(name in ranges for name in FACTORS):
+        numbers[:, _FIRST_RESPONSE:] = _responses(held, factors["friction"], factors["viscosity"])
+    return numbers
+
+
+def _responses(held: HeldModel, friction: PerRobot, viscosity: PerRobot) -> Samples:
+    """(U, Omega, omega) per joint torque, then per imposed flow, of robots with other friction and viscosity, (n, 6).
+
+    In Stokes flow all resistances, and the wrench of an imposed flow, are in proportion to the viscosity.
+    """
+    steady = held.prediction
+    flow = None if held.flow is None else 1.0
+    batch = steady.batch.placed(steady.batch.placement.model_copy(update={"flow": flow}))
+    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
+    thick = {name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")}
+    s = s._replace(**thick)
+    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
+    t = friction_torques(steady.friction, steady.effective_friction * friction, rotor)
+    still = s._replace(u_0=np.zeros(1))
+    body, tail = rates_per_torque(s, t)
+    coasting_body, coasting_tail = coasting_rates(s, t)
+    columns = [still.speed(body, tail), body, tail]
+    columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
+    return np.stack([np.broadcast_to(column, friction.shape) for column in columns], axis=-1)
+
+
+def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Samples:
+    """Numbers of robots with the values of a posterior's draws, (count, len(PARAMETERS)), evenly among the draws.
+
+    Args:
+        held: the robot, computed by the model that was fitted.
+        posterior: file of a calibration's posterior.
+        count: how many, at most as many as the posterior has draws.
+
+    Raises:
+        InputError: for a wrong file, or one that was fitted with another model or to places in the tube.
+    """
+    name = held.prediction.model.name
+    known = read_posterior(posterior, name)
+    if known.places_robots:
+        raise InputError(
+            f"{posterior} was fitted to places in the tube, each of which is a flow of its own; allowed: one of drag "
+            "factors and friction, or ranges"
+        )
+    drawn: list[Robot] = known.drawn(held.robot, count, np.random.default_rng(1))
+    numbers = [held_model(robot, model=name, friction=held.prediction.friction).values for robot in drawn]
+    return np.array(numbers)

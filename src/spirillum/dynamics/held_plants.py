@@ -1,0 +1,186 @@
+"""Thousands of held robots that step together: the same equations as a run of `simulate` with motion `held`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.dynamics.held_draws import checked_ranges, drawn_numbers, posterior_numbers
+from spirillum.dynamics.held_model import PARAMETERS, STATES, HeldModel, held_model
+from spirillum.errors import InputError
+from spirillum.kernels import held_motor as kernel
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
+
+__all__ = ["HeldPlants"]
+
+_MOST = 10_000_000
+_LONGEST = 1e6
+_POOL = 500
+"""Draws of a posterior that robots are taken from."""
+
+
+class HeldPlants:
+    """Robots that are held to their channel's axis, all of them one step at a time; for one thread.
+
+    All are the same robot, or are drawn around it. Arrays have one value for each robot, SI, signed about +x.
+    """
+
+    def __init__(
+        self,
+        robot: str | Path | Mapping[str, Any] | Robot,
+        count: int = 1,
+        *,
+        model: str = AUTO,
+        friction: str | None = None,
+        calibration: str | Path | None = None,
+        placement: Placement | Mapping[str, Any] | None = None,
+        ranges: Mapping[str, Any] | None = None,
+        posterior: str | Path | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Put robots at rest.
+
+        Args:
+            robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+            count: how many.
+            model: a hydrodynamic model, or `auto`.
+            friction: reading of the friction; None: the robot's own.
+            calibration: calibration file whose factors replace the robot's.
+            placement: where they are held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
+            ranges: what they are drawn from: `friction` and `viscosity`, low and high factor of the robot's own,
+                evenly in the logarithm; other numbers of `held_model.PARAMETERS`, such as `battery.voltage`, in SI.
+            posterior: file of a calibration's posterior, from whose draws they are taken, before the ranges.
+            seed: of the draws.
+
+        Raises:
+            InputError: for wrong input.
+        """
+        _check_count(count)
+        self.held: HeldModel = held_model(
+            robot, model=model, friction=friction, calibration=calibration, placement=placement
+        )
+        """The robot that they are drawn around."""
+        self._ranges: dict[str, tuple[float, float]] = checked_ranges(ranges)
+        self._pool: Samples | None = None if posterior is None else posterior_numbers(self.held, posterior, _POOL)
+        self._rng = np.random.default_rng(seed)
+        self.time: Samples = np.zeros(count)
+        """Time since each was reset, s."""
+        self.states: Samples = np.zeros((count, kernel.STATES))
+        """States in the order of `held_model.STATES`."""
+        self.numbers: Samples = np.tile(np.array(self.held.values), (count, 1))
+        """Numbers of each robot in the order of `held_model.PARAMETERS`."""
+        self._duty: Samples = np.full(count, self.held.duty)
+        self._flow: Samples = np.full(count, self.held.flow or 0.0)
+        self.redraw()
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        return len(self.time)
+
+    def redraw(self, which: np.ndarray | None = None, rng: np.random.Generator | None = None) -> None:
+        """Take new robots from the ranges or the posterior; their motion goes on.
+
+        Args:
+            which: truth value of each robot; None: all.
+            rng: source of chance; None: that of the seed.
+        """
+        rng = rng or self._rng
+        chosen = np.arange(self.count) if which is None else np.flatnonzero(which)
+        if not len(chosen) or not (self._ranges or self._pool is not None):
+            return
+        numbers = drawn_numbers(self.held, len(chosen), rng, self._ranges)
+        if self._pool is not None:
+            rows = self._pool[rng.integers(len(self._pool), size=len(chosen))]
+            own = [place for place, item in enumerate(PARAMETERS) if item.name in self._ranges]
+            rows[:, own] = numbers[:, own]
+            numbers = rows
+        self.numbers[chosen] = numbers
+
+    def reset(self, which: np.ndarray | None = None) -> None:
+        """Back to rest at place 0, with the drive on at the robot's own duty.
+
+        Args:
+            which: truth value of each robot; None: all.
+        """
+        rows = slice(None) if which is None else np.asarray(which, dtype=bool)
+        self.time[rows] = 0.0
+        self.states[rows] = 0.0
+        self._duty[rows] = self.held.duty
+        self._flow[rows] = self.held.flow or 0.0
+
+    def step(
+        self,
+        dt: float,
+        *,
+        duty: Samples | float | None = None,
+        remote: np.ndarray | bool | None = None,
+        flow: Samples | float | None = None,
+    ) -> None:
+        """All go on for a time; what is not given stays as it was.
+
+        Args:
+            dt: s, positive.
+            duty: of each drive, 0 (off) to 1; or one for all.
+            remote: instead, on (at the robot's own duty) or off.
+            flow: mean flow that is imposed, m/s, where the placement has one.
+
+        Raises:
+            InputError: for wrong input; nothing has then moved.
+        """
+        number = _time(dt)
+        if remote is not None:
+            if duty is not None:
+                raise InputError("remote and duty are given together; allowed: one of them")
+            duty = np.where(np.asarray(remote, dtype=bool), self.held.duty, 0.0)
+        if flow is not None and self.held.flow is None:
+            raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
+        asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
+        carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
+        self._duty, self._flow = asked, carried
+        kernel.advance(self.numbers, self.states, number, self._duty, self._flow)
+        self.time += number
+
+    def observe(self) -> dict[str, Samples]:
+        """True values by name: the states, rates and speed."""
+        found = {name: self.states[:, place].copy() for place, name in enumerate(STATES)}
+        torque = self.numbers[:, kernel.TORQUE] * self.states[:, kernel.CURRENT]
+        for name, per_torque, per_flow in (
+            ("forward_velocity", kernel.SPEED, kernel.SPEED_FLOW),
+            ("body_rotation_rate", kernel.BODY, kernel.BODY_FLOW),
+            ("tail_rotation_rate", kernel.TAIL, kernel.TAIL_FLOW),
+        ):
+            found[name] = self.numbers[:, per_torque] * torque + self.numbers[:, per_flow] * self._flow
+        found["battery_voltage"] = self.numbers[:, kernel.VOLTAGE] - self.numbers[:, kernel.INTERNAL] * np.abs(
+            self.states[:, kernel.CURRENT]
+        )
+        return found
+
+    def _one_each(self, name: str, given: Samples | float, low: float, high: float) -> Samples:
+        try:
+            values = np.array(np.broadcast_to(np.asarray(given, dtype=np.float64), (self.count,)))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{name} is no array of {self.count} numbers; allowed: one for each robot") from error
+        inside = (values >= low) & (values <= high)
+        if not inside.all():
+            raise InputError(f"{name} = {values[~inside][0]:g}; allowed: numbers from {low:g} to {high:g}")
+        return values
+
+
+def _check_count(count: Any) -> None:
+    if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= _MOST:
+        raise InputError(f"count = {str(count)[:40]}; allowed: a whole number from 1 to {_MOST}")
+
+
+def _time(dt: Any) -> float:
+    number = float(dt) if isinstance(dt, Real) else np.nan
+    if not 0.0 < number <= _LONGEST:
+        raise InputError(f"dt = {str(dt)[:40]}; allowed: above 0, at most {_LONGEST:g} s")
+    return number

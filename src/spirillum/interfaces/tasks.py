@@ -1,0 +1,333 @@
+"""Tasks to learn: many held robots in the laboratory of `sp.control`, one time step at a time, as plain arrays.
+
+A step is one frame of the camera. What an agent sees is the frame that the camera's latency lets through, with its
+errors; what it commands reaches the drive after the remote's delay, or not at all. Nothing here knows Gymnasium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.controllers.lab import Lab
+from spirillum.dynamics.held_plants import HeldPlants
+from spirillum.errors import InputError
+from spirillum.kernels import held_motor as kernel
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO, choose_model
+from spirillum.units import KINDS, parse_option
+
+__all__ = ["HoldSpeed", "StopAt", "Task"]
+
+_MM = 1e3
+_SEEN_OVER = 0.5
+"""Time over which the observed speed is an average, s."""
+_LATEST_PULSE = 0.9
+"""Share of an episode in which a pulse of flow may begin."""
+
+
+class Observed(NamedTuple):
+    """One number of an observation."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+class _Past:
+    """The last values of all robots, in a ring."""
+
+    def __init__(self, length: int, count: int) -> None:
+        self._rows, self._last = np.zeros((length, count)), 0
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def append(self, values: Samples) -> None:
+        self._last = (self._last + 1) % len(self._rows)
+        self._rows[self._last] = values
+
+    def ago(self, steps: int) -> Samples:
+        """Values so many steps ago; a view."""
+        return np.asarray(self._rows[self._last - steps])
+
+    def forget(self, which: np.ndarray) -> None:
+        self._rows[:, which] = 0.0
+
+
+class Task:
+    """Robots with camera, remote and flow; a task adds goal, actions, observation and reward."""
+
+    observed: ClassVar[tuple[Observed, ...]]
+    """The numbers of an observation."""
+    score_unit: ClassVar[str]
+
+    def __init__(
+        self,
+        count: int,
+        *,
+        robot: str | Path | Mapping[str, Any] | Robot = "biorob2012-wide",
+        model: str = AUTO,
+        friction: str | None = None,
+        placement: Placement | Mapping[str, Any] | None = None,
+        lab: Lab | str | Path | Mapping[str, Any] | None = None,
+        ranges: Mapping[str, Any] | None = None,
+        posterior: str | Path | None = None,
+        duration: str | float = 20.0,
+    ) -> None:
+        """Put robots into their laboratory.
+
+        Args:
+            count: how many.
+            robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
+            model: a hydrodynamic model, or `auto`; only `tube` knows the pulse of flow.
+            friction: reading of the friction; None: the robot's own.
+            placement: where the robots are held, for `tube`.
+            lab: camera, meter, remote, pulse, and how unknown the friction is, as for `sp.control`.
+            ranges: what robots are drawn from besides, see `HeldPlants`; a range of `friction` instead of the lab's.
+            posterior: file of a calibration's posterior, from whose draws they are taken.
+            duration: of an episode, with its unit or a float in s.
+
+        Raises:
+            InputError: for wrong input.
+        """
+        self.lab = Lab.of(lab)
+        self.duration = parse_option("duration", duration, KINDS["time"])
+        self.dt = 1.0 / self.lab.camera.fps
+        if not self.dt <= self.duration <= 1e5:
+            raise InputError(f"duration = {self.duration:g} s; allowed: {self.dt:.3g} to 100000 s")
+        own, placed = load(robot), Placement.of(placement)
+        chosen = choose_model(model, own, placement=placed).model
+        if chosen == "tube" and self.lab.pulse.velocity and placed.flow is None and placed.ends is None:
+            placed = placed.model_copy(update={"flow": 0.0})
+        factor = self.lab.unknown.friction_factor
+        known = posterior is not None or factor == 1.0
+        drawn = {**({} if known else {"friction": (1.0 / factor, factor)}), **(ranges or {})}
+        self.plants = HeldPlants(
+            own, count, model=chosen, friction=friction, placement=placed, ranges=drawn, posterior=posterior
+        )
+        self.steps = np.zeros(count, dtype=np.int64)
+        self.length = max(1, round(self.duration / self.dt))
+        """Steps of an episode."""
+        late, slow = round(self.lab.camera.latency / self.dt), max(1, round(_SEEN_OVER / self.dt))
+        self._late, self._slow = late, slow
+        self._frames = _Past(late + slow + 1, count)
+        self._commands = _Past(round(self.lab.remote.delay / self.dt) + 1, count)
+        self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
+        self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
+        self.goal = np.zeros(count)
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        return self.plants.count
+
+    @property
+    def position(self) -> Samples:
+        """True places, m."""
+        return self.plants.states[:, kernel.POSITION]
+
+    @property
+    def speed(self) -> Samples:
+        """True speeds, m/s."""
+        return self.plants.observe()["forward_velocity"]
+
+    @property
+    def done(self) -> np.ndarray:
+        """Whether the episodes are at their end."""
+        return self.steps >= self.length
+
+    def reset(self, which: np.ndarray, rng: np.random.Generator) -> None:
+        """New robots, goals, errors and flow where `which` is true, at rest with the drive off."""
+        new, lab = int(which.sum()), self.lab
+        self.plants.redraw(which, rng)
+        self.plants.reset(which)
+        self.steps[which] = 0
+        self._frames.forget(which)
+        self._commands.forget(which)
+        self._wander[which] = rng.standard_normal(new)
+        self._scale[which] = 1.0 + lab.camera.scale_error * rng.standard_normal(new)
+        self._gain[which] = 1.0 + lab.meter.gain_error * rng.standard_normal(new)
+        place, side = rng.uniform(size=(2, new))
+        start = lab.pulse.start
+        self._pulse_start[which] = _LATEST_PULSE * self.duration * place if start is None else start
+        sense = np.where(side < 0.5, 1.0, -1.0) if start is None else 1.0
+        self._pulse[which] = lab.pulse.velocity * sense
+        self.goal[which] = self._goals(new, rng)
+
+    def step(self, actions: np.ndarray, rng: np.random.Generator) -> Samples:
+        """One frame; the reward of each robot.
+
+        Args:
+            actions: of each robot.
+            rng: source of chance of camera and remote.
+
+        Raises:
+            InputError: for an action that is none; nothing has then moved.
+        """
+        duty, count = self._duty(actions), self.count
+        lost = rng.random(count) < self.lab.remote.lost
+        arriving = np.where(lost, self._commands.ago(0), duty)
+        self._commands.append(arriving)
+        self.plants.step(self.dt, duty=self._commands.ago(len(self._commands) - 1), flow=self._flow())
+        self.steps += 1
+        self._film(rng)
+        return self._reward() * self.dt
+
+    def observe(self, rng: np.random.Generator) -> np.ndarray:
+        """What each agent sees, (count, len(observed)), 32 bits."""
+        seen = np.empty((self.count, len(self.observed)), dtype=np.float32)
+        for column, (item, values) in enumerate(zip(self.observed, self._observation(rng), strict=True)):
+            np.clip(values, item.low, item.high, out=seen[:, column], casting="same_kind")
+        return seen
+
+    def scores(self) -> Samples:
+        """How far each robot is from its goal now; the score of an episode is that at its end."""
+        raise NotImplementedError
+
+    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
+        raise NotImplementedError
+
+    def _duty(self, actions: np.ndarray) -> Samples:
+        raise NotImplementedError
+
+    def _reward(self) -> Samples:
+        raise NotImplementedError
+
+    def _observation(self, rng: np.random.Generator) -> list[Samples]:
+        raise NotImplementedError
+
+    def _flow(self) -> Samples | None:
+        if self.plants.held.flow is None:
+            return None
+        since = self.plants.time + 0.5 * self.dt - self._pulse_start
+        return self.plants.held.flow + np.where((since >= 0.0) & (since < self.lab.pulse.duration), self._pulse, 0.0)
+
+    def _film(self, rng: np.random.Generator) -> None:
+        """A new frame: the last row of the frames; one that is lost shows what the one before did."""
+        camera, count = self.lab.camera, self.count
+        noise, lost = rng.standard_normal((2, count)), rng.random(count) < camera.dropped
+        kept = np.exp(-self.dt / camera.memory)
+        self._wander = kept * self._wander + np.sqrt(1.0 - kept**2) * noise[1]
+        place = self._scale * self.position + camera.position_noise * noise[0] + camera.position_wander * self._wander
+        self._frames.append(np.where(lost, self._frames.ago(0), place))
+
+    def _seen(self) -> tuple[Samples, Samples]:
+        """Place and speed as the camera tells them now, m and m/s."""
+        last = self._frames.ago(self._late)
+        return last, (last - self._frames.ago(self._late + self._slow)) / (self._slow * self.dt)
+
+    def _time_left(self) -> Samples:
+        return 1.0 - self.steps / self.length
+
+
+class StopAt(Task):
+    """Stop at a place with a remote that knows on and off."""
+
+    observed = (
+        Observed("distance", "mm", -100.0, 100.0),
+        Observed("speed", "mm/s", -20.0, 20.0),
+        Observed("command", "1", 0.0, 1.0),
+        Observed("time_left", "1", 0.0, 1.0),
+    )
+    score_unit = "mm"
+
+    def __init__(self, count: int, *, goal: tuple[float, float] = (1e-3, 6e-3), **more: Any) -> None:
+        """As `Task`, with goals drawn evenly from a range of distances.
+
+        Args:
+            count: how many robots.
+            goal: least and largest distance, m.
+            more: arguments of `Task`.
+
+        Raises:
+            InputError: for wrong input.
+        """
+        super().__init__(count, **more)
+        self._range = _range_of("goal", goal)
+
+    def scores(self) -> Samples:
+        """Distance from the goal, mm."""
+        return _MM * np.abs(self.position - self.goal)
+
+    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
+        return rng.uniform(*self._range, count)
+
+    def _duty(self, actions: np.ndarray) -> Samples:
+        asked = np.asarray(actions).reshape(-1)
+        if len(asked) != self.count or not np.isin(asked, (0, 1)).all():
+            raise InputError(
+                f"action = {str(actions)[:40]}; allowed: 0 (off) or 1 (on) for each of {self.count} robots"
+            )
+        return np.where(asked == 1, self.plants.held.duty, 0.0)
+
+    def _reward(self) -> Samples:
+        return -self.scores()
+
+    def _observation(self, rng: np.random.Generator) -> list[Samples]:  # noqa: ARG002 - no sensor but the camera
+        place, speed = self._seen()
+        return [_MM * (self.goal - place), _MM * speed, (self._commands.ago(0) > 0).astype(float), self._time_left()]
+
+
+class HoldSpeed(Task):
+    """Swim at a speed, by the duty of the drive."""
+
+    observed = (
+        Observed("target", "mm/s", -20.0, 20.0),
+        Observed("speed", "mm/s", -20.0, 20.0),
+        Observed("current", "mA", -10.0, 10_000.0),
+        Observed("duty", "1", 0.0, 1.0),
+        Observed("time_left", "1", 0.0, 1.0),
+    )
+    score_unit = "1"
+
+    def __init__(self, count: int, *, goal: tuple[float, float] = (0.3, 0.8), **more: Any) -> None:
+        """As `Task`, with target speeds drawn evenly.
+
+        Args:
+            count: how many robots.
+            goal: least and largest target, as shares of the steady speed of the robot as its file says.
+            more: arguments of `Task`.
+
+        Raises:
+            InputError: for wrong input.
+        """
+        super().__init__(count, **more)
+        self._range = _range_of("goal", goal)
+
+    def scores(self) -> Samples:
+        """Relative error of the speed."""
+        return np.abs(self.speed / self.goal - 1.0)
+
+    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
+        return self.plants.held.prediction.forward_velocity * rng.uniform(*self._range, count)
+
+    def _duty(self, actions: np.ndarray) -> Samples:
+        asked = np.asarray(actions, dtype=np.float64).reshape(-1)
+        if len(asked) != self.count or not ((asked >= 0.0) & (asked <= 1.0)).all():
+            raise InputError(
+                f"action = {str(actions)[:40]}; allowed: a duty from 0 to 1 for each of {self.count} robots"
+            )
+        return asked
+
+    def _reward(self) -> Samples:
+        return -self.scores()
+
+    def _observation(self, rng: np.random.Generator) -> list[Samples]:
+        noise = self.lab.meter.current_noise * rng.standard_normal(self.count)
+        current = self._gain * np.abs(self.plants.states[:, kernel.CURRENT]) + noise
+        return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._commands.ago(0), self._time_left()]
+
+
+def _range_of(name: str, given: Any) -> tuple[float, float]:
+    pair = tuple(given) if isinstance(given, (tuple, list)) and len(given) == 2 else ()
+    if not pair or not all(isinstance(item, (int, float)) for item in pair) or not 0.0 < pair[0] <= pair[1]:
+        raise InputError(f"{name} = {str(given)[:60]}; allowed: least and largest value, both above 0")
+    return float(pair[0]), float(pair[1])

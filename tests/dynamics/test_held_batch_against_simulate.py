@@ -1,0 +1,123 @@
+"""Batches of held robots: runs of `simulate`, convergence of order 4, and draws that are robots of their own."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.kernels import held_motor as kernel
+
+WIDE = "biorob2012-wide"
+IN_FLOW: dict[str, Any] = {"gap": "0.5 mm", "pitch": 0.0, "flow": 0.0}
+LINEAR_CIRCUIT = {
+    "motor": {"resistance": {"constant": "10 ohm", "decay": "0 ohm", "growth": "0 ohm", "slope": "0 ohm/A"}},
+    "friction": {"effective": "2e-6 N m s/rad"},
+}
+
+
+@pytest.mark.parametrize("hand", ["right", "left"])
+@pytest.mark.parametrize("dt", [0.1, 1 / 30, 0.005])
+def test_steps_are_a_run_of_simulate(hand: str, dt: float) -> None:
+    robot = sp.load(WIDE, **{"tail.handedness": hand, "friction.effective": "2e-6 N m s/rad"})
+    run = sp.simulate(robot, model="rft", motion="held", timing={"duration": 0.6, "on": [(0.1, 0.3), (0.4, 0.6)]})
+    robots = sp.HeldPlants(robot, 3, model="rft")
+    for n in range(round(0.6 / dt)):
+        time = (n + 0.5) * dt
+        robots.step(dt, remote=0.1 < time < 0.3 or 0.4 < time < 0.6)
+    for name, values in robots.observe().items():
+        expected = run[name].values
+        np.testing.assert_allclose(values, expected[-1], rtol=0, atol=1e-6 * np.abs(expected).max(), err_msg=name)
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.02, 0.1, 1.0])
+def test_linear_circuit_rises_exponentially(dt: float) -> None:
+    robot = sp.load(WIDE, **LINEAR_CIRCUIT)
+    robots, steady = sp.HeldPlants(robot, 1, model="rft"), sp.predict(robot, model="rft")
+    resistance = 10.0 + 0.8 + 0.004 * steady.motor_rotation_rate / steady.motor_current
+    robots.step(dt)
+    rest, constant = 3.7 / resistance, 0.082 / resistance
+    found, risen = robots.observe(), -np.expm1(-dt / constant)
+    assert found["motor_current"][0] == pytest.approx(rest * risen, rel=1e-6)
+    assert found["battery_charge_used"][0] == pytest.approx(rest * (dt - constant * risen), rel=1e-6)
+
+
+def test_error_falls_with_the_fourth_power_of_the_pieces() -> None:
+    robots = sp.HeldPlants(WIDE, 1, model="rft")
+    charges = []
+    for fineness in (0.5, 1.0, 2.0, 16.0):
+        state = np.zeros((1, kernel.STATES))
+        kernel.advance(robots.numbers, state, 1 / 30, np.ones(1), np.zeros(1), fineness)
+        charges.append(state[0, kernel.CHARGE])
+    errors = np.abs(np.array(charges[:3]) / charges[3] - 1.0)
+    assert errors[1] < 3e-6
+    assert np.all(np.log2(errors[:-1] / errors[1:]) > 3.5)
+
+
+def test_drawn_robots_are_robots_of_their_own() -> None:
+    """Twice the friction and 1.1 times the viscosity, by a factor and in the robot file; in a flow, too."""
+    options: dict[str, Any] = {"model": "tube", "placement": IN_FLOW}
+    drawn = sp.HeldPlants(WIDE, 1, ranges={"friction": (2, 2), "viscosity": (1.1, 1.1)}, **options)
+    own = sp.load(WIDE)
+    fields = {"friction.effective": "1.4e-6 N m s/rad", "fluid.viscosity": f"{1.1 * own.fluid.viscosity!r} Pa s"}
+    np.testing.assert_allclose(drawn.numbers, sp.HeldPlants(sp.load(WIDE, **fields), 1, **options).numbers, rtol=1e-12)
+
+
+def test_flow_carries_robots_as_predict_says() -> None:
+    robots = sp.HeldPlants(WIDE, 2, model="tube", placement={**IN_FLOW, "flow": 1e-3})
+    robots.step(1.0)
+    steady = sp.predict(WIDE, model="tube", placement={**IN_FLOW, "flow": 1e-3})
+    assert robots.observe()["forward_velocity"][0] == pytest.approx(steady.forward_velocity, rel=1e-6)
+    robots.step(1.0, remote=[True, False], flow=[0.0, -1e-3])
+    robots.step(1.0)
+    after = robots.observe()["forward_velocity"]
+    still = sp.predict(WIDE, model="tube", placement=IN_FLOW)
+    assert after[0] == pytest.approx(still.forward_velocity, rel=1e-6)
+    assert -1e-3 < after[1] < -0.8e-3
+
+
+def test_ranges_are_kept_and_seeds_repeat() -> None:
+    ranges = {"battery.voltage": (3.3, 3.7), "friction": (0.5, 2.0)}
+    first, again, other = (sp.HeldPlants(WIDE, 200, model="rft", ranges=ranges, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.numbers, again.numbers)
+    assert not np.array_equal(first.numbers, other.numbers)
+    voltage = first.numbers[:, kernel.VOLTAGE]
+    assert 3.3 <= voltage.min() < 3.35
+    assert 3.65 < voltage.max() <= 3.7
+    first.step(0.1)
+    first.reset(np.arange(200) < 50)
+    assert not first.states[:50].any()
+    assert np.all(first.states[50:, kernel.POSITION] > 0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"dt": 0.0}, r"dt = 0\.0; allowed: above 0"),
+        ({"dt": float("nan")}, "dt = nan"),
+        ({"dt": 0.1, "duty": float("nan")}, "duty = nan; allowed"),
+        ({"dt": 0.1, "duty": [0.0, 1.5]}, r"duty = 1\.5; allowed"),
+        ({"dt": 0.1, "duty": [0.0, 1.0, 1.0]}, "no array of 2 numbers"),
+        ({"dt": 0.1, "duty": 1.0, "remote": True}, "given together"),
+        ({"dt": 0.1, "flow": 1e-3}, "flow without one in the placement"),
+    ],
+)
+def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) -> None:
+    robots = sp.HeldPlants(WIDE, 2, model="rft")
+    with pytest.raises(sp.InputError, match=sentence):
+        robots.step(**arguments)
+    assert not robots.states.any()
+
+
+@pytest.mark.parametrize(
+    ("ranges", "sentence"),
+    [
+        ({"voltage": (3, 4)}, r"ranges\.voltage is not a number that can be drawn"),
+        ({"friction": (0, 1)}, "for factors above 0"),
+        ({"friction": (2, 1)}, "allowed: low and high"),
+        ({"battery.voltage": 3.7}, "allowed: low and high"),
+    ],
+)
+def test_wrong_ranges_are_a_sentence(ranges: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(sp.InputError, match=sentence):
+        sp.HeldPlants(WIDE, 2, model="rft", ranges=ranges)
