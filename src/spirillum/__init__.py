@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from spirillum.view.scene3d.show import Picture3D as Picture3D
     from spirillum.view.scene3d.show import show as show
     from spirillum.virtual.experiment import virtual_experiment as virtual_experiment
+    from spirillum.virtual.live_camera import VirtualCamera as VirtualCamera
     from spirillum.virtual.trial import render as render
 
     __version__: str
@@ -98,6 +99,7 @@ _HOME = {
     "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.swimming.answer",
     "Tracked": "spirillum.live.answer",
+    "VirtualCamera": "spirillum.virtual.live_camera",
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",

@@ -13,7 +13,9 @@ from spirillum.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "TrialTrajectory", "lab_to_camera", "run_trajectory", "steady_trajectory"]
+    from spirillum.dynamics.poses import Poses
+
+__all__ = ["Pose", "TrialTrajectory", "lab_to_camera", "run_trajectory", "steady_trajectory", "trajectory_of"]
 
 _MAX_OBLIQUITY = 0.5
 """Largest angle of a run's robot to the channel, rad."""
@@ -177,16 +179,32 @@ def run_trajectory(dataset: xr.Dataset, view: str, *, leftwards: bool, axis: flo
     Raises:
         InputError: if the run cannot be shown.
     """
-    from spirillum.dynamics.poses import poses_of, rotation_matrix
+    from spirillum.dynamics.poses import poses_of
 
-    poses = poses_of(dataset, level)
+    return trajectory_of(poses_of(dataset, level), view, leftwards=leftwards, axis=axis)
+
+
+def trajectory_of(poses: Poses, view: str, *, leftwards: bool, axis: float) -> TrialTrajectory:
+    """TrialTrajectory of a robot's poses in the lab, from the time 0 on.
+
+    Args:
+        poses: of the robot.
+        view: `top` or `side`.
+        leftwards: whether the nose points to the left in the picture.
+        axis: height of the channel's axis in the camera's frame, m.
+
+    Raises:
+        InputError: if the robot turns across the channel.
+    """
+    from spirillum.dynamics.poses import rotation_matrix
+
     turn = lab_to_camera(view, leftwards=leftwards)
     turns = np.array([turn @ rotation_matrix(attitude) for attitude in poses.attitude])
     noses = turns[:, :, 0]
     heading, pitch = np.arctan2(noses[:, 1], noses[:, 0]), np.arcsin(np.clip(noses[:, 2], -1.0, 1.0))
     if np.abs(heading).max() > _MAX_OBLIQUITY or np.abs(pitch).max() > _MAX_OBLIQUITY:
         raise InputError(
-            f"the run's robot turns across the channel by more than {_MAX_OBLIQUITY} rad; allowed: one that swims along"
+            f"the robot turns across the channel by more than {_MAX_OBLIQUITY} rad; allowed: one that swims along"
         )
     upright = np.array([_attitude(*angles) for angles in zip(heading.tolist(), pitch.tolist(), strict=True)])
     rolled = np.swapaxes(upright, 1, 2) @ turns

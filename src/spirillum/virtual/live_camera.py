@@ -1,0 +1,135 @@
+"""The virtual camera before a robot that moves step by step: a picture of each moment, as a real one would give it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from spirillum.dynamics.poses import Pose, Poses
+from spirillum.errors import InputError
+from spirillum.files import write_text
+from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
+from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.disturbances import Disturbances, tilt_of
+from spirillum.virtual.frames import Frames
+from spirillum.virtual.framing import check_size, lens_of, swimming_range
+from spirillum.virtual.options import CameraOptions, Seeded
+from spirillum.virtual.painter import Painter
+from spirillum.virtual.robot_file import is_preset, robot_text
+from spirillum.virtual.tank import tank_of
+from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
+from spirillum.virtual.truth import setup_text
+
+__all__ = ["Shot", "VirtualCamera"]
+
+_LAMP_TIME = 20.0
+"""Time over which the lamp drifts once, s, as in a trial's usual length."""
+_SHARE = 0.1
+"""Where in the picture the robot is at first, as a share of the way on which it is seen whole."""
+
+
+class Shot(NamedTuple):
+    """A picture."""
+
+    time: float
+    """The middle of its exposure, s; the exposure ends at the moment that was shown."""
+    image: np.ndarray
+    """8-bit RGB, (height, width, 3), synthetic, and marked so."""
+
+
+class VirtualCamera:
+    """Takes pictures of a robot whose poses come one by one, as from `spirillum.Plant`; all of it is synthetic."""
+
+    def __init__(
+        self,
+        robot: str | Path | Mapping[str, Any] | Robot,
+        pose: Pose,
+        *,
+        camera: CameraOptions | Mapping[str, Any] | None = None,
+        degradation: str | Degradation | Mapping[str, Any] | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Set the camera up above a robot, which has most of the picture before it.
+
+        Args:
+            robot: a preset's name, a robot file, its tables, or a loaded robot.
+            pose: where it is at first, in the lab.
+            camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
+            degradation: `clean`, `degraded`, or `Degradation`; frames are lost by whoever takes none.
+            seed: of all random numbers.
+
+        Raises:
+            InputError: for wrong input, or a robot that this camera cannot show.
+        """
+        self.camera, self.degradation = CameraOptions.of(camera), Degradation.of(degradation)
+        self.robot, seed = load(robot), Seeded.of({"seed": seed}).seed
+        self._tank = tank_of(self.robot, self.camera.view)
+        self._lens = lens_of(self.camera, tilt_of(self.degradation, seed))
+        check_size(self.robot, self._tank, self._lens)
+        body, tube = (self.robot.body.length, self.robot.body.diameter), self._tank.tube
+        top = min(self._tank.tube_height + 0.8 * (tube or 1.5 * body[1]), 0.95 * self._lens.surface)
+        self._disturbances = Disturbances(self.degradation, seed, self._lens, _LAMP_TIME, body, top)
+        self._painter = Painter(self.robot, self._tank, self._lens)
+        low, high = swimming_range(self.robot, self.camera)
+        self._shift = low + _SHARE * (high - low) - float(pose.position[0])
+        self._height = float(self._trajectory(0.0, pose, 1.0, pose).position[0, 2])
+        self._last: tuple[float, Pose] | None = None
+
+    def take(self, time: float, pose: Pose) -> Shot:
+        """The picture whose exposure ends at a moment; what moved since the last picture is blurred.
+
+        Args:
+            time: of the moment, s, later than that of the picture before.
+            pose: of the robot, in the lab.
+
+        Raises:
+            InputError: for a time that does not rise, or a robot that turns across the channel.
+        """
+        before = (time - 1.0, pose) if self._last is None else self._last
+        if not time > before[0]:
+            raise InputError(f"time = {time:g} s; allowed: later than the picture before, {before[0]:g} s")
+        trajectory, self._last = self._trajectory(*before, time, pose), (time, pose)
+        exposure = min(self.camera.exposure, time - before[0])
+        frames = Frames(self._painter, self._disturbances, trajectory, exposure)
+        middle = time - 0.5 * exposure
+        return Shot(middle, frames.image(middle))
+
+    def setup(self, path: str | Path) -> Path:
+        """Write the setup file, as an experimenter would know it; a robot that is no preset lies beside it.
+
+        Args:
+            path: the file (`.toml`).
+        """
+        path = Path(path)
+        own = path.with_name(f"{path.stem}.robot.toml")
+        name = self.robot.name if is_preset(self.robot) else own.name
+        if name == own.name:
+            write_text(own, robot_text(self.robot))
+        axis = self._height, 0.0
+        write_text(path, setup_text(name, self.camera, self._lens, self._tank.spacing, axis, timed=True))
+        return path
+
+    def x_of(self, pose: Pose) -> float:
+        """Place of a robot's mid-length along the channel from below the lens, as the tracker counts it, m."""
+        return float(pose.position[0]) + self._shift
+
+    def _trajectory(self, before: float, first: Pose, now: float, last: Pose) -> TrialTrajectory:
+        """From one pose to the next, at their times."""
+        both = (first, last)
+        poses = Poses(
+            time=np.array([before, now]),
+            position=np.array([one.position for one in both]),
+            attitude=np.array([one.attitude for one in both]),
+            tail_phase=np.array([one.tail_phase for one in both]),
+            roll=np.zeros(2),
+        )
+        found = trajectory_of(
+            poses, self.camera.view, leftwards=self.camera.leftwards, axis=self._tank.tube_height
+        ).shifted(self._shift)
+        return TrialTrajectory(
+            poses.time, found.position, found.heading, found.pitch, found.body_angle, found.tail_phase
+        )
