@@ -3,47 +3,69 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from itertools import islice
 from multiprocessing import get_context
+from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
 from spirillum.errors import InputError
 
-__all__ = ["as_they_come"]
+__all__ = ["AHEAD", "as_they_come", "memory_in_use"]
 
+AHEAD = 3
+"""Tasks that wait or are answered for each process: what is sent ahead and what is not yet taken stays in memory."""
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _Task = TypeVar("_Task")
 _Answer = TypeVar("_Answer")
 
 
 def as_they_come(
-    work: Callable[[_Task], _Answer], tasks: Sequence[_Task], workers: int, *, besides: str = ""
+    work: Callable[[_Task], _Answer], tasks: Iterable[_Task], workers: int, *, besides: str = "", single: bool = False
 ) -> Iterator[tuple[_Task, _Answer]]:
     """Tasks with their answers: in order from this process, in any order from several.
 
     Args:
         work: what is done; a function of a module of this package.
-        tasks: what it is done to; they can be pickled.
+        tasks: what it is done to; they can be pickled. They are taken as they are needed.
         workers: number of processes; 1: this one.
         besides: what the sentence of an error says at its end, such as what is kept.
+        single: whether every process keeps to one thread.
 
     Raises:
         InputError: if a process was ended from outside.
     """
-    if workers == 1 or len(tasks) < 2:
-        for task in tasks:
+    ahead = iter(tasks)
+    first = list(islice(ahead, AHEAD * workers))
+    if workers == 1 or len(first) < 2:
+        for task in (*first, *ahead):
             yield task, work(task)
         return
-    pool = ProcessPoolExecutor(min(workers, len(tasks)), mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(
+        min(workers, len(first)), mp_context=get_context("spawn"), initializer=_single if single else None
+    )
     try:
+        waiting: dict[Future[_Answer], _Task] = {}
         with _no_main():
-            waiting = {pool.submit(work, task): task for task in tasks}
-        for future in as_completed(waiting):
-            yield waiting[future], future.result()
+            for task in first:
+                waiting[pool.submit(work, task)] = task
+        while waiting:
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                with _no_main():
+                    for task in islice(ahead, 1):
+                        waiting[pool.submit(work, task)] = task
+                task = waiting.pop(future)
+                yield task, future.result()
+            del done, future  # they hold the answers
+        pool.shutdown()
     except BrokenProcessPool as error:
         raise InputError(
             f"a process of {workers} was ended from outside, as for want of memory; allowed: workers = 1, or more "
@@ -55,6 +77,20 @@ def as_they_come(
         raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+def memory_in_use() -> float:
+    """Memory of this process, bytes; 0 where the system does not say."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def _single() -> None:
+    """In a new process: libraries that are loaded from here on keep to one thread."""
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
 
 
 @contextmanager

@@ -266,9 +266,10 @@ def resistance(
 
 def study(
     source: Annotated[Path | None, typer.Argument(help="Study file (TOML); without one, the paper's study.")] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")] = Path(
-        "spirillum-study"
-    ),
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study."),
+    ] = None,
     observations: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Observed rates and speeds (CSV): B_eff is inferred from them.")
     ] = None,
@@ -293,7 +294,14 @@ def study(
             show_default=False,
         ),
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for --predicted.")] = 2,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute: tcp://HOST:8786.")
+    ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER.zarr", help="Write a Zarr store, piece by piece; no folder of results."),
+    ] = None,
     calibration: Calibration = None,
     posterior: Posterior = None,
     rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = 10,
@@ -309,21 +317,27 @@ def study(
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer
         from spirillum.results.study import study_answer
+        from spirillum.results.study_store import store_answer
 
+        folder = output or (Path("spirillum-study") if store is None else None)
         dataset = answer(
             source,
             observations=observations,
-            output=output,
+            output=folder,
             overrides=overrides_from(settings),
             models=model,
             band=band,
             predicted=predicted,
-            workers=workers,
+            workers=workers if cluster is None else cluster,
+            store=store,
             calibration=calibration,
             posterior=posterior,
             progress=progress,
         )
-    renderer.show(study_answer(dataset, output), json=json, rows=rows)
+    if folder is None:
+        renderer.show(store_answer(dataset, Path(store or "")), json=json)
+    else:
+        renderer.show(study_answer(dataset, folder), json=json, rows=rows)
 
 
 def schema(

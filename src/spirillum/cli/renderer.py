@@ -79,15 +79,18 @@ def patience(model: str, *, quiet: bool) -> Iterator[None]:
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar on standard error with the time left; silent for `--json` and where nobody watches.
 
-    That a table is made, which takes minutes, is a line of its own on standard error in any case.
+    That a table is made, which takes minutes, and what a large study will take, are lines of their own on standard
+    error in any case.
     """
+    from spirillum.crews import ESTIMATE
     from spirillum.fluid.tube.announced import ANNOUNCED
 
+    lines = (ANNOUNCED, ESTIMATE)
     console = Console(stderr=True, soft_wrap=True)
     if quiet:
 
         def announce(what: str, _done: int, _total: int) -> None:
-            if what.startswith(ANNOUNCED):
+            if what.startswith(lines):
                 console.print(what, highlight=False)
 
         yield announce
@@ -116,7 +119,7 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     before = [0, 0]
 
     def tell(what: str, done: int, total: int) -> None:
-        if what.startswith(ANNOUNCED):
+        if what.startswith(lines):
             bar.console.print(what, highlight=False)
             return
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen

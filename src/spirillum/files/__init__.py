@@ -29,13 +29,24 @@ from spirillum.files.writing import (
     whole_folder,
     write_text,
 )
+from spirillum.files.zarr_store import (
+    Stored,
+    chunk_key,
+    opened_store,
+    region_files,
+    store_files,
+    store_target,
+    write_pieces,
+)
 
 __all__ = [
     "MARK",
     "PICTURES",
+    "Stored",
     "check_replaceable",
     "checked_file",
     "checked_path",
+    "chunk_key",
     "claim_folder",
     "csv_rows",
     "file_name",
@@ -48,6 +59,7 @@ __all__ = [
     "new_file",
     "open_netcdf",
     "opened",
+    "opened_store",
     "output_folder",
     "output_target",
     "parse_toml",
@@ -56,11 +68,15 @@ __all__ = [
     "read_json",
     "read_text",
     "read_toml",
+    "region_files",
     "results_folder",
+    "store_files",
+    "store_target",
     "text_cell",
     "whole_file",
     "whole_files",
     "whole_folder",
     "write_dataset",
+    "write_pieces",
     "write_text",
 ]

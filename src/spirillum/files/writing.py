@@ -32,6 +32,7 @@ __all__ = [
     "output_folder",
     "output_target",
     "protected",
+    "synced",
     "whole_file",
     "whole_files",
     "whole_folder",
@@ -193,7 +194,7 @@ def whole_files(
                 raise _unwritable(path, error) from error
         if sync:
             for folder in folders:
-                _sync(folder)
+                synced(folder)
 
 
 def holds_own_only(folder: Path) -> bool:
@@ -229,7 +230,7 @@ def whole_folder(path: Path) -> Iterator[Path]:
             elif path.exists() or path.is_symlink():
                 raise FileExistsError(errno.EEXIST, "something of this name is there", str(path))
             part.rename(parent / path.name)
-            _sync(parent)
+            synced(parent)
     except OSError as error:
         raise _unwritable(path, error) from error
 
@@ -253,7 +254,7 @@ def _finish(part: Path, *, sync: bool) -> None:
             os.fsync(stream.fileno())
 
 
-def _sync(folder: Path) -> None:
+def synced(folder: Path) -> None:
     """Wait until the disk knows the names in a folder, where that can be asked for."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)

@@ -5,19 +5,23 @@ Kernels assign and multiply element by element: slices of arrays and `@` take se
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 
-__all__ = ["compiled", "compiled_by_rows"]
+__all__ = ["compiled", "compiled_by_rows", "rows_in_one_thread"]
 
 _THREADS: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _SHARES = 4
 """Shares of the rows for each thread: some rows take longer than others."""
+
+_alone: ContextVar[bool] = ContextVar("alone", default=False)
 
 _F = TypeVar("_F", bound=Callable[..., Any])
 
@@ -47,7 +51,7 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
         def call(*arguments: Any) -> None:
             first = arguments[places[0]]
             count = len(first[0] if isinstance(first, tuple) else first)
-            if _THREADS == 1:
+            if _THREADS == 1 or _alone.get():
                 kernel(*arguments)
                 return
 
@@ -61,6 +65,16 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
         return cast("_F", call)
 
     return decorate
+
+
+@contextmanager
+def rows_in_one_thread() -> Iterator[None]:
+    """While the block runs, rows are worked through by this thread alone: other processes have the other cores."""
+    token = _alone.set(True)
+    try:
+        yield
+    finally:
+        _alone.reset(token)
 
 
 def _rows(argument: Any, low: int, high: int) -> Any:

@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.answer import envelope
+from spirillum.crews import checked_crew
 from spirillum.errors import InputError
 from spirillum.files import output_folder, protected, results_folder, write_dataset
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.papers.registry import claims_of, predictions_of
 from spirillum.results.study_report import write_report
+from spirillum.results.study_store import stored_study
 from spirillum.studies.dataset import read_dataset
 from spirillum.studies.observed import observed_arrays
 from spirillum.studies.ranking import ranking_of
 from spirillum.studies.run import Progress, computed_study, study_fingerprint
-from spirillum.studies.spec import load_study
+from spirillum.studies.spec import LARGEST_STORED, LARGEST_STUDY, load_study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +41,8 @@ def study(
     models: Sequence[str] | None = None,
     band: bool | None = None,
     predicted: bool | None = None,
-    workers: int = 1,
+    workers: int | str = 1,
+    store: str | Path | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     progress: Progress | None = None,
@@ -57,20 +60,25 @@ def study(
             (seconds with tables, else many minutes), or not; None: what the study says.
         predicted: lay the robots down in their tubes and let them go too, over a design of gap, pitch, waiting time,
             roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
-        workers: number of processes in which they are let go.
+        workers: number of processes, or the address of a Dask scheduler, as `tcp://192.168.1.5:8786`. The results do
+            not depend on it.
+        store: instead of `output`, a Zarr store (`study.zarr`), written a region after the other: for more robots than
+            fit into memory. A rerun adds what is missing.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot, and the answers of its
             model have 95 % intervals.
         progress: called as the work goes on.
 
     Returns:
-        Dataset with dimensions `channel`, `wavelength`, `amplitude` (or `robot`), `model`, `friction`.
+        Dataset with dimensions `channel`, `wavelength`, `amplitude` (or `robot`), `model`, `friction`; that of a store
+        reads its values where they are asked for.
 
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
-    if workers < 1:
-        raise InputError(f"workers = {workers}; allowed: a whole number of at least 1")
+    crew = checked_crew(1, workers) if isinstance(workers, str) else checked_crew(workers, None)
+    if store is not None and output is not None:
+        raise InputError(f"store = {str(store)[:80]!r} together with a folder for results; allowed: one of them")
     question = paper_study() if source is None else source
     loaded = load_study(
         question,
@@ -80,20 +88,25 @@ def study(
         predicted=predicted,
         calibration=calibration,
         posterior=posterior,
+        largest=LARGEST_STUDY if store is None else LARGEST_STORED,
     )
     observed = observed_arrays(observations, loaded) if observations is not None else None
+    crew.check()
     fingerprint = study_fingerprint(loaded, observed)
     tell = progress or (lambda _what, _done, _total: None)
+    inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
+    if store is not None:
+        with protected(*inputs):
+            return stored_study(loaded, observed, fingerprint, store, crew, tell)
     if output is None:
-        return computed_study(loaded, observed, fingerprint, None, tell, workers)
+        return computed_study(loaded, observed, fingerprint, None, tell, crew)
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
-    inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     with protected(*inputs), results_folder(output, claim=claim) as folder:
         dataset = read_dataset(folder / "dataset.nc", loaded.count)
         if dataset is None or dataset.attrs.get("fingerprint") != fingerprint:
             parts = output_folder(folder / f"parts-{fingerprint[:16]}", folder)
-            dataset = computed_study(loaded, observed, fingerprint, parts, tell, workers)
+            dataset = computed_study(loaded, observed, fingerprint, parts, tell, crew)
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
         write_report(dataset, folder, tell)

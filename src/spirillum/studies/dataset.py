@@ -26,7 +26,7 @@ from spirillum.version import versions
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["assembled", "read_dataset"]
+__all__ = ["assembled", "coordinates_of", "described", "laid_out", "read_dataset"]
 
 _PAPER = "BioRob 2012"
 _PLACED = {
@@ -52,6 +52,40 @@ def assembled(
     warnings: Sequence[str],
 ) -> xr.Dataset:
     """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots laid down."""
+    dataset = laid_out(loaded, answers, band, laid_down, observed)
+    dataset.attrs = described(loaded, observed, fingerprint, warnings)
+    dataset.attrs["checksum"] = _checksum(dataset)
+    return dataset
+
+
+def described(
+    loaded: LoadedStudy, observed: ObservedArrays | None, fingerprint: str, warnings: Sequence[str]
+) -> dict[str, str]:
+    """Attributes of a dataset: the question, and what is to be known of the answer."""
+    study = loaded.study
+    references = [key for name in study.models for key in find_swimmer_model(name).references]
+    return {
+        "title": study.title,
+        "note": study.note.strip(),
+        "settings": json.dumps(loaded.question, sort_keys=True),
+        "fingerprint": fingerprint,
+        "observations": observed.source if observed else "none: nothing in this dataset is measured",
+        "claims": study.claims,
+        "references": " ".join(dict.fromkeys(references)),
+        "warnings": "\n".join(warnings),
+        "versions": versions(),
+        "Conventions": "CF-1.11",
+    }
+
+
+def laid_out(
+    loaded: LoadedStudy,
+    answers: Iterable[tuple[Task, Part]],
+    band: Sequence[tuple[BandTask, Part]] = (),
+    laid_down: Sequence[tuple[LaidDownTask, Part]] = (),
+    observed: ObservedArrays | None = None,
+) -> xr.Dataset:
+    """Answers as labelled arrays, without attributes of the whole."""
     import xarray as xr
 
     study = loaded.study
@@ -72,26 +106,11 @@ def assembled(
     data["outside"] = (data["outside"][0], data["outside"][1].astype("int8"), _attributes_of("outside"))
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
-    coordinates = _coordinates(loaded)
+    coordinates = coordinates_of(loaded)
     if laid_down:
         data |= laid_down_variables(laid_down, robots, shape)
         coordinates |= laid_down_coordinates(study.laid_down)
-    dataset = xr.Dataset(data, coords=coordinates)
-    references = [key for name in study.models for key in find_swimmer_model(name).references]
-    dataset.attrs = {
-        "title": study.title,
-        "note": study.note.strip(),
-        "settings": json.dumps(loaded.question, sort_keys=True),
-        "fingerprint": fingerprint,
-        "observations": observed.source if observed else "none: nothing in this dataset is measured",
-        "claims": study.claims,
-        "references": " ".join(dict.fromkeys(references)),
-        "warnings": "\n".join(warnings),
-        "versions": versions(),
-        "Conventions": "CF-1.11",
-    }
-    dataset.attrs["checksum"] = _checksum(dataset)
-    return dataset
+    return xr.Dataset(data, coords=coordinates)
 
 
 _ANY = "surrogatepass"
@@ -133,7 +152,8 @@ def _robot_dimensions(loaded: LoadedStudy) -> tuple[tuple[str, ...], tuple[int, 
     return ("channel", "wavelength", "amplitude"), (len(grid.channels), len(grid.wavelengths), len(grid.amplitudes))
 
 
-def _coordinates(loaded: LoadedStudy) -> dict[str, Any]:
+def coordinates_of(loaded: LoadedStudy) -> dict[str, Any]:
+    """The question of a study: names, sizes, models, readings, rates."""
     study, robots, source = loaded.study, loaded.robots, "input of the study"
     channel = [robot.channel.diameter if robot.channel else np.inf for robot in robots]
     first = "channel" if study.grid else "robot"

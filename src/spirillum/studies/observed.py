@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from spirillum.measurement.observations import (
 from spirillum.robot.robot import Robot
 from spirillum.studies.spec import LoadedStudy
 
-__all__ = ["ObservedArrays", "observed_arrays"]
+__all__ = ["ObservedArrays", "observed_arrays", "observed_at"]
 
 _NAMES = ("forward_velocity", "tail_rate", "body_rate", "motor_rate")
 
@@ -42,6 +42,14 @@ class ObservedArrays:
         """What of the observations decides the answer."""
         columns = {name: getattr(self, name).tolist() for name in _NAMES}
         return {name: [repr(value) for value in values] for name, values in columns.items()}
+
+
+def observed_at(observed: ObservedArrays, indices: np.ndarray) -> ObservedArrays:
+    """What was observed of some robots, by their indices in the flat order of the study."""
+    columns = {name: getattr(observed, name)[indices] for name in (*_NAMES, "trials")}
+    return replace(
+        observed, **columns, intervals={name: column[indices] for name, column in observed.intervals.items()}
+    )
 
 
 def observed_arrays(path: str | Path, loaded: LoadedStudy) -> ObservedArrays:

@@ -8,14 +8,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from spirillum.crews import Crew, shared_out
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.processes import as_they_come
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
+from spirillum.studies.jobs import answered, job_of
 from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_answer, without_table
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.spec import LoadedStudy
-from spirillum.studies.work import Caution, Part, Task, answer, cautions, keep, kept, summed, tasks
+from spirillum.studies.work import Task, cautions, keep, kept, summed, tasks
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
 from spirillum.version import own_version
@@ -23,7 +24,7 @@ from spirillum.version import own_version
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Progress", "computed_study", "study_fingerprint"]
+__all__ = ["Progress", "computed_study", "study_fingerprint", "warnings_of", "warnings_of_calibrations"]
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, steps done and steps in all."""
@@ -41,7 +42,7 @@ def computed_study(
     fingerprint: str,
     parts: Path | None,
     tell: Progress,
-    workers: int = 1,
+    crew: Crew | None = None,
 ) -> xr.Dataset:
     """The dataset of a study.
 
@@ -51,15 +52,57 @@ def computed_study(
         fingerprint: see `study_fingerprint`.
         parts: folder where finished parts are kept and found again; None: nowhere.
         tell: called with what is being done, steps done and steps in all.
-        workers: number of processes in which robots are laid down and let go.
+        crew: who computes; None: this process.
     """
     todo: list[Task | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
     runs = list(laid_down_tasks(loaded, len(todo)))
-    steps = len(todo) + len(runs)
-    answers: list[tuple[Task, Part]] = []
-    band: list[tuple[BandTask, Part]] = []
-    found: list[Caution] = []
+    asked: list[Task | BandTask | LaidDownTask] = [*todo, *runs]
+    found = {task.number: kept(task, parts, _leading(task, loaded)) for task in asked}
+    missing = [task for task in asked if found[task.number] is None]
+    done = len(asked) - len(missing)
+    if missing:
+        tell(missing[0].words, done, len(asked))
+    jobs = (job_of(task, loaded, observed) for task in missing)
+    at_work = _worth(missing, crew or Crew())
+    for (number, _), part in shared_out(answered, jobs, at_work, besides=_KEPT if parts else ""):
+        found[number] = part
+        keep(asked[number], part, parts)
+        done += 1
+        tell(asked[number].words, done, len(asked))
+    tell("dataset", len(asked), len(asked))
+    parts_of = {number: part for number, part in found.items() if part is not None}
+    answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, Task)]
+    band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
+    laid_down = [(task, parts_of[task.number]) for task in runs]
+    warnings = warnings_of(loaded)
+    warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
+    warnings += left_out(band)
+    warnings += without_table(loaded, runs)
+    warnings += without_answer(part for _, part in laid_down)
+    warnings += warnings_of_calibrations(loaded)
+    return assembled(loaded, answers, band, laid_down, observed, fingerprint, list(dict.fromkeys(warnings)))
+
+
+_KEPT = "; what was answered is kept"
+_SHORT = 600_000
+"""Robots in closed form below which other processes would start longer than they work."""
+
+
+def _leading(task: Task | BandTask | LaidDownTask, loaded: LoadedStudy) -> tuple[int, ...]:
+    """Sizes of the first axes of a task's arrays."""
+    return (1,) if isinstance(task, LaidDownTask) else (task.size, len(loaded.study.friction))
+
+
+def _worth(missing: Sequence[Task | BandTask | LaidDownTask], crew: Crew) -> Crew:
+    """Who computes: this process where the others would start longer than they work."""
+    quick = all(isinstance(task, Task) and find_swimmer_model(task.model).closed_form for task in missing)
+    short = quick and sum(task.size for task in missing) < _SHORT
+    return Crew() if short and crew.cluster is None else crew
+
+
+def warnings_of(loaded: LoadedStudy) -> list[str]:
+    """What to be careful about in the question, a sentence each."""
     warnings = list(loaded.cautions)
     warnings += [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
@@ -76,48 +119,14 @@ def computed_study(
         warnings += loaded.fitted.tails_warnings([loaded.robot_at(index) for index in range(loaded.count)])
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
-    warnings += uneven_models(loaded.robots, models, factors)
-    for done, task in enumerate(todo):
-        tell(task.words, done, steps)
-        part = kept(task, parts, (task.size, len(loaded.study.friction)))
-        if part is None:
-            part = _answered(task, loaded, observed)
-            keep(task, part, parts)
-        if isinstance(task, BandTask):
-            band.append((task, part))
-        else:
-            answers.append((task, part))
-            found += cautions(task, part)
-    laid_down = _laid_down(runs, parts, lambda what, done: tell(what, len(todo) + done, steps), workers)
-    tell("dataset", steps, steps)
-    warnings += summed(found, loaded.count)
-    warnings += left_out(band)
-    warnings += without_table(loaded, runs)
-    warnings += without_answer(part for _, part in laid_down)
-    for robot in loaded.robots:
-        for name in loaded.study.models:
-            warnings += [f"{robot.name}: {sentence}" for sentence in calibration_warnings(robot, name)]
-    return assembled(loaded, answers, band, laid_down, observed, fingerprint, list(dict.fromkeys(warnings)))
+    return warnings + uneven_models(loaded.robots, models, factors)
 
 
-def _answered(task: Task | BandTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> Part:
-    if isinstance(task, BandTask):
-        return task.answer(loaded.study.friction)
-    return answer(task, loaded, observed)
-
-
-def _laid_down(
-    runs: Sequence[LaidDownTask], parts: Path | None, tell: Callable[[str, int], None], workers: int
-) -> list[tuple[LaidDownTask, Part]]:
-    """The answers of robots that are laid down, in their order; each is kept as soon as it is done."""
-    found = {task.number: kept(task, parts, (1,)) for task in runs}
-    todo = [task for task in runs if found[task.number] is None]
-    done = len(runs) - len(todo)
-    if todo:
-        tell(todo[0].words, done)
-    for task, made in as_they_come(LaidDownTask.answer, todo, workers):
-        found[task.number] = made
-        keep(task, made, parts)
-        done += 1
-        tell(task.words, done)
-    return [(task, part) for task in runs if (part := found[task.number]) is not None]
+def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
+    """What to be careful about in the robots' own calibrations."""
+    return [
+        f"{robot.name}: {sentence}"
+        for robot in loaded.robots
+        for name in loaded.study.models
+        for sentence in calibration_warnings(robot, name)
+    ]

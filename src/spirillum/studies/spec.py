@@ -35,10 +35,12 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
 from spirillum.units import Hz, show
 
-__all__ = ["Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
+__all__ = ["LARGEST_STORED", "LARGEST_STUDY", "Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
 
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
+LARGEST_STORED = 500_000_000
+"""Most results of a study that is written into a store, a region after the other."""
 LARGEST_WITH_INTERVALS = 10_000
 """Most robots of a study with a posterior, each of which swims a thousand times."""
 
@@ -157,8 +159,8 @@ class Study(Section):
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         problems += self._problems_of_the_band()
-        if self.size > LARGEST_STUDY:
-            problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STUDY}")
+        if self.size > LARGEST_STORED:
+            problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STORED}")
         if problems:
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": "\n".join(problems)})
         return self
@@ -250,6 +252,7 @@ def load_study(
     predicted: bool | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
+    largest: int = LARGEST_STUDY,
 ) -> LoadedStudy:
     """Load a study and its robots.
 
@@ -261,6 +264,7 @@ def load_study(
         predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot.
+        largest: most results that it may ask for.
 
     Raises:
         InputError: if the study or one of its robots is wrong.
@@ -276,6 +280,9 @@ def load_study(
     if isinstance(study, list):
         more = f" (and {len(study) - 1} more)" if len(study) > 1 else ""
         raise InputError(f"{name}: {study[0]}{more}", [f"{name}: {problem}" for problem in study])
+    if study.size > largest:
+        store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
+        raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
     sources = list(study.grid.channels.values()) if study.grid else study.robots or []
     robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
     _check_drives(study, sources, robots, name)

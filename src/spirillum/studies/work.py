@@ -29,6 +29,7 @@ from spirillum.swimming.steady import requirements, swim
 
 __all__ = [
     "AT_RATES",
+    "BLOCK",
     "REASONS",
     "WITH_INTERVALS",
     "Caution",
@@ -91,7 +92,8 @@ REASONS = (
 )
 """Why a robot of a study has no answer; the index in this list is the value in the dataset."""
 
-_BLOCK = 100_000
+BLOCK = 25_000
+"""Robots of a task in closed form: a fifth of a second of work."""
 _SMALL_BLOCK = 8  # of a model that solves for the flow: some seconds of work between two signs of life
 _PLACED_BLOCK = 64  # of one that solves for body and walls once, for all tails at one place
 
@@ -153,7 +155,7 @@ def tasks(loaded: LoadedStudy) -> Iterator[Task]:
 
 def _block_size(model: SwimmerModel) -> int:
     if model.closed_form:
-        return _BLOCK
+        return BLOCK
     return _PLACED_BLOCK if model.placed else _SMALL_BLOCK
 
 

@@ -1,0 +1,204 @@
+"""Zarr stores (format 3): encoded in memory by the library, written whole by this program, a region after the other.
+
+A region is one chunk of every variable. The library writes any region that it is asked to, also one that shares a
+chunk with another, and one of two writers then loses what it wrote: so regions are checked here.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from spirillum.errors import InputError
+from spirillum.files.locks import private_folder
+from spirillum.files.names import checked_path
+from spirillum.files.writing import synced
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Stored", "chunk_key", "opened_store", "region_files", "store_files", "store_target", "write_pieces"]
+
+_SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "async.concurrency": 1}
+_LEVEL = 1
+"""Of compression: faster than a disk, and floats gain nothing from more."""
+
+Place = Sequence[tuple[int, int]]
+"""First place, and that behind the last, along each dimension."""
+
+
+class Stored(NamedTuple):
+    """A variable of a store."""
+
+    dimensions: tuple[str, ...]
+    shape: tuple[int, ...]
+    chunk: tuple[int, ...]
+    dtype: str
+    """`float64`, `int8`, `int32` or `str`."""
+    attributes: Mapping[str, Any]
+
+
+def store_target(path: str | Path) -> Path:
+    """The folder of a store, by its name.
+
+    Raises:
+        InputError: if it does not end in `.zarr`, or is a file.
+    """
+    found = checked_path(path, "a Zarr store, for example study.zarr")
+    if found.suffix != ".zarr":
+        raise InputError(f"store = {str(path)[:200]!r}; allowed: a name that ends in .zarr, for example study.zarr")
+    return found
+
+
+def store_files(
+    variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], attributes: Mapping[str, Any]
+) -> dict[str, bytes]:
+    """Files of a store without its regions: what is in it, and the variables that stand in it whole.
+
+    Args:
+        variables: name to variable.
+        values: those that are written whole now, such as coordinates.
+        attributes: of the whole.
+
+    Returns:
+        Paths within the store with what stands there; the one that says what is in it comes last.
+    """
+    import zarr
+    from zarr.storage import MemoryStore
+
+    found: dict[str, Any] = {}
+    store = MemoryStore(found)
+    with zarr.config.set(_SETTINGS), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # metadata at one place: read by all, and not yet part of the format
+        group = zarr.create_group(store=store, zarr_format=3, attributes=dict(attributes))
+        for name, item in variables.items():
+            array = _created(group, name, item)
+            if name in values:
+                given = values[name]
+                array[...] = given.astype(object) if item.dtype == "str" else given
+        zarr.consolidate_metadata(store)
+    last = found.pop("zarr.json")
+    return {key: buffer.to_bytes() for key, buffer in {**found, "zarr.json": last}.items()}
+
+
+def region_files(
+    variables: Mapping[str, Stored], values: Mapping[str, np.ndarray[Any, Any]], places: Mapping[str, Place]
+) -> dict[str, bytes]:
+    """Files of one region of some variables, in their order.
+
+    Args:
+        variables: name to variable, of the whole store.
+        values: what stands in the region.
+        places: where the region lies.
+
+    Raises:
+        ValueError: if a region is not one whole chunk.
+    """
+    import zarr
+    from zarr.storage import MemoryStore
+
+    found: dict[str, Any] = {}
+    with zarr.config.set(_SETTINGS):
+        group = zarr.create_group(store=MemoryStore(found), zarr_format=3)
+        for name, given in values.items():
+            item, place = variables[name], places[name]
+            _check_whole_chunk(name, item, place)
+            _created(group, name, item)[tuple(slice(*ends) for ends in place)] = given
+    keys = [chunk_key(name, variables[name], places[name]) for name in values]
+    return {key: found[key].to_bytes() for key in keys}
+
+
+def chunk_key(name: str, item: Stored, place: Place) -> str:
+    """Path within the store of the chunk that a region of a variable is."""
+    return "/".join([name, "c", *(str(start // part) for (start, _), part in zip(place, item.chunk, strict=True))])
+
+
+def _check_whole_chunk(name: str, item: Stored, place: Place) -> None:
+    """Refuse a region that is not exactly one chunk, or the last one along a dimension.
+
+    Raises:
+        ValueError: if it is not.
+    """
+    for (start, stop), size, part in zip(place, item.shape, item.chunk, strict=True):
+        if start % part or stop != min(start + part, size):
+            raise ValueError(f"{name}: places {start} to {stop} of {size} are no chunk of {part}")
+
+
+def _created(group: Any, name: str, item: Stored) -> Any:
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    if item.dtype == "str":
+        kind: dict[str, Any] = {"dtype": str}
+    else:
+        kind = {"dtype": item.dtype, "fill_value": np.nan if item.dtype == "float64" else 0}
+    return group.create_array(
+        name,
+        shape=item.shape,
+        chunks=tuple(max(part, 1) for part in item.chunk),
+        dimension_names=item.dimensions,
+        attributes=_plain(item.attributes),
+        compressors=[ZstdCodec(level=_LEVEL), Crc32cCodec()],
+        **kind,
+    )
+
+
+def _plain(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes as JSON has them."""
+    return {key: item.tolist() if isinstance(item, np.ndarray) else item for key, item in attributes.items()}
+
+
+def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
+    """Write files that belong together into a claimed folder: all are on the disk before the first takes its place.
+
+    Args:
+        folder: the folder, claimed and locked by this process.
+        pieces: paths within it with what stands there, in the order in which they take their places.
+
+    Raises:
+        InputError: where a folder in it is a link, or cannot be written to.
+        OSError: if there is no space.
+    """
+    with private_folder(folder) as hidden:
+        for number, content in enumerate(pieces.values()):
+            with (hidden / str(number)).open("wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+        *earlier, last = enumerate(pieces)
+        for numbered in (earlier, [last]):
+            for number, key in numbered:
+                place = folder / key
+                _made(folder, place.parent)
+                (hidden / str(number)).replace(place)
+            for parent in {(folder / key).parent for _, key in numbered}:
+                synced(parent)
+
+
+def _made(folder: Path, inner: Path) -> None:
+    """Make a folder within another, no part of which may lead out of it."""
+    for part in reversed([inner, *inner.parents][: len(inner.relative_to(folder).parts)]):
+        if part.is_symlink():
+            raise InputError(f"{part} is a link; allowed: a folder of its own in {folder}")
+        with suppress(FileExistsError):
+            part.mkdir()
+
+
+def opened_store(folder: Path) -> xr.Dataset:
+    """A store as a dataset, whose values are read where they are asked for.
+
+    Raises:
+        InputError: if it cannot be read.
+    """
+    import xarray as xr
+
+    try:
+        found: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True, decode_times=False)
+    except Exception as error:  # a damaged store raises whatever the libraries meet first
+        raise InputError(f"{folder} cannot be read ({str(error)[:120]}); allowed: a store of this study") from error
+    return found

@@ -1,0 +1,180 @@
+"""A study written as a Zarr store, a region after the other: a kill leaves whole regions, and a rerun adds the rest."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from spirillum.answer import envelope
+from spirillum.crews import Crew, shared_out
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.files import opened_store, read_json, results_folder, store_files, store_target, write_pieces
+from spirillum.studies.dataset import described
+from spirillum.studies.estimate import estimate_of, is_large
+from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.regions import Region, layout_of
+from spirillum.studies.run import warnings_of, warnings_of_calibrations
+from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.stored import Plan, encoded_region, plan_of, region_jobs
+from spirillum.studies.work import Caution, summed
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["store_answer", "stored_study"]
+
+_MARK = "study.json"
+_NOTES = "notes"
+
+Tell = Callable[[str, int, int], None]
+
+
+def stored_study(
+    loaded: LoadedStudy,
+    observed: ObservedArrays | None,
+    fingerprint: str,
+    store: str | Path,
+    crew: Crew,
+    tell: Tell,
+) -> xr.Dataset:
+    """Compute what a store lacks of a study, and open it.
+
+    Args:
+        loaded: the study with its robots.
+        observed: observed rates and speeds of its robots, if any.
+        fingerprint: hash of question and program.
+        store: folder that ends in `.zarr`.
+        crew: who computes; this process alone writes.
+        tell: called with what is being done, regions done and regions in all.
+
+    Raises:
+        InputError: for a band or robots laid down, which need all regions at once; a folder of something else; a
+            cluster that is not there, or is lost; a missing library.
+    """
+    required("zarr", "a store", "cluster")
+    if loaded.study.band or loaded.study.predicted:
+        asked = "band" if loaded.study.band else "predicted"
+        raise InputError(f"{asked} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
+    mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
+    claim = {"mark": _MARK, "content": mark, "what": "study"}
+    with results_folder(store_target(store), claim=claim) as folder:
+        plan = plan_of(loaded, observed, layout_of(loaded))
+        attributes = {**described(loaded, observed, fingerprint, []), "coordinates": " ".join(plan.others)}
+        missing = _missing(plan, folder)
+        if not _finished(folder) or missing:
+            _begin(plan, folder, attributes)
+            if is_large(loaded):
+                tell(estimate_of(loaded, observed, plan, len(missing), crew).words, 0, 0)
+            _write_regions(_Work(loaded, observed, plan, folder), missing, crew, tell)
+            notes = [read_json(folder / plan.note(region), "a note of a study") for region in plan.layout.regions()]
+            _finish(loaded, plan, folder, attributes, notes)
+        shutil.rmtree(folder / _NOTES, ignore_errors=True)
+        return opened_store(folder)
+
+
+class _Work:
+    """What regions are written of, and where."""
+
+    def __init__(self, loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, folder: Path) -> None:
+        self.loaded, self.observed, self.plan, self.folder = loaded, observed, plan, folder
+
+
+def _missing(plan: Plan, folder: Path) -> list[Region]:
+    """Regions of which a file is not there, or, until the study is finished, their note."""
+    finished = _finished(folder)
+
+    def lacks(region: Region) -> bool:
+        keys = [key for key in plan.pieces(region) if not (finished and key.startswith(_NOTES))]
+        return not all(_there(folder / key) for key in reversed(keys))
+
+    return [region for region in plan.layout.regions() if lacks(region)]
+
+
+def _there(path: Path) -> bool:
+    with suppress(OSError):
+        return path.stat().st_size > 0
+    return False
+
+
+def _finished(folder: Path) -> bool:
+    """Whether all has been written, the warnings too."""
+    with suppress(InputError, KeyError, TypeError):
+        return bool(read_json(folder / "zarr.json", "a store")["attributes"]["finished"] == "yes")
+    return False
+
+
+def _begin(plan: Plan, folder: Path, attributes: Mapping[str, Any]) -> None:
+    """Write what is in the store, unless it stands there."""
+    files = store_files(plan.variables, plan.coordinates, {**attributes, "finished": "no"})
+    changed = {key: content for key, content in files.items() if not _same(folder / key, content)}
+    if changed:
+        write_pieces(folder, changed)
+
+
+def _same(path: Path, content: bytes) -> bool:
+    with suppress(OSError):
+        return path.stat().st_size == len(content) and path.read_bytes() == content
+    return False
+
+
+def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tell) -> None:
+    plan, total = work.plan, work.plan.layout.count
+    models = ", ".join(work.loaded.study.models)
+    done, here = total - len(missing), [""]
+
+    def at_work(words: str) -> None:
+        if words != here[0]:
+            here[0] = words
+            tell(f"{models}: {words}", done, total)
+
+    jobs = region_jobs(work.loaded, work.observed, plan, missing)
+    for job, files in shared_out(encoded_region, jobs, crew, besides="; what was written is kept", tell=at_work):
+        write_pieces(work.folder, files)
+        done += 1
+        tell(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
+
+
+def _finish(
+    loaded: LoadedStudy,
+    plan: Plan,
+    folder: Path,
+    attributes: Mapping[str, Any],
+    notes: Sequence[Mapping[str, Any]],
+) -> None:
+    """Write what is known once all regions are there."""
+    warnings = warnings_of(loaded)
+    warnings += summed((Caution(*item) for note in notes for item in note["cautions"]), loaded.count)
+    warnings += warnings_of_calibrations(loaded)
+    own = {
+        "warnings": "\n".join(dict.fromkeys(warnings)),
+        "unanswered": sum(int(note["unanswered"]) for note in notes),
+        "finished": "yes",
+    }
+    files = store_files(plan.variables, plan.coordinates, {**attributes, **own})
+    write_pieces(folder, {"zarr.json": files["zarr.json"]})
+
+
+def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
+    """What a study has written into a store, as `spirillum study --store` prints it.
+
+    Args:
+        dataset: the study.
+        store: its folder.
+    """
+    content = {
+        "title": dataset.attrs["title"],
+        "folder": str(store),
+        "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        "results": int(np.prod(dataset["outside"].shape)),
+        "unanswered": int(dataset.attrs["unanswered"]),
+        "observations": dataset.attrs["observations"],
+    }
+    warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
+    return envelope("study-store", json.loads(json.dumps(content)), warnings)

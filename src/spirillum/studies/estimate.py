@@ -1,0 +1,156 @@
+"""How long a large study takes, and how much memory: from a few of its robots, or measured rates, before it starts."""
+
+from __future__ import annotations
+
+import tracemalloc
+from time import process_time
+from typing import NamedTuple
+
+from spirillum.crews import ESTIMATE, Crew
+from spirillum.fluid.registry import find_swimmer_model, quickest
+from spirillum.processes import AHEAD, memory_in_use
+from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.regions import Layout, Region, cut, layout_of
+from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.stored import Plan, RegionJob, encoded_region, plan_of
+from spirillum.studies.work import groups
+
+__all__ = ["Estimate", "estimate_of", "is_large"]
+
+_FEW, _MORE = 200, 2000
+"""Robots that are computed to know the rest of them."""
+_SECONDS_PER_ROBOT, _SECONDS_PER_PLACE = 0.3, 40.0
+"""Of a model that solves for the flow, and of a place of one that solves for the walls, too; measured for the paper's
+robot, with the second resolution for the error estimate."""
+_SOLVING_MEMORY = 4e8
+"""Of a solve of body and walls, bytes; measured for the paper's robot."""
+
+
+class Estimate(NamedTuple):
+    """What a study will take."""
+
+    results: int
+    seconds: float
+    """Of all its workers together, over their number."""
+    memory: float
+    """Most that all processes of this machine take together, bytes."""
+    disk: float
+    """Of the results before compression, bytes."""
+    workers: int
+
+    @property
+    def words(self) -> str:
+        """The estimate in a line."""
+        return (
+            f"{ESTIMATE}{self.results} results, about {_duration(self.seconds)} with {self.workers} "
+            f"worker{'' if self.workers == 1 else 's'}, {self.memory / 1e6:.0f} MB of memory here, at most "
+            f"{self.disk / 1e6:.0f} MB on disk"
+        )
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{max(seconds, 1.0):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+_LARGE = 20_000
+"""Robots in closed form below which a study takes less time than its estimate."""
+
+
+def is_large(loaded: LoadedStudy) -> bool:
+    """Whether a study takes long enough to be estimated."""
+    models = [find_swimmer_model(name) for name in loaded.study.models]
+    return loaded.count * len(models) >= _LARGE or not all(model.closed_form for model in models)
+
+
+class _Cost(NamedTuple):
+    seconds: float
+    memory: float
+    encoded: float
+    """Size of a region's files, bytes."""
+
+
+def estimate_of(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, missing: int, crew: Crew) -> Estimate:
+    """Estimate what is missing of a study.
+
+    Args:
+        loaded: the study.
+        observed: observed rates and speeds of its robots, if any.
+        plan: what its store holds.
+        missing: number of regions that are to be computed.
+        crew: who computes.
+    """
+    cost = _tried(loaded, observed, plan) if missing else _Cost(0.0, 0.0, 0.0)
+    workers, base = crew.size, memory_in_use()
+    alone = crew.cluster is None and (workers == 1 or missing < 2)
+    here = base + (cost.memory if alone else AHEAD * workers * cost.encoded)
+    others = 0 if alone or crew.cluster is not None else min(workers, missing)
+    return Estimate(
+        results=loaded.study.size,
+        seconds=missing * cost.seconds / workers,
+        memory=here + others * (base + cost.memory),
+        disk=plan.bytes_of_results,
+        workers=workers,
+    )
+
+
+def _tried(loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan) -> _Cost:
+    """Time and memory of a region of full size."""
+    layout = plan.layout
+    first = next(layout.regions())
+    slow = [name for name in loaded.study.models if not _is_quick(name, loaded)]
+    if slow:
+        placed = any(find_swimmer_model(name).placed for name in slow)
+        seconds = len(slow) * first.size * _SECONDS_PER_ROBOT + (_SECONDS_PER_PLACE if placed else 0.0)
+        readings = len(loaded.study.friction)
+        return _Cost(seconds, _SOLVING_MEMORY, plan.bytes_of_results / loaded.count / readings * first.size)
+    small, large = (_job(loaded, observed, layout, first, count) for count in (_FEW, _MORE))
+    few = _timed(small)
+    if large.region.size == small.region.size:
+        return few
+    more = _timed(large)
+    share = (first.size - small.region.size) / (large.region.size - small.region.size)
+    return _Cost(*(max(a + (b - a) * share, a) for a, b in zip(few, more, strict=True)))
+
+
+def _is_quick(name: str, loaded: LoadedStudy) -> bool:
+    """Whether a model answers in closed form, or from a table."""
+    model = find_swimmer_model(name)
+    if model.closed_form:
+        return True
+    one = _single(loaded)
+    return all(quickest(model, batch) is not model for _, batch in groups(one))
+
+
+def _single(loaded: LoadedStudy) -> LoadedStudy:
+    layout = layout_of(loaded)
+    first = next(layout.regions())
+    return cut(loaded, None, layout, first._replace(stop=tuple(start + 1 for start in first.start)))[0]
+
+
+def _job(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, first: Region, count: int) -> RegionJob:
+    """The first region, with about so many of its robots."""
+    stop = list(first.stop)
+    for axis in range(len(stop)):
+        behind = 1
+        for size in stop[axis + 1 :]:
+            behind *= size
+        stop[axis] = min(stop[axis], max(count // behind, 1))
+    own, seen = cut(loaded, observed, layout, first._replace(stop=tuple(stop)))
+    plan = plan_of(own, seen, layout_of(own))
+    return RegionJob(next(plan.layout.regions()), own, seen, plan)
+
+
+def _timed(job: RegionJob) -> _Cost:
+    """One region: once to be warm, once for the time, once for the memory."""
+    encoded_region(job)
+    begun = process_time()
+    files = encoded_region(job)
+    seconds = process_time() - begun
+    tracemalloc.start()
+    try:
+        encoded_region(job)
+        return _Cost(seconds, float(tracemalloc.get_traced_memory()[1]), float(sum(map(len, files.values()))))
+    finally:
+        tracemalloc.stop()

@@ -1,0 +1,247 @@
+"""Large studies: one process, several, a cluster, or runs that were killed leave the same bytes."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import spirillum as sp
+from spirillum.crews import checked_crew
+from spirillum.files import Stored, region_files, write_pieces
+from spirillum.results import study_store
+from spirillum.studies import regions, run
+
+AT = "0.5 Hz", "1 Hz"
+GRID = {
+    "title": "Many tails",
+    "models": ["sbt", "rft"],
+    "friction": ["none", "rotor"],
+    "assumed_motor_rates": list(AT),
+    "grid": {
+        "channels": {"wide": "biorob2012-wide", "narrow": "biorob2012-narrow"},
+        "wavelengths": [f"{value} mm" for value in (15, 20, 25, 30, 35)],
+        "amplitudes": ["1.5 mm", "2 mm", "2.5 mm", "3 mm", "40 mm"],
+    },
+}
+
+
+@pytest.fixture
+def small_regions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two rows of amplitudes a region, so that there are six: some smaller than the others."""
+    monkeypatch.setattr(regions, "BLOCK", 11)
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """All files with what stands in them, as a hash."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def same(one: xr.Dataset, other: xr.Dataset) -> None:
+    """Same values, names, units and warnings; coordinates are the same, too."""
+    assert set(one.variables) == set(other.variables)
+    assert set(one.coords) == set(other.coords)
+    for name in one.variables:
+        np.testing.assert_array_equal(one[name].values, other[name].values)
+        assert one[name].dims == other[name].dims
+        assert one[name].attrs["units"] == other[name].attrs["units"]
+    assert {key for key in one.attrs if one.attrs[key] != other.attrs.get(key)} <= {"checksum"}
+
+
+@pytest.mark.usefixtures("small_regions")
+def test_store_holds_what_the_study_answers(tmp_path: Path) -> None:
+    stored = sp.study(GRID, store=tmp_path / "study.zarr")
+    same(sp.study(GRID), stored)
+    assert stored.attrs["finished"] == "yes"
+    assert stored.attrs["unanswered"] == int(np.count_nonzero(stored["outside"])) > 0
+    assert not (tmp_path / "study.zarr" / "notes").exists()
+    chunks = [path for path in (tmp_path / "study.zarr" / "outside" / "c").rglob("*") if path.is_file()]
+    assert len(chunks) == 6
+
+
+def test_store_of_a_list_with_observed_rates_holds_what_the_study_answers(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, planted: Any
+) -> None:
+    """Robots of several kinds, one without a motor, in blocks of two."""
+    monkeypatch.setattr(regions, "BLOCK", 2)
+    names = ["biorob2012-wide", "ecoli.toml", "biorob2012-narrow"]
+    (tmp_path / "ecoli.toml").write_text('extends = "biorob2012-wide"\nname = "other"\n[tail]\nwavelength = "20 mm"\n')
+    listed = {"models": ["rft"], "robots": [names[0], str(tmp_path / names[1]), names[2]]}
+    one = {**GRID, "grid": {**GRID["grid"], "wavelengths": ["25 mm"], "amplitudes": ["2.5 mm"]}}  # type: ignore[dict-item]
+    seen = planted(one, "rft", "rotor", 1e-5)
+    whole = sp.study(listed, observations=seen)
+    same(whole, sp.study(listed, observations=seen, store=tmp_path / "study.zarr"))
+    assert np.isfinite(whole["forward_velocity_at_observed_rate"]).any()
+
+
+@pytest.mark.usefixtures("small_regions")
+def test_interrupted_store_adds_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store, whole = tmp_path / "part.zarr", tmp_path / "whole.zarr"
+    sp.study(GRID, store=whole)
+    done: list[int] = []
+    original, most = study_store.write_pieces, 4
+
+    def counted(folder: Path, pieces: dict[str, bytes]) -> None:
+        if any(key.startswith("notes") for key in pieces):
+            if len(done) == most:
+                raise KeyboardInterrupt
+            done.append(1)
+        original(folder, pieces)
+
+    monkeypatch.setattr(study_store, "write_pieces", counted)
+    with pytest.raises(KeyboardInterrupt):
+        sp.study(GRID, store=store)
+    assert xr.open_zarr(store, chunks=None).attrs["finished"] == "no"
+    next(path for path in (store / "tail_torque" / "c").rglob("*") if path.is_file()).unlink()
+    most = 99
+    sp.study(GRID, store=store)
+    assert len(done) == 7
+    assert tree(store) == tree(whole)
+    done.clear()
+    sp.study(GRID, store=store)
+    assert done == []
+
+
+def test_processes_answer_what_one_answers(
+    small: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the work is long enough to be shared out; studies below that stay in one process."""
+    monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
+    alone = sp.study(small, output=tmp_path / "one")
+    monkeypatch.setattr(run, "_SHORT", 0)
+    assert sp.study(small, output=tmp_path / "two", workers=2).identical(alone)
+    assert (tmp_path / "one" / "dataset.nc").read_bytes() == (tmp_path / "two" / "dataset.nc").read_bytes()
+
+
+def test_slices_that_share_a_chunk_are_refused() -> None:
+    """Zarr itself would take them, and one of two writers would lose what it wrote."""
+    stored = {"a": Stored(("x",), (10,), (4,), "float64", {})}
+    for start, stop in ((0, 4), (4, 8), (8, 10)):
+        assert list(region_files(stored, {"a": np.zeros(stop - start)}, {"a": [(start, stop)]})) == [
+            f"a/c/{start // 4}"
+        ]
+    for start, stop in ((0, 3), (1, 5), (0, 8), (8, 9)):
+        with pytest.raises(ValueError, match="no chunk"):
+            region_files(stored, {"a": np.zeros(stop - start)}, {"a": [(start, stop)]})
+
+
+def test_a_store_never_leads_out_of_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "study.zarr").mkdir()
+    (tmp_path / "study.zarr" / "a").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(sp.InputError, match="is a link"):
+        write_pieces(tmp_path / "study.zarr", {"a/c/0": b"x"})
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+def test_what_cannot_be_stored_gets_a_sentence(tmp_path: Path) -> None:
+    tiny = {"models": ["rft"], "robots": ["biorob2012-wide"]}
+    store = tmp_path / "study.zarr"
+    sp.study(tiny, store=store)
+    before = tree(store)
+    (tmp_path / "foreign.zarr").mkdir()
+    (tmp_path / "foreign.zarr" / "zarr.json").write_text("{}")
+    (tmp_path / "file.zarr").write_text("precious")
+    for path, words in (
+        (store, "another study"),
+        (tmp_path / "foreign.zarr", "unknown origin"),
+        (tmp_path / "file.zarr", "is a file"),
+        (tmp_path / "study.nc", "ends in .zarr"),
+    ):
+        with pytest.raises(sp.InputError, match=words):
+            sp.study({**tiny, "friction": ["none"]}, store=path)
+    with pytest.raises(sp.InputError, match="one of them"):
+        sp.study(tiny, store=store, output=tmp_path / "out")
+    walled = {"models": ["tube"], "robots": ["biorob2012-wide"], "band": True}
+    with pytest.raises(sp.InputError, match="band with a store"):
+        sp.study(walled, store=tmp_path / "band.zarr")
+    many = {**GRID, "grid": {**GRID["grid"], "wavelengths": [f"{1 + n / 1e6} cm" for n in range(60_000)]}}  # type: ignore[dict-item]
+    with pytest.raises(sp.InputError, match=r"at most 5000000, or 500000000 in a store"):
+        sp.study(many)
+    assert tree(store) == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit on the size of files")
+def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(tmp_path: Path) -> None:
+    """A limit on the size of files stands for the disk."""
+    (tmp_path / "study.toml").write_text('models = ["rft"]\nrobots = ["biorob2012-wide"]\n')
+    limited = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000));"
+        "from spirillum.cli import main; main(['study', 'study.toml', '--store', 'study.zarr'])"
+    )
+    found = subprocess.run([sys.executable, "-c", limited], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert found.returncode == 2
+    (line,) = [line for line in found.stderr.splitlines() if not line.startswith("estimate")]
+    assert line == "spirillum: no space is left for the output; allowed: a place with space"
+    again = sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr")
+    assert np.isfinite(again["forward_velocity"]).all()
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "here", "tcp://"])
+def test_a_scheduler_that_is_not_there_gets_a_sentence(address: str, tmp_path: Path) -> None:
+    begun = time.monotonic()
+    with pytest.raises(sp.InputError, match=r"cluster = .*allowed: the address of a Dask scheduler"):
+        sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr", workers=address)
+    assert time.monotonic() - begun < 60.0
+    with pytest.raises(sp.InputError, match="workers = 0"):
+        checked_crew(0, None)
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    """A scheduler with two small workers, each a process of its own."""
+    from distributed import LocalCluster
+
+    made = LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, memory_limit=0, silence_logs=50)
+    yield made
+    made.close()
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.usefixtures("small_regions")
+def test_a_cluster_leaves_the_bytes_of_one_process(tmp_path: Path) -> None:
+    """Two workers of one thread each, here in this process; workers of more threads are refused."""
+    from distributed import LocalCluster
+
+    sp.study(GRID, store=tmp_path / "whole.zarr")
+    words: list[str] = []
+    settings = {"processes": False, "dashboard_address": None, "silence_logs": 50}
+    with LocalCluster(n_workers=2, threads_per_worker=1, **settings) as made:
+        address = made.scheduler_address
+        sp.study(GRID, store=tmp_path / "a.zarr", workers=address, progress=lambda what, *_: words.append(what))
+    assert tree(tmp_path / "a.zarr") == tree(tmp_path / "whole.zarr")
+    assert any("2 workers on 1 machine" in line for line in words)
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=2, **settings) as wide,
+        pytest.raises(sp.InputError, match="has 2 threads; allowed: workers of one thread"),
+    ):
+        sp.study(GRID, store=tmp_path / "b.zarr", workers=wide.scheduler_address)
+    with LocalCluster(n_workers=0, **settings) as empty, pytest.raises(sp.InputError, match="has no workers"):
+        sp.study(GRID, store=tmp_path / "c.zarr", workers=empty.scheduler_address)
+    assert not (tmp_path / "b.zarr").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.usefixtures("small_regions")
+def test_a_cluster_whose_workers_are_killed_leaves_the_same_bytes(tmp_path: Path, cluster: Any) -> None:
+    """Each of them once, while the study runs; another takes its place."""
+    sp.study(GRID, store=tmp_path / "whole.zarr")
+    victims = iter(list(cluster.workers.values()))
+
+    def kill(what: str, done: int, _total: int) -> None:
+        if done and (victim := next(victims, None)) is not None:
+            os.kill(victim.pid, signal.SIGKILL)
+
+    sp.study(GRID, store=tmp_path / "killed.zarr", workers=cluster.scheduler_address, progress=kill)
+    assert tree(tmp_path / "killed.zarr") == tree(tmp_path / "whole.zarr")
