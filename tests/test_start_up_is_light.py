@@ -28,6 +28,7 @@ HEAVY = (
     "websockets",
     "control",
     "gymnasium",
+    "mcap",
 )
 
 

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from spirillum.dynamics.settling import settle as settle
     from spirillum.dynamics.simulation import simulate as simulate
     from spirillum.errors import InputError as InputError
+    from spirillum.exports.recording import Recording as Recording
+    from spirillum.exports.recording import export_run as export_run
     from spirillum.exports.write import Export as Export
     from spirillum.exports.write import export as export
     from spirillum.fields.flow import Flow as Flow
@@ -92,6 +94,7 @@ _HOME = {
     "Prediction": "spirillum.swimming.prediction",
     "Prepared": "spirillum.swimming.preparation",
     "Ranking": "spirillum.calibration.ranking",
+    "Recording": "spirillum.exports.recording",
     "Resistance": "spirillum.fluid.resistance",
     "Robot": "spirillum.robot.robot",
     "RobotBatch": "spirillum.robot.batch",
@@ -107,6 +110,7 @@ _HOME = {
     "control_system": "spirillum.interfaces.python_control",
     "design": "spirillum.designs.design",
     "export": "spirillum.exports.write",
+    "export_run": "spirillum.exports.recording",
     "feasibility": "spirillum.measurement.feasibility",
     "film": "spirillum.view.scene3d.film",
     "flow": "spirillum.fields.flow",

@@ -15,9 +15,9 @@ from spirillum.cli.options import (
     ImposedFlow,
     Json,
     Pitch,
-    RobotArgument,
     Settings,
     complete_auto_models,
+    complete_robots,
     starting,
 )
 
@@ -29,9 +29,17 @@ def _complete_units(incomplete: str) -> list[str]:
 
 
 def export(
-    robot: RobotArgument,
+    robot: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=complete_robots, help="A preset's name or a TOML file; for .mcap a run of `simulate` (.nc)."
+        ),
+    ],
     target: Annotated[
-        Path, typer.Argument(metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), or .fmu.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
+        ),
     ],
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     fineness: Annotated[float, typer.Option(help="Triangles along every line, relative to the normal ones.")] = 1.0,
@@ -55,10 +63,14 @@ def export(
     gap: Gap = None,
     pitch: Pitch = None,
     flow: ImposedFlow = None,
+    film: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="For .mcap: a film of the run, whose frames it holds too.")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="For .mcap: time of the run over time of that film.")] = 1.0,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Write the robot for a printer, Blender, ParaView, MuJoCo, or a simulator of robots or systems.
+    """Write the robot for a printer, Blender, ParaView, MuJoCo, a simulator of robots or systems; a run for Foxglove.
 
     Example: `spirillum export biorob2012-wide robot.stl`
     """
@@ -66,6 +78,16 @@ def export(
     from spirillum.errors import InputError
     from spirillum.exports.write import export as answer
 
+    if target.suffix == ".mcap":
+        from spirillum.exports.recording import export_run
+
+        given = (unit, model, friction, calibration, gap, pitch, flow, settings, sidecar or None, no_sidecar or None)
+        if any(item is not None for item in given):
+            raise InputError("options of a robot with .mcap; allowed: --film and --speed, for the run has its robot")
+        renderer.show(export_run(robot, target, film=film, speed=speed).to_dict(), json=json)
+        return
+    if film is not None:
+        raise InputError(f"--film with {target.suffix or 'no ending'}; allowed: only with .mcap")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
     found = answer(
