@@ -21,8 +21,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
-    "sphinx.ext.mathjax",
-    "from_the_code",
+    "for_the_pages",
 ]
 if not tags.has("check"):  # noqa: F821 - Sphinx gives it; listings take longest and can hold no warning
     extensions.append("sphinx.ext.viewcode")
@@ -33,6 +32,8 @@ myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 myst_dmath_double_inline = True
 
+root_doc = "contents"
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = "spirillum"
 html_static_path = ["_static"]

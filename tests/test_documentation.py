@@ -34,8 +34,10 @@ def _loaded(path: Path) -> ModuleType:
 
 
 BLOCKS = _loaded(DOCS / "run_blocks.py")
+LISTINGS = _loaded(DOCS / "write_listings.py")
 RUNNABLE = [page for page in BLOCKS.pages() if re.search(r"^```(console|pycon)$", page.read_text("utf-8"), re.M)]
 WITH_SLOW = [page for page in RUNNABLE if "<!-- slow -->" in page.read_text("utf-8")]
+LISTED = [page for page in sorted(DOCS.glob("*.md")) if LISTINGS.MARKED.search(page.read_text("utf-8"))]
 WRITTEN = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))]
 
 
@@ -100,11 +102,48 @@ def test_every_mentioned_option_of_a_command_exists(page: Path) -> None:
 
 def test_commands_page_has_every_command() -> None:
     text = (DOCS / "commands.md").read_text("utf-8")
-    listed = {f"spirillum {name}" for name in re.findall(r"^```\{command-options\} (.*)$", text, re.M)}
+    listed = {f"spirillum {name}" for name in re.findall(r"^<!-- written: command-options (.*) -->$", text, re.M)}
     leaves = {path for path, command in COMMANDS.items() if not hasattr(command, "commands")}
     same = {"spirillum robot check"}
     assert listed | same == leaves
     assert _options("spirillum robot check") == _options("spirillum robot show")
+
+
+def _listings(page: Path, *, dear: bool) -> None:
+    for mark in LISTINGS.MARKED.finditer(page.read_text("utf-8")):
+        if (mark[1] in LISTINGS.DEAR) == dear:
+            now = LISTINGS.written(mark[1], mark[2])
+            assert mark[4] == now, (
+                f"{page.name}: {mark[1]}{mark[2]} is old: python docs/write_listings.py docs/{page.name}"
+            )
+
+
+@pytest.mark.parametrize("page", LISTED, ids=lambda path: path.stem)
+def test_listings_are_what_the_code_says(page: Path) -> None:
+    _listings(page, dear=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", LISTED, ids=lambda path: path.stem)
+def test_listings_of_datasets_are_what_the_code_says(page: Path) -> None:
+    _listings(page, dear=True)
+
+
+def test_every_table_of_the_robot_file_is_listed() -> None:
+    from spirillum.robot.robot import Robot
+
+    text = (DOCS / "robot-file.md").read_text("utf-8")
+    tables = set(re.findall(r"<!-- written: robot-fields (\w+) -->", text))
+    plain = {name for name in Robot.model_fields if f"| `{name}` |" in text}
+    assert tables - {"root"} | plain == set(Robot.model_fields)
+
+
+def test_pages_read_without_being_built() -> None:
+    """No directive, role or empty link outside the page of contents and the reference of the modules."""
+    for page in WRITTEN:
+        if page.name not in ("contents.md", "api.md"):
+            text = re.sub(r"^```(?!\{).*?^```$", "", page.read_text("utf-8"), flags=re.M | re.S)
+            assert re.findall(r"^(?:```|:::)\{.*|\{\w+(?::\w+)?\}`|\[\]\(", text, re.M) == [], page.name
 
 
 def test_commands_page_has_every_column_of_observations() -> None:
@@ -127,7 +166,7 @@ def test_reference_covers_every_room_and_shared_module() -> None:
 
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.stem)
 def test_references_into_the_code_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\{py:\w+\}`([\w.]+)`", page.read_text("utf-8")):
+    for target in re.findall(r"`(spirillum(?:\.\w+){2,})`", page.read_text("utf-8")):
         parts = target.split(".")
         found: Any = importlib.import_module(parts[0])
         for place, name in enumerate(parts[1:], 2):

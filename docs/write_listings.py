@@ -1,0 +1,399 @@
+"""Write the tables and listings that the pages show from the code itself, as plain Markdown.
+
+    python docs/write_listings.py [--pictures] [PAGE...]
+
+Each stands between `<!-- written: NAME ARGUMENTS -->` and `<!-- end of written -->`; NAME is an entry of `LISTINGS`. A
+test compares them with what the code says now. `--pictures` also draws the pictures of the paper's study and of the
+tutorial, in `docs/images/study/`.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import typing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Literal
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from spirillum.robot.fields import Section
+from spirillum.robot.meanings import meanings
+from spirillum.units import Kind, for_people, show
+
+DOCS = Path(__file__).parent
+ROOT = DOCS.parent
+MARKED = re.compile(r"(?<=<!-- written: )([\w-]+)((?: [^\n]*?)?)( -->\n\n)(.*?)(?=\n<!-- end of written -->)", re.S)
+DEAR = ("study-variables", "simulation-variables", "sweep-variables", "claims", "study-figure")
+"""Listings for which robots have to swim: a slow test compares them."""
+
+Rows = Iterable[Sequence[str]]
+
+
+def table(header: Sequence[str], rows: Rows) -> str:
+    """A table in Markdown; cells may hold `code` spans."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join(f"| {' | '.join(_cell(cell) for cell in line)} |\n" for line in lines)
+
+
+def _cell(text: str) -> str:
+    return " ".join(str(text).split()).replace("|", "\\|").replace("<", "&lt;") or " "
+
+
+def _parts_of(annotation: Any) -> Iterator[Any]:
+    """An annotation and everything inside it."""
+    yield annotation
+    for part in typing.get_args(annotation):
+        yield from _parts_of(part)
+
+
+def _metadata(info: FieldInfo) -> Iterator[Any]:
+    yield from info.metadata
+    for part in _parts_of(info.annotation):
+        yield from getattr(part, "__metadata__", ())
+
+
+def _kind(info: FieldInfo) -> Kind | None:
+    return next((item for item in _metadata(info) if isinstance(item, Kind)), None)
+
+
+def _section(info: FieldInfo) -> type[Section] | None:
+    for part in _parts_of(info.annotation):
+        if isinstance(part, type) and issubclass(part, BaseModel):
+            return typing.cast("type[Section]", part)
+    return None
+
+
+def _bounds(info: FieldInfo) -> tuple[Any, Any]:
+    low = next((item.ge for item in _metadata(info) if hasattr(item, "ge")), None)
+    high = next((item.le for item in _metadata(info) if hasattr(item, "le")), None)
+    return low, high
+
+
+def _allowed(info: FieldInfo, kind: Kind | None) -> str:
+    if kind is not None:
+        return f"{kind.allowed}, as in `{kind.example}`".replace("**", "^")
+    for item in _metadata(info):
+        schema = getattr(item, "json_schema", None) or {}
+        if "anyOf" in schema:
+            return ", or ".join(_choice(choice) for choice in schema["anyOf"])
+    words = [arg for part in _parts_of(info.annotation) if typing.get_origin(part) is Literal for arg in part.__args__]
+    if words:
+        return ", ".join(f"`{word}`" for word in words)
+    return _allowed_number_or_text(info)
+
+
+def _choice(schema: dict[str, Any]) -> str:
+    """One of several forms of a field, from its JSON schema."""
+    if "minimum" in schema:
+        return f"{schema['minimum']:g} to {schema['maximum']:g}"
+    words = schema.get("enum", [schema["const"]] if "const" in schema else ["true", "false"])
+    return ", ".join(f"`{word}`" for word in words)
+
+
+def _allowed_number_or_text(info: FieldInfo) -> str:
+    low, high = _bounds(info)
+    if low is not None:
+        return f"{low:g} to {high:g}"
+    parts = list(_parts_of(info.annotation))
+    if bool in parts:
+        return "`true`, `false`"
+    if dict in (typing.get_origin(part) for part in parts):
+        return "a table"
+    if tuple in (typing.get_origin(part) for part in parts) and float in parts:
+        return "two numbers"
+    return "a list of texts" if {list, tuple} & {typing.get_origin(part) for part in parts} else "text"
+
+
+def _default(info: FieldInfo, kind: Kind | None) -> str:
+    if info.is_required():
+        return "required"
+    value = info.get_default(call_default_factory=True)
+    if value is None:
+        return "unset"
+    ends = value if isinstance(value, tuple) else (value,)
+    if kind is not None and ends and all(isinstance(end, float) for end in ends):
+        unit = for_people(kind.unit)
+        return " to ".join(show(end, unit) if unit != kind.unit else f"{end:g} {kind.unit}" for end in ends)
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, (tuple, list)):
+        return ", ".join(f"`{item}`" for item in value) or "empty"
+    return f"{value:g}" if isinstance(value, float) else f"`{value}`" if value != "" else "empty"
+
+
+def field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str, str, str]]:
+    """Field, unit, default, allowed and meaning of every field of a table, its own tables included."""
+    words = meanings(model)
+    for name, info in model.model_fields.items():
+        path = f"{prefix}{name}"
+        below = _section(info)
+        if below is not None:
+            yield from field_rows(below, f"{path}.")
+            continue
+        kind = _kind(info)
+        unit = kind.unit.replace("**", "^") if kind else "–"
+        yield f"`{path}`", unit, _default(info, kind), _allowed(info, kind), words.get(name, "")
+
+
+_HEADER = ("Field", "SI unit", "Default", "Allowed", "Meaning")
+
+
+def robot_fields(wanted: str) -> str:
+    """The fields of one table of the robot file; `root` for the fields outside tables."""
+    from spirillum.robot.robot import Robot
+
+    if wanted == "root":
+        plain = {name: info for name, info in Robot.model_fields.items() if _section(info) is None}
+        words = meanings(Robot)
+        rows = [(f"`{name}`", "–", _default(info, None), "text", words.get(name, "")) for name, info in plain.items()]
+        extends = "What the file starts from; its own fields are laid over it."
+        return table(
+            _HEADER, [*rows, ("`extends`", "–", "unset", "a preset, or a robot file beside this one", extends)]
+        )
+    model = _section(Robot.model_fields[wanted])
+    if model is None:
+        raise ValueError(f"{wanted} is no table of the robot file")
+    return table(_HEADER, field_rows(model, "calibration.<model>." if wanted == "calibration" else f"{wanted}."))
+
+
+def study_fields() -> str:
+    """The fields of a study file."""
+    from spirillum.studies.spec import Study
+
+    return table(_HEADER, field_rows(Study, ""))
+
+
+def derived_quantities() -> str:
+    """What `spirillum robot show` adds to the fields."""
+    from spirillum import load
+
+    derived = load("biorob2012-wide").derived()
+    return table(("Quantity", "Unit", "Meaning"), [(f"`{n}`", item.unit, item.meaning) for n, item in derived.items()])
+
+
+def quantities() -> str:
+    """The quantities of a prediction."""
+    from spirillum.swimming.answer import STEADY
+
+    rows = [(f"`{item.name}`", item.unit, item.meaning, item.source) for item in STEADY]
+    return table(("Quantity", "Unit", "Meaning", "Source"), rows)
+
+
+@lru_cache(maxsize=1)
+def _studied() -> Any:
+    from spirillum import study
+
+    return study()
+
+
+@lru_cache(maxsize=1)
+def _observed() -> Any:
+    """A study with observations, for the names of its variables; its single row is made up and shown nowhere."""
+    from spirillum import study
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "observations.csv"
+        path.write_text("channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz\n40,25,2.5,1\n", encoding="utf-8")
+        return study(observations=path)
+
+
+def _variables(dataset: Any, names: Iterable[str]) -> str:
+    rows = []
+    for name in names:
+        about = dataset[name].attrs
+        over = ", ".join(f"`{dimension}`" for dimension in dataset[name].dims) or "single value"
+        source = str(about.get("source", "–"))
+        rows.append((f"`{name}`", str(about.get("units", "–")), over, str(about["long_name"]), source))
+    return table(("Variable", "Unit", "Over", "Meaning", "Source"), rows)
+
+
+def study_variables(which: str) -> str:
+    """The variables of `dataset.nc`: `coordinates`, `results`, `observed`."""
+    plain = _studied()
+    if which == "coordinates":
+        return _variables(plain, map(str, plain.coords))
+    if which == "observed":
+        observed = _observed()
+        return _variables(observed, [str(name) for name in observed.data_vars if name not in plain.data_vars])
+    return _variables(plain, map(str, plain.data_vars))
+
+
+def outside_flags() -> str:
+    """The values of the variable `outside`."""
+    from spirillum.studies.work import REASONS
+
+    return table(("Value", "Meaning"), [(str(value), f"`{flag}`") for value, flag in enumerate(REASONS)])
+
+
+def simulation_variables(motion: str) -> str:
+    """The variables that `simulate` writes, `free` or `held`."""
+    from spirillum import simulate
+
+    dataset = simulate("biorob2012-wide", timing={"duration": "0.1 s"}, motion=motion)
+    return _variables(dataset, [str(name) for name in (*dataset.coords, *dataset.data_vars)])
+
+
+def sweep_variables() -> str:
+    """The variables that `magnetic-sweep` writes."""
+    from spirillum import magnetic_sweep
+
+    dataset = magnetic_sweep("magnetic-helix", ["1 Hz"], turns=4.0)
+    return _variables(dataset, [str(name) for name in (*dataset.coords, *dataset.data_vars)])
+
+
+def claims() -> str:
+    """The verdicts of the paper's study without observations."""
+    from spirillum.papers.registry import claims_of
+
+    rows = [(c.claim, c.paper, c.computed, c.verdict, c.reason) for c in claims_of(_studied())]
+    return table(("Statement", "Paper", "Computed", "Verdict", "Reason"), rows)
+
+
+def study_figure(name: str) -> str:
+    """A figure of the paper's study with its own caption; `--pictures` draws it."""
+    from spirillum.papers.registry import figures_of
+
+    picture = figures_of(_studied())[name]
+    return f"![{picture.alternative}](images/study/{name}.png)\n\n*{picture.caption.replace('*', '')}*\n"
+
+
+def models() -> str:
+    """The hydrodynamic models with what they cost."""
+    from spirillum.fluid.registry import MODELS
+
+    rows = [
+        (
+            f"`{model.name}`",
+            ", ".join(f"`{part}`" for part in model.parts),
+            "along and about the axis" if model.axial_only else "all",
+            model.known_error,
+        )
+        for model in MODELS.values()
+    ]
+    return table(("Model", "Parts", "Entries", "Known error"), rows)
+
+
+def reference_list() -> str:
+    """Every reference under its key, to which pages link."""
+    from spirillum.citations import REFERENCES
+
+    return "\n".join(f"## {key}\n\n{text}\n" for key, text in sorted(REFERENCES.items()))
+
+
+def command_options(words: str) -> str:
+    """Arguments and options of a command."""
+    import typer
+
+    from spirillum.cli.app import app
+
+    command: Any = typer.main.get_command(app)
+    for name in words.split():
+        command = command.commands[name]
+    rows = [row for parameter in command.params if (row := _parameter(parameter)) is not None]
+    return table(("Argument or option", "Default", "Meaning"), rows)
+
+
+def _parameter(parameter: Any) -> tuple[str, str, str] | None:
+    if "--help" in parameter.opts:
+        return None
+    option = parameter.opts[0].startswith("-")
+    names = ", ".join(f"`{name}`" for name in parameter.opts) if option else f"`{parameter.name.upper()}`"
+    if option and not parameter.is_flag and parameter.metavar:
+        names += f" `{parameter.metavar}`"
+    value = parameter.default
+    shown = "required" if parameter.required else "–" if value in (None, False) else f"`{value}`"
+    return names, shown, parameter.help or ""
+
+
+def file_listing(path: str) -> str:
+    """A file of the project as it is."""
+    kind = {".toml": "toml", ".py": "python"}[Path(path).suffix]
+    return f"```{kind}\n{(ROOT / path).read_text(encoding='utf-8').strip()}\n```\n"
+
+
+def function_listing(words: str) -> str:
+    """A function of a script: `PATH NAME`."""
+    import ast
+
+    path, name = words.split()
+    text = (ROOT / path).read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    found = next(item for item in tree.body if isinstance(item, ast.FunctionDef) and item.name == name)
+    return f"```python\n{ast.get_source_segment(text, found)}\n```\n"
+
+
+def part_listing(words: str) -> str:
+    """The lines of a script from one that starts with a word to the next that starts with another: `PATH FROM TO`."""
+    path, first, last = words.split()
+    lines = (ROOT / path).read_text(encoding="utf-8").splitlines()
+    start = next(n for n, line in enumerate(lines) if line.startswith(first))
+    end = next(n for n, line in enumerate(lines) if n >= start and line.startswith(last))
+    return "```toml\n" + "\n".join(lines[start : end + 1]) + "\n```\n"
+
+
+LISTINGS: dict[str, Callable[..., str]] = {
+    "robot-fields": robot_fields,
+    "study-fields": study_fields,
+    "derived-quantities": derived_quantities,
+    "quantities": quantities,
+    "study-variables": study_variables,
+    "study-figure": study_figure,
+    "outside-flags": outside_flags,
+    "simulation-variables": simulation_variables,
+    "sweep-variables": sweep_variables,
+    "claims": claims,
+    "models": models,
+    "reference-list": reference_list,
+    "command-options": command_options,
+    "file": file_listing,
+    "function": function_listing,
+    "part": part_listing,
+}
+
+
+def written(name: str, arguments: str) -> str:
+    """What stands between two marks now."""
+    return LISTINGS[name](*([arguments.strip()] if arguments.strip() else []))
+
+
+def renewed(text: str) -> str:
+    """A page with all its listings written anew."""
+    return MARKED.sub(lambda mark: f"{mark[1]}{mark[2]}{mark[3]}{written(mark[1], mark[2])}", text)
+
+
+def draw_pictures() -> None:
+    """Draw the figures of the paper's study, and run the tutorial, whose picture its page shows."""
+    import runpy
+
+    from spirillum.papers.registry import figures_of
+
+    folder = DOCS / "images" / "study"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, picture in figures_of(_studied()).items():
+        picture.figure().savefig(folder / f"{name}.png", dpi=110)
+    script = ROOT / "examples" / "tutorial.py"
+    with TemporaryDirectory() as where:
+        sys.argv = [str(script), where]
+        runpy.run_path(str(script), run_name="__main__")
+        shutil.copy(Path(where) / "advance-per-turn.png", folder / "tutorial.png")
+
+
+def main(arguments: list[str]) -> None:
+    """Write the listings of the named pages, or of all."""
+    if "--pictures" in arguments:
+        draw_pictures()
+    names = [Path(name) for name in arguments if not name.startswith("-")]
+    for page in names or sorted(DOCS.glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        if (new := renewed(text)) != text:
+            page.write_text(new, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
