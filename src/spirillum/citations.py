@@ -53,6 +53,15 @@ REFERENCES: dict[str, str] = {
     "smith1957": (
         "O. J. M. Smith. Closer control of loops with dead time. Chemical Engineering Progress 53:217-219, 1957."
     ),
+    "magill1965": (
+        "D. T. Magill. Optimal adaptive estimation of sampled stochastic processes. "
+        "IEEE Transactions on Automatic Control 10:434-439, 1965."
+    ),
+    "astrom2006": "K. J. Astrom and T. Hagglund. Advanced PID Control. ISA, 2006.",
+    "skogestad2003": (
+        "S. Skogestad. Simple analytic rules for model reduction and PID controller tuning. "
+        "Journal of Process Control 13:291-309, 2003."
+    ),
     "tsypkin1984": "Y. Z. Tsypkin. Relay Control Systems. Cambridge University Press, 1984.",
     "honda1996": (
         "T. Honda, K. I. Arai and K. Ishiyama. Micro swimming mechanisms propelled by external magnetic fields. "

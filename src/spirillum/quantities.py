@@ -228,6 +228,8 @@ _CONTROLLED = (
     Quantity("estimated_position", "x", "m", "x of the body's mid-length as estimated at the decision", _CONTROL),
     Quantity("estimated_position_error", "", "m", "standard deviation of the estimated place", _CONTROL),
     Quantity("estimated_speed", "", "m/s", "estimated speed at the robot's own duty in fluid at rest", _CONTROL),
+    Quantity("estimated_friction_factor", "", "1", "estimated friction over that of the robot file", _CONTROL),
+    Quantity("estimated_gap_factor", "", "1", "estimated gap at the start over that of the robot file", _CONTROL),
     Quantity("estimated_drift", "", "m/s", "estimated speed at which the fluid carries the robot", _CONTROL),
 )
 

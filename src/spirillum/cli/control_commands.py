@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot, placement_from
+from spirillum.cli.motion_commands import check_movie
 from spirillum.cli.options import Eccentricity, Ends, Gap, Json, Pitch, RobotArgument, Settings, starting
 
 if TYPE_CHECKING:
@@ -36,7 +37,12 @@ def _complete_controllers(incomplete: str) -> list[str]:
 def control(
     robot: RobotArgument,
     task: Annotated[
-        str, typer.Option(autocompletion=_complete_tasks, help="What to do: stop-at.", rich_help_panel=_TASK)
+        str,
+        typer.Option(
+            autocompletion=_complete_tasks,
+            help="What to do: stop-at, hold-speed, ride-out, save-battery.",
+            rich_help_panel=_TASK,
+        ),
     ] = "stop-at",
     at: Annotated[
         str | None,
@@ -46,7 +52,11 @@ def control(
     ] = None,
     tolerance: Annotated[
         str | None,
-        typer.Option(metavar="LENGTH", help="stop-at: how far beside it is good, else 1mm.", rich_help_panel=_TASK),
+        typer.Option(metavar="LENGTH", help="How far beside place or course is good.", rich_help_panel=_TASK),
+    ] = None,
+    speed: Annotated[
+        str | None,
+        typer.Option(metavar="VELOCITY", help="The other tasks: speed along the robot's way.", rich_help_panel=_TASK),
     ] = None,
     duration: Annotated[
         str | None,
@@ -80,6 +90,10 @@ def control(
             rich_help_panel=_LAB,
         ),
     ] = None,
+    learn: Annotated[
+        bool,
+        typer.Option("--learn", help="Estimate friction and gap beside the controller.", rich_help_panel=_LAB),
+    ] = False,
     live: Annotated[
         bool, typer.Option("--live", help="Run at the pace of the clock on the wall.", rich_help_panel=_LAB)
     ] = False,
@@ -100,6 +114,10 @@ def control(
         Path | None,
         typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
     ] = None,
+    movie: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Film the run too: .mp4 or .gif (extra `3d`).", rich_help_panel=_PICTURES),
+    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -113,7 +131,9 @@ def control(
 
     target = None if output is None else netcdf_target(output)
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
-    fields = {"at": at, "tolerance": tolerance, "duration": duration}
+    if movie is not None:
+        check_movie(movie)
+    fields = {"at": at, "tolerance": tolerance, "speed": speed, "duration": duration}
     place = placement_from(gap, eccentricity, pitch, None, ends, None)
     with protected(lab), renderer.progress_bar(quiet=json) as progress:
         found = answer(
@@ -124,6 +144,7 @@ def control(
             seed=seed,
             seeds=seeds,
             plant={"model": model, "placement": place, "roughness": roughness},
+            learn=learn,
             workers=workers,
             live=live,
             progress=progress,
@@ -137,6 +158,11 @@ def control(
 
             save_as(control_figure(found), picture)
             files["plot"] = str(plot)
+        if movie is not None:
+            from spirillum.view.scene3d.film import film
+
+            film(found.dataset, movie, progress=progress)
+            files["movie"] = str(movie)
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
     if found.interrupted:
         raise KeyboardInterrupt

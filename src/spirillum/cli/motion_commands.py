@@ -27,7 +27,7 @@ from spirillum.cli.options import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["magnetic_sweep", "simulate"]
+__all__ = ["check_movie", "magnetic_sweep", "simulate"]
 
 _START = "Start of a free run, and its tube"
 _TIMING = "Timing and remote"
@@ -183,7 +183,7 @@ def simulate(
 
         check_column(column)
     if movie is not None:
-        _check_movie(movie)
+        check_movie(movie)
     loaded = loaded_robot(robot, settings)
     with renderer.progress_bar(quiet=json) as progress:
         dataset = answer(
@@ -223,7 +223,7 @@ def simulate(
         raise KeyboardInterrupt
 
 
-def _check_movie(movie: Path) -> None:
+def check_movie(movie: Path) -> None:
     """Refuse a film that cannot be written before anything is computed."""
     from spirillum.extras import required
     from spirillum.files import output_target

@@ -11,8 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.answer import envelope, quantity
-from spirillum.controllers.jobs import Job, Outcome, begun, done, finished, named, plant_of
+from spirillum.controllers.bank import Bank
+from spirillum.controllers.drawn_plant import plant_of
+from spirillum.controllers.jobs import Job, Outcome, begun, done, finished, named
 from spirillum.controllers.lab import Lab
+from spirillum.controllers.learner import Learner
+from spirillum.controllers.learning import Learnt
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.registry import task_of
 from spirillum.controllers.run_record import record
@@ -47,6 +51,8 @@ class Control:
     lab: Lab
     controller: str
     seed: int
+    speed: float
+    """Predicted while the drive is on, m/s, with its sign."""
     drawn: Drawn
     """What the robot and the flow of this run were, and the controller did not know."""
     score: Score
@@ -55,6 +61,8 @@ class Control:
     """The run, see `docs/control.md`."""
     late: float | None
     """Live: by how much the last decision was late against the clock on the wall, s."""
+    learnt: Learnt | None
+    """What was learnt of the robot by the end of the run, if that was asked for and there was enough to see."""
     scores: Scores | None
     """Over many seeds, if they were asked for."""
     warnings: tuple[str, ...]
@@ -88,6 +96,8 @@ class Control:
             "drawn": {
                 "friction_factor": self.drawn.friction,
                 "gap_factor": self.drawn.gap,
+                "voltage_factor": self.drawn.voltage,
+                "viscosity_factor": self.drawn.viscosity,
                 "pulse": None
                 if pulse is None
                 else {
@@ -96,6 +106,7 @@ class Control:
                     "velocity": quantity(pulse.velocity, "m/s"),
                 },
             },
+            "learnt": None if self.learnt is None else self.learnt.to_dict(),
             "lab": {name: _fields(getattr(self.lab, name)) for name in Lab.model_fields},
             "scores": None if self.scores is None else self.scores.to_dict(),
         }
@@ -111,6 +122,7 @@ def control(
     seed: int = 0,
     seeds: int = 0,
     plant: Mapping[str, Any] | None = None,
+    learn: bool = False,
     workers: int = 1,
     live: bool = False,
     progress: Progress | None = None,
@@ -125,6 +137,7 @@ def control(
         seed: of the run: what is unknown of the robot, the flow, and all errors of sensors and remote.
         seeds: score all controllers over so many seeds, from `seed` on, too; 0: none.
         plant: further arguments of `spirillum.Plant`: `model`, `placement`, `roughness`, ...
+        learn: estimate friction and gap beside the controller, from camera and meter, by a bank of robots.
         workers: processes for the scores.
         live: run at the pace of the clock on the wall.
         progress: told what is being computed, how much is done, and of how much.
@@ -139,15 +152,16 @@ def control(
     _check(controller, seed, seeds, workers, arguments)
     own = load(robot)
     said: list[str] = []
-    nominal = plant_of(own, arguments, Drawn(1.0, 1.0, None), progress)
+    nominal = plant_of(own, arguments, Drawn(1.0, 1.0), progress)
     if there.pulse.velocity and nominal.model != "tube":
         said.append(f"model '{nominal.model}' knows no flow: there is no pulse")
         there = there.model_copy(update={"pulse": there.pulse.model_copy(update={"velocity": 0.0})})
     brief = asked.brief(nominal, there, progress)
     job = Job(own, arguments, asked, brief, controller, seed)
     moving, found = begun(job)
+    learner = Learner(there, Bank(own, there.unknown, arguments, progress)) if learn else None
     pace = _Pace() if live else None
-    run = done(job, moving, found, pace=pace, progress=progress)
+    run = done(job, moving, found, learner, pace=pace, progress=progress)
     scores = None
     if seeds and not run.interrupted:
         outcomes = _all(job, seeds, workers, progress)
@@ -171,11 +185,13 @@ def control(
         lab=there,
         controller=controller,
         seed=seed,
+        speed=brief.speed,
         drawn=found,
         score=score,
         run=run,
         dataset=dataset,
         late=None if pace is None else pace.late,
+        learnt=None if learner is None else learner.found,
         scores=scores,
         warnings=(*moving.steady.warnings, *said, *_of(run)),
     )

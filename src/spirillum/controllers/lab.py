@@ -141,6 +141,10 @@ class Unknown(Options):
     """The true friction is the robot's times a factor from 1/this to this, evenly in its logarithm; 1: known."""
     gap_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 1.0
     """The same for the gap at which the robot is laid down; 1: known."""
+    voltage_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.0
+    """Relative standard deviation of the battery's voltage."""
+    viscosity_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.0
+    """Relative standard deviation of the fluid's viscosity; silicone oil changes by some 2 % a kelvin."""
 
 
 class Lab(Section):

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
 from spirillum.controllers.stop_task import StopAtTask
 from spirillum.controllers.task import Task
 from spirillum.errors import InputError, did_you_mean
 
 __all__ = ["TASKS", "task_of"]
 
-TASKS: dict[str, type[Task]] = {task.kind: task for task in (StopAtTask,)}
+TASKS: dict[str, type[Task]] = {task.kind: task for task in (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask)}
 """Tasks by their kinds."""
 
 

@@ -11,7 +11,7 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.dynamics.attributes import run_attributes
 from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.start import reach_of
-from spirillum.quantities import attributes
+from spirillum.quantities import QUANTITIES, attributes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +54,9 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
     data["command"] = ("decision_time", np.array([d.duty for d in run.decisions]), attributes("command"))
     for name in run.decisions[-1].estimate if run.decisions else ():
         values = np.array([d.estimate.get(name, np.nan) for d in run.decisions])
-        data[name] = ("decision_time", values, attributes(name))
+        base, _, end = name.rpartition("_") if name.endswith(("_low", "_high")) else (name, "", "")
+        meaning = f"{QUANTITIES[base].meaning}, {end} end of its 95 % interval" if end else None
+        data[name] = ("decision_time", values, attributes(base, meaning=meaning))
     coords = {
         "time": ("time", np.array([m.time for m in moments]), attributes("time")),
         "frame_time": ("frame_time", np.array([time for time, _ in run.frames]), attributes("frame_time")),

@@ -78,8 +78,8 @@ class Scores:
                     "good": one.score.good,
                     "error": quantity(one.score.error, unit),
                     "energy": quantity(one.score.energy, "J"),
-                    "friction_factor": one.friction,
-                    "gap_factor": one.gap,
+                    "friction_factor": one.drawn.friction,
+                    "gap_factor": one.drawn.gap,
                     "ended": one.ended,
                 }
                 for one in self.outcomes

@@ -20,6 +20,8 @@ _STREAMS = ("unknown", "pulse", "camera", "meter", "remote")
 _SEEN = ("position", "heading", "body_angle", "tail_phase")
 _LATEST = 0.9
 """Share of a run in which a pulse may begin."""
+_FARTHEST = 4.0
+"""Standard deviations beyond which nothing is drawn."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +48,12 @@ class Drawn:
     """Factor of the friction."""
     gap: float
     """Factor of the gap at the start."""
-    pulse: FlowPulse | None
+    pulse: FlowPulse | None = None
     """Flow; None: none."""
+    voltage: float = 1.0
+    """Factor of the battery's voltage."""
+    viscosity: float = 1.0
+    """Factor of the viscosity."""
 
 
 def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
@@ -59,9 +65,12 @@ def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
         seed: of the run.
         duration: of the run, s.
     """
-    factors = np.exp(
-        np.log([unknown.friction_factor, unknown.gap_factor]) * _stream(seed, "unknown").uniform(-1.0, 1.0, 2)
-    )
+    stream = _stream(seed, "unknown")
+    factors = np.exp(np.log([unknown.friction_factor, unknown.gap_factor]) * stream.uniform(-1.0, 1.0, 2))
+    others = 1.0 + np.clip(stream.standard_normal(2), -_FARTHEST, _FARTHEST) * [
+        unknown.voltage_error,
+        unknown.viscosity_error,
+    ]
     place, side = _stream(seed, "pulse").uniform(size=2)
     found = None
     if pulse.velocity and pulse.duration > 0.0:
@@ -69,7 +78,7 @@ def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
         if start is None:
             start, velocity = _LATEST * duration * place, velocity if side < 0.5 else -velocity
         found = FlowPulse(float(start), float(start) + pulse.duration, float(velocity))
-    return Drawn(float(factors[0]), float(factors[1]), found)
+    return Drawn(float(factors[0]), float(factors[1]), found, float(others[0]), float(others[1]))
 
 
 class Senses:

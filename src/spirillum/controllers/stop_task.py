@@ -13,12 +13,11 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
 from spirillum.controllers.stopping import KnowingStop, StopAt, Timed
-from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy
+from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy, positive
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.dynamics.start import reach_of
 from spirillum.errors import InputError
-from spirillum.robot.arguments import refusal
 from spirillum.robot.fields import LengthOrZero, SignedLength
 from spirillum.units import show
 
@@ -32,12 +31,6 @@ _SPARE, _SETTLING = 2.5, 5.0
 """A run lasts so many times as long as the robot of the file needs, and s."""
 
 
-def _positive(value: float) -> float:
-    if value <= 0.0:
-        raise refusal(f"= {value:g} m; allowed: above 0 m")
-    return value
-
-
 class StopAtTask(Task):
     """Go to a place and stop, with a remote that knows on and off."""
 
@@ -47,7 +40,7 @@ class StopAtTask(Task):
 
     at: SignedLength | None = None
     """x of the body's mid-length at which to stop; it starts at 0. It has to be given."""
-    tolerance: Annotated[LengthOrZero, AfterValidator(_positive)] = 1e-3
+    tolerance: Annotated[LengthOrZero, AfterValidator(lambda value: positive(value, "m"))] = 1e-3
     """How far beside it is good."""
 
     @property
@@ -89,7 +82,7 @@ class StopAtTask(Task):
         error = float(run.moments[-1].pose.position[0]) - self.goal
         return Score(error, abs(error) <= self.tolerance and not run.ended, energy(run))
 
-    def target(self, time: Samples) -> tuple[Samples, float]:
+    def target(self, time: Samples, way: float) -> tuple[Samples, float]:  # noqa: ARG002 - one interface for all tasks
         """The place, throughout."""
         return np.full_like(time, self.goal), self.tolerance
 

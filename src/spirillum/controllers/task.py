@@ -19,7 +19,7 @@ from spirillum.dynamics.plant import Plant
 from spirillum.robot.arguments import Options, refusal
 from spirillum.robot.fields import Time
 
-__all__ = ["CONTROLLERS", "FEEDBACK", "Brief", "Score", "Task", "carried_by_flow", "energy"]
+__all__ = ["CONTROLLERS", "FEEDBACK", "Brief", "Score", "Task", "carried_by_flow", "energy", "positive"]
 
 FEEDBACK = "feedback"
 CONTROLLERS = {
@@ -35,6 +35,13 @@ _LONGEST = 24.0 * 3600.0
 def _length(value: float) -> float:
     if not 0.1 <= value <= _LONGEST:
         raise refusal(f"= {value:g} s; allowed: 0.1 to {_LONGEST:g} s")
+    return value
+
+
+def positive(value: float, unit: str) -> float:
+    """A check of values above 0; `unit` is for the sentence of an error."""
+    if not value > 0.0:
+        raise refusal(f"= {value:g} {unit}; allowed: above 0 {unit}")
     return value
 
 
@@ -103,8 +110,8 @@ class Task(Options):
         """Judge a run."""
 
     @abstractmethod
-    def target(self, time: Samples) -> tuple[Samples, float]:
-        """For figures: the place that is aimed at, m, (n,), NaN where none is, and what is good around it, m."""
+    def target(self, time: Samples, way: float) -> tuple[Samples, float]:
+        """For figures: the place that is aimed at, m, (n,), by a robot that swims along `way`, and what is good, m."""
 
 
 def energy(run: LoopRun) -> float:

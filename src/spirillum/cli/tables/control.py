@@ -34,9 +34,11 @@ def table(answer: Answer, console: Console) -> None:
     if answer["late"] is not None:
         late = " ".join(friendly(answer["late"]["value"], "s"))
         console.print(f"live: at the end {late} behind the clock", highlight=False)
+    if answer["learnt"] is not None:
+        console.print(f"learnt: {_learnt(answer['learnt'], answer['drawn'])}", highlight=False, soft_wrap=True)
     if answer["scores"] is not None:
         _scores(answer["scores"], answer["error"]["unit"], console)
-    for name in ("plot", "file"):
+    for name in ("plot", "movie", "file"):
         if answer.get(name):
             console.print(
                 f"{'run' if name == 'file' else name} in {escape(answer[name])}", highlight=False, soft_wrap=True
@@ -63,6 +65,15 @@ def _drawn(drawn: Answer) -> str:
         velocity = _words(pulse["velocity"])
         said.append(f"flow of {velocity} from {pulse['start']['value']:.3g} s to {pulse['end']['value']:.3g} s")
     return ", ".join(said)
+
+
+def _learnt(learnt: Answer, drawn: Answer) -> str:
+    """Factors with their intervals beside the truth."""
+    said = []
+    for name, item in learnt.items():
+        words = f"{item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not told"
+        said.append(f"{name.replace('_factor', '')} times {words}, in truth {drawn[name]:.3g}")
+    return "; ".join(said)
 
 
 def _scores(scores: Answer, unit: str, console: Console) -> None:

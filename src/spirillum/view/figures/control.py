@@ -39,7 +39,7 @@ def control_figure(control: Control) -> Figure:
         panels = sheet.panels[:, 0]
         add_letters(panels)
         time = control.dataset["time"].values
-        target, around = control.task.target(time)
+        target, around = control.task.target(time, float(np.sign(control.speed)))
         scale = Scale.of(control.dataset["position"].values[:, 0], "m")
         _places(panels[0], control, scale, target, around)
         _rests(panels[1], control, target, around)

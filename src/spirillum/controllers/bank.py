@@ -1,0 +1,132 @@
+"""A bank of robots that differ in what is unknown and do what the real one is told: the model of the learner.
+
+The unknown factors of friction and gap are u, v in [-1, 1] as powers of their largest factors. The members stand at
+Chebyshev's points of both; between them a polynomial in u and v interpolates what they do (Trefethen 2013). Two more
+members, in the middle, tell how all of it changes with the battery's voltage and the fluid's viscosity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.controllers.drawn_plant import plant_of
+from spirillum.controllers.lab import Unknown
+from spirillum.controllers.sensors import Drawn
+from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.plant import Moment, Plant
+from spirillum.robot.robot import Robot
+
+__all__ = ["QUANTITIES_OF_BANK", "Bank", "Paths", "interpolation", "points"]
+
+QUANTITIES_OF_BANK = ("tail_phase", "body_angle", "motor_current", "battery_voltage")
+"""What is kept of every member."""
+_POINTS = 5
+_STEP = 0.1
+"""Between two moments that are kept, s."""
+_CHANGE = 0.02
+"""Relative change of voltage and of viscosity of the two members in the middle."""
+
+
+def points(factor: float) -> Samples:
+    """Powers of a factor at which members stand: Chebyshev's points of [-1, 1], or 0 where nothing is unknown."""
+    return -np.cos(np.pi * np.arange(_POINTS) / (_POINTS - 1)) if factor > 1.0 else np.zeros(1)
+
+
+def interpolation(nodes: Samples, at: Samples) -> Samples:
+    """Weights of the values at nodes for the polynomial through them, (at, nodes)."""
+    found = np.ones((at.size, nodes.size))
+    for number, node in enumerate(nodes):
+        for other in np.delete(nodes, number):
+            found[:, number] *= (at - other) / (node - other)
+    return found
+
+
+@dataclass(frozen=True)
+class Paths:
+    """What the members did; SI."""
+
+    time: Samples
+    """s, (n,)."""
+    members: Samples
+    """(friction, gap, quantity, n)."""
+    sensitivity: Samples
+    """Relative change of each quantity in the middle per relative one of voltage and viscosity, (2, quantity, n)."""
+
+
+class Bank:
+    """The members, and what they have done since they were laid down."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        unknown: Unknown,
+        arguments: Mapping[str, Any] | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Lay the members down.
+
+        Args:
+            robot: as its file says.
+            unknown: what is unknown of it.
+            arguments: further arguments of `spirillum.Plant`.
+            progress: told how many are laid down.
+
+        Raises:
+            InputError: for a robot that cannot have these factors.
+        """
+        self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)
+        places = [
+            Drawn(float(unknown.friction_factor**u), float(unknown.gap_factor**v))
+            for u in self.friction
+            for v in self.gap
+        ]
+        places += [Drawn(1.0, 1.0), Drawn(1.0, 1.0, None, 1.0 + _CHANGE), Drawn(1.0, 1.0, None, 1.0, 1.0 + _CHANGE)]
+        self._plants: list[Plant] = []
+        for place in places:
+            self._plants.append(plant_of(robot, arguments or {}, place))
+            if progress is not None:
+                progress("bank of robots", len(self._plants), len(places))
+        self._time = [0.0]
+        self._rows = [np.array([_kept(plant.observe()) for plant in self._plants])]
+
+    @property
+    def time(self) -> float:
+        """Until when they have gone, s."""
+        return self._time[-1]
+
+    @property
+    def duty(self) -> float:
+        """The robot's own."""
+        return float(self._plants[0].state.command)
+
+    @property
+    def current(self) -> float:
+        """Predicted while the drive is on, A."""
+        return float(abs(self._plants[-3].steady.motor_current))
+
+    def follow(self, time: float, duty: float) -> None:
+        """Let all members go on to a time at a duty."""
+        while time - self.time > 1e-9:
+            dt = min(_STEP, time - self.time)
+            moments = [plant.step(dt, duty=duty) for plant in self._plants]
+            self._time.append(moments[0].time)
+            self._rows.append(np.array([_kept(moment) for moment in moments]))
+
+    def paths(self) -> Paths:
+        """What they have done."""
+        rows = np.moveaxis(np.array(self._rows), 0, -1)
+        middle, changed = rows[-3], rows[-2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sensitivity = np.nan_to_num((changed / middle - 1.0) / _CHANGE, posinf=0.0, neginf=0.0)
+        members = rows[:-3].reshape(self.friction.size, self.gap.size, len(QUANTITIES_OF_BANK), -1)
+        return Paths(np.array(self._time), members, sensitivity)
+
+
+def _kept(moment: Moment) -> list[float]:
+    values = moment.values
+    return [moment.pose.tail_phase, values["body_angle"], values["motor_current"], values["battery_voltage"]]

@@ -1,0 +1,203 @@
+"""Controllers of speed: by PWM at a set speed, along a course through pulses of flow, and with the remote alone.
+
+The follower (`spirillum.controllers.follower`) gives place x, speed s at full duty and drift w of the fluid; v is the
+speed that is asked for, t the time, d = 1 or -1 the robot's way.
+
+`HoldSpeed`, proportional and integral with back-calculation against windup (Astrom and Hagglund 2006):
+
+    e = d v - (u s + w),   u = sat(u_0 + K e + I),   dI/dt = K e / T_i + (sat(u) - u) / T_t.
+
+A robot without inertia answers at once, after a dead time: its integral gain K / T_i = 1 / (s_0 (T_c + theta)) is
+Skogestad's (2003) for such a process, with T_c = 2 s for the follower's own lag.
+
+`KeepCourse`, place by a cascade whose inner loop inverts the robot as it is estimated, drift included:
+
+    u = sat((d v + (d v t - x) / T - w) / s),   T = 3 s.
+
+`SaveBattery`, a relay around the course, for a remote that knows on and off: on below d v t - h, off above d v t + h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.controllers.follower import Follower
+from spirillum.controllers.lab import Lab
+from spirillum.controllers.sensors import FlowPulse
+from spirillum.controllers.signals import News, Sight
+
+__all__ = ["HoldSpeed", "KeepCourse", "SaveBattery", "Steady"]
+
+_CLOSED = 2.0
+"""T_c, s."""
+_PROPORTIONAL = 0.2
+"""K s_0."""
+_BACK = 3.0
+"""T_t, s."""
+_CATCH_UP = 3.0
+"""T, s."""
+_SLOWEST = 0.05
+"""The estimated speed at full duty counts as at least this share of the predicted one."""
+_EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
+
+
+class _Watching:
+    """What follows the robot and says so; one that knows is told place and coming flow."""
+
+    blind = False
+    knowing = False
+
+    def __init__(self, lab: Lab, speed: float, duty: float, *, knowing: bool = False) -> None:
+        """Begin.
+
+        Args:
+            lab: sensors and remote.
+            speed: predicted while the drive is on, m/s, with its sign.
+            duty: of the drive while it is on.
+            knowing: whether it is told the truth.
+        """
+        self.knowing = self.blind = knowing
+        seen = lab if not knowing else Lab.of(_EXACT).model_copy(update={"remote": lab.remote})
+        self._follower = Follower(seen, speed / duty)
+        self._full, self._delay = speed / duty, lab.remote.delay
+        self._way = float(np.sign(speed))
+        self._duty = duty
+        self._now: Samples = np.array([0.0, self._full, 0.0, 0.0])
+        self._error = 0.0
+
+    def _follow(self, news: News) -> Samples:
+        """Place, speed at full duty, drift and the camera's error where a command that is decided now will act."""
+        for sight in news.sights if news.truth is None else ():
+            self._follower.see(sight)
+        if news.truth is not None:
+            self._follower.see(Sight(news.time, float(news.truth.pose.position[0]), 0.0, 0.0, 0.0))
+        self._now, spread = self._follower.ahead(news.time)
+        self._error = float(np.sqrt(spread[0, 0]))
+        ahead, _ = self._follower.ahead(news.time + self._delay)
+        least = _SLOWEST * abs(self._full)
+        ahead[1] = self._way * max(self._way * ahead[1], least)
+        return ahead
+
+    def _sent(self, news: News, duty: float) -> float:
+        self._follower.send(news.time, duty)
+        return duty
+
+    def estimate(self) -> Mapping[str, float]:
+        """Place, its standard deviation, speed at the robot's own duty, and drift."""
+        return {
+            "estimated_position": float(self._now[0]),
+            "estimated_position_error": self._error,
+            "estimated_speed": float(self._now[1] * self._duty),
+            "estimated_drift": float(self._now[2]),
+        }
+
+
+class HoldSpeed(_Watching):
+    """A set speed by PWM."""
+
+    def __init__(self, lab: Lab, speed: float, duty: float, asked: float) -> None:
+        """Begin; `asked` is the speed that is to be held, m/s, without sign."""
+        super().__init__(lab, speed, duty)
+        self._asked = self._way * asked
+        dead = lab.camera.latency + lab.remote.delay + 0.5 * lab.remote.period
+        self._gain = _PROPORTIONAL / self._full
+        self._integral_gain = 1.0 / (self._full * (_CLOSED + dead))
+        self._first = min(asked / abs(self._full), 1.0)
+        self._integral, self._before = 0.0, 0.0
+
+    def decide(self, news: News) -> float:
+        """Proportional and integral, held within 0 and 1."""
+        ahead = self._follow(news)
+        duty = self._follower.duty_at(news.time + self._delay)
+        error = self._asked - (duty * ahead[1] + ahead[2])
+        wanted = self._first + self._gain * error + self._integral
+        held = float(np.clip(wanted, 0.0, 1.0))
+        dt = news.time - self._before
+        self._integral += dt * (self._integral_gain * error + (held - wanted) / _BACK)
+        self._before = news.time
+        return self._sent(news, held)
+
+
+class KeepCourse(_Watching):
+    """A course at a set speed, by PWM, through pulses of flow."""
+
+    def __init__(
+        self,
+        lab: Lab,
+        speed: float,
+        duty: float,
+        asked: float,
+        *,
+        knowing: bool = False,
+        flow: FlowPulse | None = None,
+        carried: float = 0.0,
+    ) -> None:
+        """Begin.
+
+        Args:
+            lab: sensors and remote.
+            speed: predicted while the drive is on, m/s, with its sign.
+            duty: of the drive while it is on.
+            asked: speed of the course, m/s, without sign.
+            knowing: whether it is told the truth.
+            flow: for one that knows: the pulse.
+            carried: way of the robot over the way of the mean flow.
+        """
+        super().__init__(lab, speed, duty, knowing=knowing)
+        self._asked, self._flow, self._carried = self._way * asked, flow, carried
+
+    def decide(self, news: News) -> float:
+        """The duty that leads back to the course in T, by the robot as it is estimated."""
+        ahead, acts = self._follow(news), news.time + self._delay
+        drift = ahead[2]
+        if self._flow is not None and self._flow.start <= acts <= self._flow.end:
+            drift = self._carried * self._flow.velocity
+        wanted = (self._asked + (self._asked * acts - ahead[0]) / _CATCH_UP - drift) / ahead[1]
+        return self._sent(news, float(np.clip(wanted, 0.0, 1.0)))
+
+
+class SaveBattery(_Watching):
+    """A course at a set mean speed, with a remote that knows on and off."""
+
+    def __init__(
+        self, lab: Lab, speed: float, duty: float, asked: float, band: float, *, knowing: bool = False
+    ) -> None:
+        """Begin; `asked` is the mean speed, m/s, without sign, `band` the half width of the relay, m."""
+        super().__init__(lab, speed, duty, knowing=knowing)
+        self._asked, self._band = asked, band
+        self._on = True
+
+    def decide(self, news: News) -> float:
+        """On where the robot has fallen behind, off where it is ahead."""
+        ahead = self._follow(news)
+        left = self._asked * (news.time + self._delay) - self._way * ahead[0]
+        self._on = left > (-self._band if self._on else self._band)
+        return self._sent(news, self._duty if self._on else 0.0)
+
+
+class Steady:
+    """Open loop: a duty throughout, or on for a share of each cycle."""
+
+    blind = True
+    knowing = False
+
+    def __init__(self, duty: float, *, share: float = 1.0, cycle: float = 5.0) -> None:
+        """Begin.
+
+        Args:
+            duty: while it is on.
+            share: of each cycle in which it is on.
+            cycle: s.
+        """
+        self._duty, self._share, self._cycle = duty, share, cycle
+
+    def decide(self, news: News) -> float:
+        """The same in every cycle."""
+        return self._duty if (news.time / self._cycle) % 1.0 < self._share else 0.0
+
+    def estimate(self) -> Mapping[str, float]:
+        """Nothing."""
+        return {}

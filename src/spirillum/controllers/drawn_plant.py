@@ -1,0 +1,70 @@
+"""The robot that a run has drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from spirillum.controllers.sensors import Drawn
+from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.plant import Plant
+from spirillum.errors import InputError
+from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
+
+__all__ = ["plant_of"]
+
+
+def plant_of(robot: Robot, arguments: Mapping[str, Any], found: Drawn, progress: Progress | None = None) -> Plant:
+    """The robot that a run has drawn, at rest where it starts.
+
+    Args:
+        robot: as its file says.
+        arguments: further arguments of `spirillum.Plant`.
+        found: what was drawn.
+        progress: told how far a table is that has to be made.
+
+    Raises:
+        InputError: for wrong arguments, or a friction or gap factor where there is nothing to multiply.
+    """
+    arguments = dict(arguments)
+    if found.gap != 1.0:
+        if robot.channel is None:
+            raise InputError("unknown.gap_factor is given for a robot without a channel; allowed: 1")
+        placed = Placement.of(arguments.get("placement"))
+        if placed.eccentricity is not None:
+            raise InputError(
+                "unknown.gap_factor is given together with an eccentricity; allowed: a gap, or a factor of 1"
+            )
+        own = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
+        arguments["placement"] = placed.model_copy(update={"gap": own * found.gap})
+    if found.friction != 1.0:
+        robot = _rubbing(robot, found.friction)
+    robot = _in_another_oil(robot, found)
+    return Plant(robot, **arguments, progress=progress)
+
+
+def _rubbing(robot: Robot, factor: float) -> Robot:
+    """A robot with another friction."""
+    own = robot.friction.effective
+    if own is None and robot.motor is not None:
+        own = robot.motor.joint_rotor_friction
+    if not own:
+        raise InputError(
+            f"unknown.friction_factor is given, but {robot.name} has no friction; allowed: a factor of 1, or a "
+            "friction.effective"
+        )
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * own})})
+
+
+def _in_another_oil(robot: Robot, found: Drawn) -> Robot:
+    """A robot with another voltage and viscosity."""
+    changes: dict[str, Any] = {}
+    if found.viscosity != 1.0:
+        fluid = robot.fluid
+        changes["fluid"] = fluid.model_copy(update={"viscosity": fluid.viscosity * found.viscosity})
+    if found.voltage != 1.0 and robot.battery is not None:
+        battery = robot.battery
+        changes["battery"] = battery.model_copy(update={"voltage": battery.voltage * found.voltage})
+    return robot.model_copy(update=changes) if changes else robot

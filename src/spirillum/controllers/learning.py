@@ -1,0 +1,275 @@
+"""Friction and gap from what camera and meter tell: the posterior on a bank of robots.
+
+Blocks of a second of the tail's phase and the body's angle, and the mean current and voltage, are compared with what
+the bank did under the same commands (multiple-model estimation, Magill 1965). Given the unknown factors theta all else
+is linear and Gaussian, and is integrated out:
+
+    z = m(theta) + H eta + e,   eta ~ N(0, P),  e ~ N(0, R),   log p(z | theta) = -r' (R + H P H')^-1 r / 2 + const,
+
+with r = z - m(theta). In eta are the relative errors of voltage and viscosity, the gains of the meter, where each angle
+began (unknown), and what the bank leaves. R holds the camera's errors of a frame and its slow ones, averaged over
+blocks. The prior is even in the logarithms of the factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.answer import quantity
+from spirillum.arrays import Samples
+from spirillum.controllers.bank import Paths, interpolation, points
+from spirillum.controllers.lab import Lab
+from spirillum.controllers.signals import Reading, Sight
+
+__all__ = ["BLOCK", "SETTLING", "Learnt", "Stretch", "learnt"]
+
+BLOCK = 1.0
+"""Length of a block, s."""
+SETTLING = 0.3
+"""What is seen so soon after the drive was switched is left out, s."""
+_FEWEST = 4
+"""Frames of a block at least."""
+_LEFT = (1e-3, 8e-3)
+"""Relative standard deviations of what the bank leaves in the tail's and in the body's angle: interpolation (4e-4 and
+3e-3 for the paper's robot), and a pulse of flow, which lifts the robot a little (0.5 mm/s for 2 s: 1e-4 and 7e-3)."""
+_ANYWHERE = 1e2
+"""Standard deviation of where an angle began, rad."""
+_COARSE, _FINE = 41, 61
+_NEGLIGIBLE = 15.0
+"""Differences of the log posterior beyond which nothing is looked for."""
+_UNTOLD = 0.8
+"""A 95 % interval that is as wide as this share of the prior's tells nothing."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A time in which the drive was on; s."""
+
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What is known of a factor: median and 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    told: bool
+    """Whether the data say more than the prior."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The factor as data."""
+        return quantity(self.value, "1", low=self.low, high=self.high, kind="interval", level=0.95, told=self.told)
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What is known of the robot."""
+
+    friction: Factor
+    gap: Factor
+
+    def to_dict(self) -> dict[str, Any]:
+        """The factors as data."""
+        return {"friction_factor": self.friction.to_dict(), "gap_factor": self.gap.to_dict()}
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Means over a second."""
+
+    stretch: int
+    start: float
+    frames: int
+    seen: tuple[float, float]
+    """Tail's phase and body's angle, rad."""
+    done: Samples
+    """The same of every member, (friction, gap, 2)."""
+    sensitivity: Samples
+    """(2, 2): voltage and viscosity, by quantity."""
+
+
+def learnt(
+    paths: Paths,
+    lab: Lab,
+    stretches: Sequence[Stretch],
+    sights: Sequence[Sight],
+    readings: Sequence[Reading],
+) -> Learnt | None:
+    """The posterior of friction and gap.
+
+    Args:
+        paths: what the bank did under the commands of the run.
+        lab: sensors, and what is unknown.
+        stretches: when the drive was on.
+        sights: what was seen, in the order of time.
+        readings: what the meter told.
+
+    Returns:
+        Medians and 95 % intervals; None before there are two blocks.
+    """
+    blocks = [block for number, one in enumerate(stretches) for block in _blocks(paths, number, one, sights)]
+    if len(blocks) < 2:
+        return None
+    means, electric = _electric(paths, lab, stretches, readings)
+    nodes = points(lab.unknown.friction_factor), points(lab.unknown.gap_factor)
+    members = np.concatenate([np.moveaxis(np.array([block.done for block in blocks]), 0, -2), electric.done], axis=-2)
+    flat = members.reshape(nodes[0].size, nodes[1].size, -1)
+    seen = np.concatenate([[block.seen for block in blocks], means]).ravel()
+    axes = [np.linspace(-1.0, 1.0, _COARSE) if one.size > 1 else np.zeros(1) for one in nodes]
+    middle = _between(flat, nodes, (np.zeros(1), np.zeros(1)))[0, 0]
+    for size in (_FINE, _FINE):
+        spread = _spread(lab, blocks, electric, middle)
+        log = _log_likelihood(seen, _between(flat, nodes, axes), spread)
+        best = np.unravel_index(np.argmax(log), log.shape)
+        middle = _between(flat, nodes, (axes[0][best[0] : best[0] + 1], axes[1][best[1] : best[1] + 1]))[0, 0]
+        near = log > log.max() - _NEGLIGIBLE
+        axes = [_narrowed(axis, near.any(axis=1 - side), size) for side, axis in enumerate(axes)]
+    spread = _spread(lab, blocks, electric, middle)
+    log = _log_likelihood(seen, _between(flat, nodes, axes), spread)
+    weight = np.exp(log - log.max())
+    unknown = lab.unknown
+    return Learnt(
+        _factor(axes[0], weight.sum(axis=1), unknown.friction_factor),
+        _factor(axes[1], weight.sum(axis=0), unknown.gap_factor),
+    )
+
+
+@dataclass(frozen=True)
+class _Electric:
+    """Current and voltage; one row, or none without a meter."""
+
+    done: Samples
+    """(friction, gap, rows, 2)."""
+    sensitivity: Samples
+    """(rows, 2, 2)."""
+    noise: Samples
+    """Variances of the means, (rows, 2)."""
+
+
+def _blocks(paths: Paths, number: int, stretch: Stretch, sights: Sequence[Sight]) -> list[_Block]:
+    found: list[_Block] = []
+    begin, end = stretch.start + SETTLING, min(stretch.end, float(paths.time[-1]))
+    inside = [sight for sight in sights if begin <= sight.time <= end]
+    for part in range(int((end - begin) / BLOCK)):
+        start = begin + part * BLOCK
+        here = [sight for sight in inside if start <= sight.time < start + BLOCK]
+        if len(here) < _FEWEST:
+            continue
+        weights = _means_at(paths.time, np.array([sight.time for sight in here]))
+        seen = (
+            float(np.mean([sight.tail_phase for sight in here])),
+            float(np.mean([sight.body_angle for sight in here])),
+        )
+        done, sensitivity = paths.members[:, :, :2] @ weights, paths.sensitivity[:, :2] @ weights
+        found.append(_Block(number, start, len(here), seen, done, sensitivity))
+    return found
+
+
+def _means_at(time: Samples, moments: Samples) -> Samples:
+    """Weights of values at times for their mean, interpolated linearly, at moments, (n,)."""
+    after = np.clip(np.searchsorted(time, moments), 1, time.size - 1)
+    share = np.clip((moments - time[after - 1]) / (time[after] - time[after - 1]), 0.0, 1.0)
+    weights = np.zeros(time.size)
+    np.add.at(weights, after, share)
+    np.add.at(weights, after - 1, 1.0 - share)
+    return weights / moments.size
+
+
+def _electric(
+    paths: Paths, lab: Lab, stretches: Sequence[Stretch], readings: Sequence[Reading]
+) -> tuple[Samples, _Electric]:
+    end = float(paths.time[-1])
+    inside = [one for one in readings if any(s.start + SETTLING <= one.time <= min(s.end, end) for s in stretches)]
+    shape = paths.members.shape
+    if not inside:
+        return np.empty((0, 2)), _Electric(np.empty((*shape[:2], 0, 2)), np.empty((0, 2, 2)), np.empty((0, 2)))
+    weights = _means_at(paths.time, np.array([one.time for one in inside]))
+    done, sensitivity = paths.members[:, :, 2:] @ weights, paths.sensitivity[:, 2:] @ weights
+    means = np.array([[np.mean([one.current for one in inside]), np.mean([one.voltage for one in inside])]])
+    meter = lab.meter
+    noise = np.array([[meter.current_noise, meter.voltage_noise * abs(means[0, 1])]]) ** 2 / len(inside)
+    return means, _Electric(done[:, :, None], sensitivity[None], noise)
+
+
+def _between(flat: Samples, nodes: tuple[Samples, Samples], axes: Sequence[Samples]) -> Samples:
+    """What robots between the members do, (friction, gap, data)."""
+    first, second = (interpolation(node, axis) for node, axis in zip(nodes, axes, strict=True))
+    found: Samples = np.einsum("ai,ijd,bj->abd", first, flat, second)
+    return found
+
+
+def _spread(lab: Lab, blocks: Sequence[_Block], electric: _Electric, middle: Samples) -> Samples:
+    """R + H P H' at what a robot near the truth does, (data, data)."""
+    rows = len(blocks)
+    done = middle.reshape(-1, 2)
+    sensitivity = np.concatenate([[block.sensitivity for block in blocks], electric.sensitivity])
+    columns: list[Samples] = []
+    for number, size in enumerate((lab.unknown.voltage_error, lab.unknown.viscosity_error)):
+        columns.append(size * (done * sensitivity[:, number]).ravel())
+    for seen in range(2):
+        one = np.zeros_like(done)
+        one[:rows, seen] = _LEFT[seen] * done[:rows, seen]
+        columns.append(one.ravel())
+        gain = np.zeros_like(done)
+        gain[rows:, seen] = lab.meter.gain_error * done[rows:, seen]
+        columns.append(gain.ravel())
+        for stretch in {block.stretch for block in blocks}:
+            began = np.zeros_like(done)
+            began[:rows, seen] = [_ANYWHERE * (block.stretch == stretch) for block in blocks]
+            columns.append(began.ravel())
+    across = np.array(columns)
+    found: Samples = across.T @ across
+    for seen, name in enumerate(("tail_phase", "body_angle")):
+        found[seen : 2 * rows : 2, seen : 2 * rows : 2] += _errors_of_blocks(lab, blocks, name)
+    last = np.arange(2 * rows, found.shape[0])
+    found[last, last] += electric.noise.ravel() + 1e-12
+    return found
+
+
+def _errors_of_blocks(lab: Lab, blocks: Sequence[_Block], name: str) -> Samples:
+    """Covariance of the camera's errors of block means: white ones, and an Ornstein-Uhlenbeck process averaged."""
+    camera = lab.camera
+    white, slow = getattr(camera, f"{name}_noise"), getattr(camera, f"{name}_wander")
+    starts = np.array([block.start for block in blocks])
+    over = BLOCK / camera.memory
+    apart = np.abs(starts[:, None] - starts) / camera.memory
+    found = slow**2 * ((1.0 - np.exp(-over)) / over) ** 2 * np.exp(-np.maximum(apart - over, 0.0))
+    same = 2.0 * slow**2 * (over - 1.0 + np.exp(-over)) / over**2
+    np.fill_diagonal(found, same + white**2 / np.array([block.frames for block in blocks]) + 1e-10)
+    return np.asarray(found)
+
+
+def _log_likelihood(seen: Samples, done: Samples, spread: Samples) -> Samples:
+    from scipy.linalg import cholesky, solve_triangular
+
+    rest = (seen - done).reshape(-1, seen.size).T
+    white = solve_triangular(cholesky(spread, lower=True), rest, lower=True)
+    return np.asarray(-0.5 * np.sum(white**2, axis=0).reshape(done.shape[:2]))
+
+
+def _narrowed(axis: Samples, near: Samples, size: int) -> Samples:
+    """A finer axis over what is near the best."""
+    if axis.size == 1:
+        return axis
+    found = np.flatnonzero(near)
+    low, high = max(found[0] - 1, 0), min(found[-1] + 1, axis.size - 1)
+    return np.linspace(axis[low], axis[high], size)
+
+
+def _factor(axis: Samples, weight: Samples, largest: float) -> Factor:
+    """Median and interval of a factor from its density over the power."""
+    if axis.size == 1:
+        return Factor(1.0, 1.0, 1.0, told=True)
+    parts = 0.5 * (weight[1:] + weight[:-1])
+    cumulative = np.concatenate([[0.0], np.cumsum(parts)]) / parts.sum()
+    low, value, high = np.interp([0.025, 0.5, 0.975], cumulative, axis)
+    return Factor(
+        float(largest**value), float(largest**low), float(largest**high), told=bool(high - low < 1.9 * _UNTOLD)
+    )
