@@ -100,6 +100,15 @@ _Hand = Annotated[
     bool, typer.Option("--hand", help="The shadow of a hand passes over the picture.", rich_help_panel=_DISTURBED)
 ]
 
+_Trouble = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME,...",
+        help="Of a real bench: lost-frames, handheld, rolled, uneven-stripes; with commas between them.",
+        rich_help_panel=_DISTURBED,
+    ),
+]
+
 
 def render(
     robot: RobotArgument,
@@ -173,6 +182,7 @@ def render(
     glare_fixed: _Fixed = False,
     bubbles: _Bubbles = None,
     hand: _Hand = False,
+    trouble: _Trouble = "",
     seed: _Seed = 0,
     depth_error: Annotated[
         str,
@@ -212,6 +222,7 @@ def render(
             camera=_fields(CameraOptions, given),
             degradation=_degradation(given),
             setup_errors=_fields(SetupErrors, given),
+            troubles=trouble,
             seed=seed,
             progress=progress,
         )

@@ -9,6 +9,7 @@ from spirillum.virtual.disturbances import Disturbances
 from spirillum.virtual.label import stamp
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.trajectory import TrialTrajectory
+from spirillum.virtual.troubles import Shake
 
 __all__ = ["Frames"]
 
@@ -23,7 +24,12 @@ class Frames:
     """The frames of one video, in order: noise differs from frame to frame."""
 
     def __init__(
-        self, painter: Painter, disturbances: Disturbances, trajectory: TrialTrajectory, exposure: float
+        self,
+        painter: Painter,
+        disturbances: Disturbances,
+        trajectory: TrialTrajectory,
+        exposure: float,
+        shake: Shake | None = None,
     ) -> None:
         """Prepare.
 
@@ -32,7 +38,9 @@ class Frames:
             disturbances: of the pictures.
             trajectory: of the robot.
             exposure: of a frame, s.
+            shake: of the camera; None: it stands still.
         """
+        self._shake = shake
         self._painter, self._disturbances, self._trajectory = painter, disturbances, trajectory
         self._exposure = exposure
         width, height = painter.lens.size
@@ -46,6 +54,8 @@ class Frames:
         disturbances = self._disturbances
         light = self._painter.light(self._trajectory, time, self._exposure)
         disturbances.disturb(light, time, self._trajectory.at(time).position)
+        if self._shake is not None:
+            light = self._shake.moved(light, time)
         image = np.empty(light.shape, dtype=np.uint8)
         gain = _BRIGHTNESS * disturbances.gain(time)
         starts = disturbances.starts(light.shape[0])

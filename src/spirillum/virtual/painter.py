@@ -37,16 +37,17 @@ _FEW = 13
 class Painter:
     """Draws the robot before its tank. One painter serves one video: it keeps its buffers between frames."""
 
-    def __init__(self, robot: Robot, tank: Tank, lens: Lens) -> None:
+    def __init__(self, robot: Robot, tank: Tank, lens: Lens, edges: Samples | None = None) -> None:
         """Prepare.
 
         Args:
             robot: a checked robot.
             tank: the still parts.
             lens: the camera.
+            edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
         """
         self.robot, self.tank, self.lens = robot, tank, lens
-        self.body, self.rotor = solids_of(robot)
+        self.body, self.rotor = solids_of(robot, edges=edges)
         self.still = backdrop(tank, lens)
         self._lamps = _lamps(tank.view, -1.0 if lens.leftwards else 1.0)
         self._tint = tint(lens.surface - tank.tube_height)

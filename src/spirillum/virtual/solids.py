@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from spirillum.kernels.raster import Lamps, Materials, Shading, shade
 from spirillum.robot.mesh import RobotMesh, robot_mesh
 from spirillum.robot.robot import Robot
 from spirillum.robot.surface import Faces, corner_normals
+from spirillum.virtual.troubles import repainted
 
 __all__ = ["MATERIALS", "Solid", "linear", "solids_of"]
 
@@ -67,14 +68,20 @@ class Solid:
         return shading
 
 
-def solids_of(robot: Robot, fineness: float = 1.0) -> tuple[Solid, Solid]:
+def solids_of(robot: Robot, fineness: float = 1.0, edges: Samples | None = None) -> tuple[Solid, Solid]:
     """Body and rotor of a robot, the rotor with its tail at phase 0.
 
     Args:
         robot: a checked robot.
         fineness: of `spirillum.robot.mesh.robot_mesh`.
+        edges: of the stripes, see `spirillum.virtual.troubles.stripe_edges`; None: even ones.
     """
     pieces = robot_mesh(robot, phase=0.0, fineness=fineness)
+    if edges is not None:
+        pieces = tuple(
+            replace(piece, vertices=repainted(robot, piece.vertices, edges)) if piece.name == "body" else piece
+            for piece in pieces
+        )
     return _joined([piece for piece in pieces if piece.part == "body"]), _joined(
         [piece for piece in pieces if piece.part == "rotor"]
     )

@@ -29,6 +29,7 @@ from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, Setu
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import tank_of
+from spirillum.virtual.troubles import Shake, Troubles, even_times, stripe_edges
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ def render(
     camera: CameraOptions | Mapping[str, Any] | None = None,
     degradation: str | Degradation | Mapping[str, Any] | None = None,
     setup_errors: SetupErrors | Mapping[str, Any] | None = None,
+    troubles: str | Troubles | Mapping[str, Any] | None = None,
     setup: str | Path | None = None,
     seed: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
@@ -117,6 +119,7 @@ def render(
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         setup_errors: `SetupErrors`: by how much the setup's height of the robot's axis is wrong on purpose.
+        troubles: of a real bench: `Troubles`, or names such as ``"lost-frames,handheld"``.
         setup: the setup file; None: beside the video.
         seed: of all random numbers.
         progress: told what is done, how many frames are done, and how many there are.
@@ -132,7 +135,7 @@ def render(
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     degradation, setup_errors = Degradation.of(degradation), SetupErrors.of(setup_errors)
-    seed = Seeded.of({"seed": seed}).seed
+    seed, troubles = Seeded.of({"seed": seed}).seed, Troubles.of(troubles)
     robot = load(robot)
     shown = motion_of(robot, motion, trial, camera) if run is None else motion_of_run(robot, run, trial, camera)
     tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))
@@ -145,7 +148,7 @@ def render(
     body = robot.body.length, robot.body.diameter
     top = min(tank.tube_height + 0.8 * (tank.tube or 1.5 * body[1]), 0.95 * lens.surface)
     disturbances = Disturbances(degradation, seed, lens, trajectory.duration, body, top)
-    kept = np.flatnonzero(disturbances.kept(count))
+    kept, counted = even_times(troubles, np.flatnonzero(disturbances.kept(count)), seed)
     names = names_beside(target) if setup is None else names_beside(target, Path(setup))
     robot_file = robot.name if is_preset(robot) else names["robot"].name
     height = _stated_height(float(trajectory.position[:, 2].mean()), setup_errors.depth_error, lens.surface)
@@ -169,11 +172,14 @@ def render(
     truth = truth_dataset(trajectory, kept / camera.fps, kept, attributes)
     texts = {
         "setup": setup_text(robot_file, camera, lens, tank.spacing, axis, timed=target.suffix == ".mp4"),
-        "json": truth_text(written.rates, _facts(written, camera, degradation, lens)),
+        "json": truth_text(written.rates, _facts(written, camera, degradation, troubles, lens)),
     }
     if robot_file != robot.name:
         texts["robot"] = robot_text(robot)
-    frames = Frames(Painter(robot, tank, lens), disturbances, trajectory, camera.exposure)
+    stripes = len(robot.seal.stripes) if robot.seal is not None else 0
+    edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
+    shake = Shake(troubles, seed)
+    frames = Frames(Painter(robot, tank, lens, edges), disturbances, trajectory, camera.exposure, shake)
     tell = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (
@@ -184,7 +190,7 @@ def render(
         for place, text in beside.items():
             parts[place].write_text(text, encoding="utf-8")
         write_dataset(truth, parts[names["nc"]])
-        _write_frames(writer, frames, kept, camera.fps, tell)
+        _write_frames(writer, frames, (kept, counted), camera.fps, tell)
         tell("render: writing", len(kept), len(kept))
     return written
 
@@ -204,13 +210,16 @@ def _stated_height(height: float, error: float, surface: float) -> float:
     return height + error
 
 
-def _facts(trial: VirtualTrial, camera: CameraOptions, degradation: Degradation, lens: Lens) -> dict[str, Any]:
+def _facts(
+    trial: VirtualTrial, camera: CameraOptions, degradation: Degradation, troubles: Troubles, lens: Lens
+) -> dict[str, Any]:
     """What the truth says of a trial besides its rates."""
     return {
         "robot": trial.robot.name,
         "model": trial.model,
         "seed": trial.seed,
         "degradation": degradation.model_dump(),
+        "troubles": troubles.model_dump(),
         "frames": trial.frames,
         "dropped": trial.dropped,
         "frames_per_second": camera.fps,
@@ -230,9 +239,14 @@ def _facts(trial: VirtualTrial, camera: CameraOptions, degradation: Degradation,
 
 
 def _write_frames(
-    writer: FrameWriter, frames: Frames, kept: np.ndarray, fps: float, tell: Callable[[str, int, int], None]
+    writer: FrameWriter,
+    frames: Frames,
+    numbers: tuple[np.ndarray, np.ndarray],
+    fps: float,
+    tell: Callable[[str, int, int], None],
 ) -> None:
-    """Draw a frame while the one before it is encoded."""
+    """Draw a frame while the one before it is encoded; `numbers`: as recorded, and as the film counts them."""
+    kept, counted = numbers
     with ThreadPoolExecutor(1) as encoder:
         before: Future[None] | None = None
         for done, number in enumerate(kept):
@@ -240,6 +254,6 @@ def _write_frames(
             image = frames.image(number / fps)
             if before is not None:
                 before.result()
-            before = encoder.submit(writer.add, image, int(number))
+            before = encoder.submit(writer.add, image, int(counted[done]))
         if before is not None:
             before.result()
