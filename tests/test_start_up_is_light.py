@@ -29,6 +29,7 @@ HEAVY = (
     "control",
     "gymnasium",
     "mcap",
+    "serial",
 )
 
 

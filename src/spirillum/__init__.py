@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from spirillum.interfaces.python_control import LinearSystem as LinearSystem
     from spirillum.interfaces.python_control import control_system as control_system
     from spirillum.interfaces.python_control import linear_system as linear_system
+    from spirillum.interfaces.serial_remote import RemoteRun as RemoteRun
+    from spirillum.interfaces.serial_remote import SerialRemote as SerialRemote
+    from spirillum.interfaces.serial_remote import VirtualRemote as VirtualRemote
+    from spirillum.interfaces.serial_remote import remote as remote
     from spirillum.live.answer import Tracked as Tracked
     from spirillum.live.observation import Observation as Observation
     from spirillum.live.session import track as track
@@ -95,14 +99,17 @@ _HOME = {
     "Prepared": "spirillum.swimming.preparation",
     "Ranking": "spirillum.calibration.ranking",
     "Recording": "spirillum.exports.recording",
+    "RemoteRun": "spirillum.interfaces.serial_remote",
     "Resistance": "spirillum.fluid.resistance",
     "Robot": "spirillum.robot.robot",
     "RobotBatch": "spirillum.robot.batch",
+    "SerialRemote": "spirillum.interfaces.serial_remote",
     "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",
     "Swimming": "spirillum.swimming.answer",
     "Tracked": "spirillum.live.answer",
     "VirtualCamera": "spirillum.virtual.live_camera",
+    "VirtualRemote": "spirillum.interfaces.serial_remote",
     "calibrate": "spirillum.results.calibration",
     "citation": "spirillum.citations",
     "compare_models": "spirillum.swimming.comparison",
@@ -125,6 +132,7 @@ _HOME = {
     "prepare": "spirillum.swimming.preparation",
     "prepare_all": "spirillum.swimming.preparation",
     "rank_models": "spirillum.calibration.ranking",
+    "remote": "spirillum.interfaces.serial_remote",
     "render": "spirillum.virtual.trial",
     "resistance": "spirillum.fluid.resistance",
     "settle": "spirillum.dynamics.settling",

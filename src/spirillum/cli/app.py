@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -48,6 +49,7 @@ from spirillum.cli.options import (
 )
 from spirillum.cli.page_commands import page
 from spirillum.cli.prepare_commands import prepare
+from spirillum.cli.remote_commands import remote
 from spirillum.cli.robot_commands import robot_app
 from spirillum.cli.settle_commands import settle
 from spirillum.cli.setup_commands import setup_app
@@ -365,9 +367,9 @@ def citation(
     typer.echo(answer(model))
 
 
-_TASKS = {
+_TASKS: dict[str, tuple[Callable[..., None], ...]] = {
     "Predict": (predict, compare_models, study, prepare, resistance),
-    "Move": (simulate, settle, control, magnetic_sweep),
+    "Move": (simulate, settle, control, remote, magnetic_sweep),
     "Look": (page, show, film, flow),
     "Measure": (render, virtual_experiment, measure, track),
     "Learn": (calibrate, rank_models, suggest),

@@ -1,0 +1,295 @@
+"""The remote at a serial port: duties that go out, are confirmed, and end with the motor off; and a virtual far end."""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from numbers import Real
+from typing import Any, Self
+
+from spirillum.answer import envelope, quantity
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.interfaces.remote_protocol import LONGEST_LINE, WATCHDOG, Receiver, framed, unframed
+from spirillum.shown import Shown
+from spirillum.units import KINDS, parse_option
+
+__all__ = ["RemoteRun", "SerialRemote", "VirtualRemote", "remote"]
+
+_BAUD = 115_200
+_PATIENCE = 0.15
+"""Time in which an answer has to come, s: three tries end before the far end's watchdog does."""
+_TRIES = 3
+_REPEAT = 0.1
+"""How often a duty that is held is said again, s."""
+_LONGEST_HOLD = 86_400.0
+
+
+class SerialRemote:
+    """A remote at a serial port; leaving its `with` block switches the motor off, whatever happened inside."""
+
+    def __init__(self, port: str, *, baud: int = _BAUD) -> None:
+        """Open the port, and ask who is there.
+
+        Args:
+            port: such as ``/dev/ttyUSB0`` or ``COM3``.
+            baud: symbols a second.
+
+        Raises:
+            InputError: if pyserial is missing, the port is not there or is in use, or nobody answers.
+        """
+        serial = required("serial", "a remote at a serial port", "control")
+        self.port = str(port)
+        """The port."""
+        self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
+        self._number, self._rest = 0, b""
+        try:
+            self._line: Any = serial.Serial(
+                self.port, baud, timeout=0.02, write_timeout=_PATIENCE, exclusive=True if os.name == "posix" else None
+            )
+        except (*self._gone, ValueError) as error:
+            raise InputError(f"{self.port[:80]} cannot be opened ({_reason(error)}); allowed: {_ports()}") from error
+        try:
+            answer = self._asked("WHO").split(" ")
+            self.name, self.watchdog = _printable(answer[2]), float(answer[3]) * 1e-3
+        except InputError:
+            self._line.close()
+            raise
+        except (IndexError, ValueError) as error:
+            self._line.close()
+            raise InputError(f"{self.port[:80]} answers as no remote does; allowed: another port") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def send(self, duty: float) -> float:
+        """Set the duty of the motor; it is off again after the watchdog's time unless it is said again.
+
+        Args:
+            duty: 0 (off) to 1.
+
+        Returns:
+            The duty as the far end has taken it, in steps of 0.001.
+
+        Raises:
+            InputError: for what is no duty (nothing is then sent), an unplugged port, or no answer.
+        """
+        _check_duty(duty)
+        return float(self._asked("DUTY", f" {float(duty):.3f}").split(" ")[2])
+
+    def hold(self, duty: float, duration: float, told: Callable[[float], None] | None = None) -> None:
+        """Keep a duty for a time, said again every tenth of a second; then the motor is off.
+
+        Args:
+            duty: 0 to 1.
+            duration: s.
+            told: told how long it has been on, s.
+
+        Raises:
+            InputError: as `send`, and for a time that is none.
+        """
+        _check_length(duration)
+        start = time.monotonic()
+        try:
+            while (passed := time.monotonic() - start) < duration:
+                self.send(duty)
+                if told is not None:
+                    told(passed)
+                time.sleep(max(0.0, min(_REPEAT, duration - (time.monotonic() - start))))
+        finally:
+            self._off()
+
+    def off(self) -> None:
+        """Switch the motor off.
+
+        Raises:
+            InputError: for an unplugged port, or no answer.
+        """
+        self._asked("OFF")
+
+    def close(self) -> None:
+        """Switch the motor off and leave the port; a port that is gone is left, and the watchdog does the rest."""
+        self._off()
+        with suppress(*self._gone):
+            self._line.close()
+
+    def _off(self) -> None:
+        with suppress(InputError):
+            if self._line.is_open:
+                self.off()
+
+    def _asked(self, verb: str, more: str = "") -> str:
+        """Say something until it is answered.
+
+        Raises:
+            InputError: for an unplugged port, no answer, or a refusal.
+        """
+        self._number = self._number % 999_999_999 + 1
+        line, wanted = framed(f"{verb} {self._number}{more}"), "WHO" if verb == "WHO" else "ACK"
+        try:
+            for _ in range(_TRIES):
+                self._line.write(line)
+                answer = self._answer(wanted)
+                if answer is not None:
+                    return answer
+        except self._gone as error:
+            raise InputError(
+                f"{self.port[:80]} is gone ({_reason(error)}): the remote's watchdog switches the motor off; allowed: "
+                "to plug it in again"
+            ) from error
+        raise InputError(
+            f"{self.port[:80]} does not answer {verb} within {_TRIES * _PATIENCE:g} s: the remote's watchdog switches "
+            "the motor off; allowed: a remote that speaks the protocol of docs/serial-remote.md"
+        )
+
+    def _answer(self, wanted: str) -> str | None:
+        """The answer to the last line; None where none comes in time."""
+        end = time.monotonic() + _PATIENCE
+        while time.monotonic() < end:
+            heard = self._line.read(max(1, min(self._line.in_waiting, LONGEST_LINE)))
+            *lines, self._rest = (self._rest + heard).split(b"\n")
+            self._rest = self._rest[-LONGEST_LINE:]
+            for body in filter(None, map(unframed, lines)):
+                if body.startswith(f"{wanted} {self._number} "):
+                    return body
+        return None
+
+
+def _check_duty(duty: Any) -> None:
+    number = float("nan") if isinstance(duty, bool) or not isinstance(duty, Real) else float(duty)
+    if not 0.0 <= number <= 1.0:
+        raise InputError(f"duty = {str(duty)[:40]}; allowed: a number from 0 to 1")
+
+
+def _check_length(duration: Any) -> None:
+    if not (isinstance(duration, Real) and 0.0 < float(duration) <= _LONGEST_HOLD):
+        raise InputError(f"duration = {str(duration)[:40]}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
+
+
+def _printable(text: str) -> str:
+    return "".join(letter for letter in text if letter.isprintable())[:40]
+
+
+def _reason(error: Exception) -> str:
+    said = getattr(error, "strerror", None) or str(error)
+    return " ".join(str(said).split())[:100]
+
+
+def _ports() -> str:
+    from serial.tools.list_ports import comports
+
+    found = sorted(str(item.device) for item in comports())
+    return ", ".join(found[:8]) if found else "a serial port, of which this machine has none now"
+
+
+@dataclass(frozen=True)
+class RemoteRun(Shown):
+    """What a remote was told."""
+
+    port: str
+    """The port."""
+    name: str
+    """What the far end calls itself."""
+    duty: float
+    """Duty of the motor, in steps of 0.001."""
+    duration: float
+    """How long it was on, s."""
+    watchdog: float
+    """Time after which the far end switches off by itself, s."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer of `spirillum remote --json`."""
+        content = {
+            "port": self.port,
+            "name": self.name,
+            "duty": quantity(self.duty, "1"),
+            "time_on": quantity(self.duration, "s"),
+            "watchdog": quantity(self.watchdog, "s"),
+        }
+        return envelope("remote", content, ())
+
+
+def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: int = _BAUD) -> RemoteRun:
+    """Switch a motor on through a remote at a serial port, for a time; then it is off. Needs the extra `control`.
+
+    Args:
+        port: such as ``/dev/ttyUSB0`` or ``COM3``.
+        duty: 0 to 1.
+        duration: how long, with its unit or a float in s.
+        baud: symbols a second.
+
+    Raises:
+        InputError: for wrong input, a port that is not there, in use or unplugged, or a remote that does not answer.
+    """
+    length = parse_option("duration", duration, KINDS["time"])
+    _check_duty(duty)
+    _check_length(length)
+    with SerialRemote(port, baud=baud) as there:
+        there.hold(duty, length)
+        return RemoteRun(there.port, there.name, round(float(duty), 3), length, there.watchdog)
+
+
+class VirtualRemote:
+    """A remote without hardware: a pseudo-terminal with a receiver behind it, to try programs on; not on Windows."""
+
+    def __init__(self, name: str = "virtual", watchdog: float = WATCHDOG) -> None:
+        """Open a pseudo-terminal.
+
+        Args:
+            name: what the remote calls itself.
+            watchdog: time after which it switches off by itself, s.
+
+        Raises:
+            InputError: where the system has no pseudo-terminals.
+        """
+        if not hasattr(os, "openpty"):
+            raise InputError("this system has no pseudo-terminals; allowed: Linux or macOS, or a real port")
+        import tty
+
+        self.receiver = Receiver(name, watchdog)
+        """What is behind the port."""
+        self._near, self._far = os.openpty()
+        tty.setraw(self._far)
+        self.port = os.ttyname(self._far)
+        """Port of the remote."""
+        self.deaf = False
+        """Whether it hears nothing, as one out of reach."""
+        self._plugged = True
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.unplug()
+
+    @property
+    def duty(self) -> float:
+        """Duty of the motor now."""
+        return self.receiver.duty(time.monotonic())
+
+    def unplug(self) -> None:
+        """Take the port away."""
+        if self._plugged:
+            self._plugged = False
+            self._thread.join()
+            os.close(self._far)
+            os.close(self._near)
+
+    def _listen(self) -> None:
+        while self._plugged:
+            ready, _, _ = select.select([self._near], [], [], 0.01)
+            if ready:
+                with suppress(OSError):
+                    data = os.read(self._near, 4096)
+                    if not self.deaf:
+                        os.write(self._near, self.receiver.receive(data, time.monotonic()))
