@@ -34,6 +34,7 @@ from spirillum.vision.track.direction import along_its_way
 from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steps import Follower
+from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Frame, Video
 
 __all__ = ["Following"]
@@ -164,7 +165,18 @@ class Following:
         self.next_check = frame.time + _CHECKED
         hand = self.learnt.known.wire.handedness()
         odd = motion_flags(self.readings, self.robot, self.body.period, hand)
-        self.flags = (*self.moved, *self.always, *self.learnt.flags, *odd)
+        self.flags = (*self.moved, *self.always, *self.learnt.flags, *self._uneven(), *odd)
+
+    def _uneven(self) -> tuple[Flag, ...]:
+        """That uneven stripes spoil the rate of a few seconds; over the whole they are learnt."""
+        if not self.learnt.known.stripes.stripes:
+            return ()
+        _, _, body, _, roll, error, _, _ = self.readings.columns()
+        edges = np.array(self.follower.record.edges[-body.size :])
+        if not evened(body, roll, error, edges, self.body.period).flags:
+            return ()
+        sentence = "the stripes are uneven: the body's angle and rate are not given frame by frame, but over all frames"
+        return (Flag("uneven-stripes", sentence, (_BODY,)),)
 
     def _rates(self, body_error: float, tail_error: float) -> dict[str, Measured]:
         """Speed and rates over the window."""
@@ -204,7 +216,7 @@ class Following:
     def _forget(self, count: int) -> None:
         """Forget the first frames."""
         record = self.follower.record
-        for column in (record.time, record.index, record.placed, record.roll, record.tail):
+        for column in (record.time, record.index, record.placed, record.roll, record.edges, record.tail):
             del column[:count]
 
     def trial(self, name: str) -> Trial:

@@ -98,7 +98,7 @@ def stripe_edges(troubles: Troubles, count: int, seed: int) -> Samples:
     even = 2.0 * np.pi / count
     widths = 1.0 + troubles.uneven_stripes * np.random.default_rng([seed, _PAINT]).uniform(-1.0, 1.0, count)
     edges = np.concatenate([[0.0], np.cumsum(widths)]) * (2.0 * np.pi / widths.sum())
-    return np.asarray(edges - 0.5 * even) if troubles.uneven_stripes else even * (np.arange(count + 1) - 0.5)
+    return np.asarray(edges - 0.5 * even, dtype=float)
 
 
 def repainted(robot: Robot, vertices: Samples, edges: Samples) -> Samples:

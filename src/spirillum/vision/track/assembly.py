@@ -21,6 +21,7 @@ from spirillum.vision.track.steps import Record
 from spirillum.vision.track.track import Track
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
+from spirillum.vision.track.widths import evened
 from spirillum.vision.video.frames import Video
 
 __all__ = ["track_of"]
@@ -57,6 +58,8 @@ def track_of(
     restored = restored_times(time, _readings(roll[:, 0], tail[:, 0], position[:, 0], known, optics))
     time = restored.time
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
+    even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
+    body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     scale, size_flags = checked_scale(sight.scale, body, known.size)
     hand = known.wire.handedness()
@@ -73,7 +76,7 @@ def track_of(
         body_angle=body_angle,
         tail_phase=tail_phase,
         position_error=errors[:, 0] * optics.focal / sight.optics.focal,
-        body_angle_error=np.where(np.isfinite(body_angle), roll[:, 1], np.nan),
+        body_angle_error=np.where(np.isfinite(body_angle), even.error, np.nan),
         tail_phase_error=np.where(np.isfinite(tail_phase), tail[:, 1], np.nan),
         picture=_drawn(pose, body.robot, optics),
         size=video.size,

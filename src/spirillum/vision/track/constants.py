@@ -27,6 +27,7 @@ __all__ = [
     "TAIL",
     "UNWRAPPING",
     "VISIBILITY",
+    "WIDTHS",
     "ColourConstants",
     "ContourConstants",
     "CutConstants",
@@ -42,6 +43,7 @@ __all__ = [
     "TailConstants",
     "UnwrappingConstants",
     "VisibilityConstants",
+    "WidthConstants",
 ]
 
 
@@ -309,6 +311,36 @@ class StripeConstants:
 
 
 @dataclass(frozen=True)
+class WidthConstants:
+    """Uneven stripes (`widths`)."""
+
+    reach: float = radians(14.0)
+    """Largest shift of an edge that is tried, rad: a third of a stripe of eight."""
+    step: float = radians(0.5)
+    """Steps between the shifts that are tried, rad."""
+    steepest: float = radians(52.0)
+    """Largest angle from the direction towards the camera at which an edge is located, rad."""
+    around: float = 0.42
+    """Half width over that of a stripe of the surroundings through which an edge is located."""
+    contrast: float = 40.0
+    """Least difference of the colours on either side, of 255."""
+    fewest: int = 8
+    """Fewest samples along the angle."""
+    frames: int = 20
+    """Fewest frames with two edges in view."""
+    rounds: int = 4
+    """Rounds in which stray edges are left out."""
+    stray: float = 4.0
+    """Residual over the usual one from which on an edge of a frame is left out."""
+    seen: int = 10
+    """Fewest frames of an edge."""
+    uneven: float = radians(2.0)
+    """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
+    left: float = 0.05
+    """Share of that range that is left as an error of each angle. Assumed."""
+
+
+@dataclass(frozen=True)
 class TailConstants:
     """Phase of the tail from the picture of its wire (`tail`)."""
 
@@ -506,6 +538,7 @@ IDENTITY = IdentityConstants()
 STEADINESS = SteadinessConstants()
 COLOURS = ColourConstants()
 STRIPES = StripeConstants()
+WIDTHS = WidthConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()

@@ -48,6 +48,8 @@ class Record:
     """The body on each frame."""
     roll: list[tuple[float, float]] = field(default_factory=list)
     """Angle of the body modulo the stripes' period, and its standard error, rad; NaN where unreadable."""
+    edges: list[np.ndarray] = field(default_factory=list)
+    """How far the edges between stripes lie off an even pattern, rad, (stripes,): see `edge_shifts`."""
     tail: list[tuple[float, float]] = field(default_factory=list)
     """Phase of the tail modulo 2 pi, and its standard error, rad; NaN where unreadable."""
 
@@ -73,12 +75,16 @@ class Follower:
         found = self._placed(frame, self._guess(frame.time))
         if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
             found = self._found_again(frame.image, found)
-        roll = self.known.stripes.read(frame.image, found.pose) if found.known else _UNREAD
+        stripes = self.known.stripes
+        roll, edges = _UNREAD, np.full(len(stripes.stripes), np.nan)
+        if found.known:
+            roll, edges = stripes.read_with_edges(frame.image, found.pose)
         tail = self.known.wire.read(frame.image, found.pose) if found.known else _UNREAD
         record.time.append(frame.time)
         record.index.append(frame.index)
         record.placed.append(found)
         record.roll.append(roll)
+        record.edges.append(edges)
         record.tail.append(tail)
         if found.known:
             self._last = found.pose

@@ -24,6 +24,7 @@ from spirillum.vision.track.colours import (
     without_glare,
 )
 from spirillum.vision.track.constants import STRIPES
+from spirillum.vision.track.widths import edge_shifts
 
 __all__ = ["Stripes"]
 
@@ -154,16 +155,28 @@ class Stripes:
             image: the picture, 8-bit RGB (h, w, 3).
             pose: pose of the body.
         """
+        return self.read_with_edges(image, pose)[0]
+
+    def read_with_edges(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], Samples]:
+        """The same, and by how much the edges between stripes lie off an even pattern: see `edge_shifts`.
+
+        Args:
+            image: the picture, 8-bit RGB (h, w, 3).
+            pose: pose of the body.
+        """
+        unread = (np.nan, np.nan), np.full(len(self.stripes), np.nan)
         if self.appearance is None:
-            return np.nan, np.nan
+            return unread
         profile, scale = self._profile(image, pose)
         answer = self._fit(profile, scale, self.appearance)
         loss, other, flat = answer[2:5]
         if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
-            return np.nan, np.nan
-        return float(answer[0]), float(
-            np.sqrt(answer[1] ** 2 + STRIPES.floor**2 + (STRIPES.pixel_locking / scale.max()) ** 2)
-        )
+            return unread
+        error = np.sqrt(answer[1] ** 2 + STRIPES.floor**2 + (STRIPES.pixel_locking / scale.max()) ** 2)
+        known, blur = self.appearance, np.clip(self.appearance.blur / np.maximum(scale, 1e-9), 0.004, 0.5)
+        colours, angle = known.palette[self.order], float(answer[0])
+        shifts = edge_shifts(profile / answer[5:8], self.angles, blur, known.shade, colours, angle)
+        return (angle, float(error)), shifts
 
     def _unreadable(self) -> Flag:
         sentence = "the stripes are in no frame's view, so that the body's rotation is not given"

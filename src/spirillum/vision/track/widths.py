@@ -1,0 +1,125 @@
+"""Uneven stripes: where the edges between them lie, learnt from the film.
+
+On each frame the edges in view are located one by one against an even pattern. An edge d off its place shows d on every
+frame, less what the frame's own angle is off; the angles of all frames and the places of all edges follow by linear
+least squares. A whole turn is exact whatever the widths are.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.robust import mad_scale
+from spirillum.vision.flag import Flag
+from spirillum.vision.track.constants import WIDTHS
+
+__all__ = ["Evened", "edge_shifts", "evened"]
+
+
+class Evened(NamedTuple):
+    """Angles of a body without what its stripes' widths do to them."""
+
+    angle: Samples
+    """Continuous, rad, (n,)."""
+    error: Samples
+    """Standard error on each frame, rad, (n,)."""
+    flags: tuple[Flag, ...]
+
+
+def edge_shifts(
+    levels: Samples, angles: Samples, blur: Samples, shade: Samples, colours: Samples, angle: float
+) -> Samples:
+    """Angles by which the edges in view lie beyond their even places, rad, (stripes,); NaN of others.
+
+    Args:
+        levels: colours along the angle over the frame's gains, (n, 3); NaN where nothing is seen.
+        angles: about the axis, rad, (n,).
+        blur: standard deviation of the blur at each angle, rad, (n,).
+        shade: shading factor and additive sheen at each angle, in each channel, (n, 6).
+        colours: of the stripes in their order, (stripes, 3).
+        angle: of the body, rad.
+    """
+    from scipy.special import ndtr
+
+    count = len(colours)
+    width = 2.0 * np.pi / count
+    shifts = np.arange(-WIDTHS.reach, WIDTHS.reach + 0.5 * WIDTHS.step, WIDTHS.step)
+    found = np.full(count, np.nan)
+    for edge in range(count):
+        place = (angle + (edge - 0.5) * width + np.pi) % (2.0 * np.pi) - np.pi
+        before, after = colours[edge - 1], colours[edge]
+        if abs(place) > WIDTHS.steepest or np.linalg.norm(after - before) < WIDTHS.contrast:
+            continue
+        near = np.abs(angles - place) < WIDTHS.around * width
+        seen = levels[near]
+        if near.sum() < WIDTHS.fewest or not np.isfinite(seen).all():
+            continue
+        share = ndtr((angles[near] - place - shifts[:, None]) / blur[near])[..., None]
+        light, sheen = shade[near, :3], shade[near, 3:]
+        misfit = seen - sheen - light * (before + (after - before) * share)
+        losses = np.sum(misfit**2, axis=(1, 2))
+        best = int(np.argmin(losses))
+        if not 0 < best < shifts.size - 1:
+            continue
+        low, middle, high = losses[best - 1 : best + 2]
+        found[edge] = shifts[best] + 0.5 * WIDTHS.step * (low - high) / max(low - 2.0 * middle + high, 1e-300)
+    return found
+
+
+def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period: float) -> Evened:
+    """Angles corrected by the learnt widths; as they are where stripes are about even, or too little was seen.
+
+    Args:
+        angle: continuous angle of the body by an even pattern, rad, (n,); NaN where unknown.
+        read: the same as it was read, modulo `period`, rad, (n,).
+        error: its standard error, rad, (n,).
+        edges: result of `edge_shifts` on each frame, (n, stripes).
+        period: of the stripes, rad.
+    """
+    untouched, count = Evened(angle, error, ()), edges.shape[1]
+    known = np.isfinite(angle) & (np.isfinite(edges).sum(axis=1) >= 2)
+    if known.sum() < WIDTHS.frames:
+        return untouched
+    repeat = round(count * period / (2.0 * np.pi))
+    turned = np.round((angle - read) / period)[known].astype(int)
+    which = (np.arange(count)[None, :] - repeat * turned[:, None]) % count
+    shifts = np.full((int(known.sum()), count), np.nan)
+    np.put_along_axis(shifts, which, edges[known], axis=1)
+    places = _places(shifts)
+    seen = np.isfinite(places)
+    off = float(np.ptp(places[seen])) if seen.any() else 0.0
+    if off < WIDTHS.uneven:
+        return untouched
+    weight = (np.isfinite(shifts) & seen).astype(float)
+    total = np.maximum(weight.sum(axis=1), 1e-9)
+    own = np.sum(weight * np.nan_to_num(shifts - places), axis=1) / total
+    better, surer = np.full(angle.shape, np.nan), error.copy()
+    better[known] = np.where(weight.sum(axis=1) > 0, angle[known] + own, np.nan)
+    surer[known] = np.hypot(error[known], WIDTHS.left * off)
+    even = 2.0 * np.pi / count
+    sentence = (
+        f"the stripes are uneven: against stripes of {np.degrees(even):.0f} deg their edges lie up to "
+        f"{np.degrees(off):.1f} deg apart; their places were learnt from the film and taken into account"
+    )
+    return Evened(better, surer, (Flag("uneven-stripes", sentence),))
+
+
+def _places(shifts: Samples) -> Samples:
+    """Shift of each edge, rad, (stripes,), of mean 0; NaN of edges that were seen too rarely, or beside no others."""
+    weight = np.isfinite(shifts).astype(float)
+    value = np.nan_to_num(shifts)
+    places = np.zeros(shifts.shape[1])
+    for _ in range(WIDTHS.rounds):
+        total = np.maximum(weight.sum(axis=1), 1e-9)
+        normal = np.diag(weight.sum(axis=0)) - (weight / total[:, None]).T @ weight
+        right = (weight * value).sum(axis=0) - (weight / total[:, None]).T @ (weight * value).sum(axis=1)
+        places = np.linalg.lstsq(normal, right, rcond=1e-6)[0]
+        own = (weight * (value - places)).sum(axis=1) / total
+        residual = value - places - own[:, None]
+        scale = float(mad_scale(residual[weight > 0])) + 1e-4
+        weight = (np.isfinite(shifts) & (np.abs(residual) < WIDTHS.stray * scale)).astype(float)
+    often = weight.sum(axis=0) >= WIDTHS.seen
+    return np.where(often, places - places[often].mean() if often.any() else 0.0, np.nan)

@@ -1,0 +1,76 @@
+"""Uneven stripes: edges are found where they were drawn, and the angle is that of the body."""
+
+import numpy as np
+import pytest
+
+from spirillum.vision.track.widths import edge_shifts, evened
+
+COUNT, PERIOD = 8, np.pi
+EVEN = 2 * np.pi / COUNT
+PLACES = np.radians([3.3, -3.4, -2.0, -3.3, -0.8, 5.5, -2.4, 3.1])
+
+
+def planted(rate, frames=240, noise=0.0, places=PLACES):
+    """Angles by an even pattern, as read, and edges' shifts, of a body with uneven stripes; and the true angle."""
+    rng = np.random.default_rng(2)
+    true = 0.4 + rate * np.arange(frames) / 30.0
+    edge = (true[:, None] + EVEN * (np.arange(COUNT) - 0.5) + np.pi) % (2 * np.pi) - np.pi
+    seen = np.abs(edge) < np.radians(52.0)
+    shifts = np.where(seen, places, np.nan)
+    weight = np.where(seen, np.cos(edge) ** 2, 0.0)
+    own = np.sum(weight * places, axis=1) / weight.sum(axis=1)  # the fit follows the edges in view
+    angle = true + own + noise * rng.standard_normal(frames)
+    found = shifts - (angle - true)[:, None] + noise * rng.standard_normal(shifts.shape)
+    turned = np.floor(angle / PERIOD).astype(int)
+    which = (np.arange(COUNT)[None, :] + 4 * turned[:, None]) % COUNT
+    return angle, angle % PERIOD, np.take_along_axis(found, which, axis=1), true
+
+
+def slope(values):
+    known = np.isfinite(values)
+    return np.polyfit(np.arange(values.size)[known] / 30.0, values[known], 1)[0]
+
+
+@pytest.mark.parametrize("rate", [-0.25, 0.25, -2.0])
+def test_the_rate_is_that_of_the_body(rate):
+    angle, read, edges, true = planted(rate, noise=np.radians(0.3))
+    found = evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD)
+    off = found.angle - true
+    assert np.nanstd(off) < np.radians(0.5)
+    assert slope(found.angle) == pytest.approx(rate, rel=5e-3)
+    if abs(rate) < 1.0:  # less than a turn: without the places it is wrong
+        assert abs(slope(angle) / rate - 1.0) > 0.02
+    assert [flag.name for flag in found.flags] == ["uneven-stripes"]
+    assert not found.flags[0].spoils
+    assert (found.error > 0.004).all()
+
+
+def test_even_stripes_are_left_as_they_are():
+    angle, read, edges, _ = planted(-0.25, noise=np.radians(0.3), places=np.zeros(COUNT))
+    found = evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD)
+    assert found.angle is angle
+    assert not found.flags
+
+
+def test_too_few_edges_change_nothing():
+    angle, read, edges, _ = planted(-0.25)
+    edges[:, 1:] = np.nan
+    assert evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD).angle is angle
+
+
+def test_edges_are_found_where_they_are_drawn():
+    from scipy.special import ndtr
+
+    angles = np.radians(np.arange(-78.0, 78.1, 1.5))
+    colours = np.array([[200, 30, 30], [210, 190, 40], [40, 130, 50], [40, 60, 190]] * 2, dtype=float)
+    body, blur = 0.3, np.full(angles.size, 0.03)
+    picture = np.repeat(colours[-1:], angles.size, axis=0)
+    for turn in range(-COUNT, COUNT):
+        edge = turn % COUNT
+        at = body + (turn - 0.5) * EVEN + PLACES[edge]
+        picture += (colours[edge] - colours[edge - 1]) * ndtr((angles - at) / blur)[:, None]
+    shade = np.column_stack([np.full((angles.size, 3), 0.8), np.full((angles.size, 3), 5.0)])
+    found = edge_shifts(0.8 * picture + 5.0, angles, blur, shade, colours, body)
+    seen = np.isfinite(found)
+    assert seen.sum() >= 2
+    assert found[seen] == pytest.approx(PLACES[seen], abs=np.radians(0.4))
