@@ -21,9 +21,12 @@ END = 8.0
 
 def done(u: Any, v: Any, time: Any, voltage: float = 0.0, viscosity: float = 0.0, *, gap: float = 1.0) -> list[Any]:
     """Tail's phase, body's angle, current and voltage of a made-up robot: smooth in the unknown powers u and v."""
-    rate = 7.5 * (1.0 - 0.25 * u - 0.03 * u**2) * (1.0 + 1.1 * voltage - 0.3 * viscosity)
+    rate = 7.5 * (1.0 - 0.25 * u - 0.03 * u**2) * (1.0 + 1.1 * voltage - (0.3 - 0.2 * u) * viscosity)
     body = (
-        -0.12 * (1.0 - 0.25 * u) * (1.0 + 0.2 * gap * v + 0.02 * gap * v**2) * (1.0 + 1.1 * voltage - 0.3 * viscosity)
+        -0.12
+        * (1.0 - 0.25 * u)
+        * (1.0 + 0.2 * gap * v + 0.02 * gap * v**2)
+        * (1.0 + 1.1 * voltage - (0.3 - 0.2 * u) * viscosity)
     )
     none = 0.0 * time
     return [rate * time, body * time, 0.3 * (1.0 + voltage) + none, 3.46 * (1.0 + voltage) + none]
@@ -34,10 +37,10 @@ def paths(*, gap: float = 1.0) -> Paths:
     u, v = points(3.0), points(2.0)
     members = np.array([[done(one, two, time, gap=gap) for two in v] for one in u])
     small = 1e-6
-    middle = np.array(done(0.0, 0.0, time))
-    changed = np.array([done(0.0, 0.0, time, small, 0.0), done(0.0, 0.0, time, 0.0, small)])
+    own = np.array([done(one, 0.0, time) for one in u])[:, None]
+    changed = np.array([[done(one, 0.0, time, small, 0.0), done(one, 0.0, time, 0.0, small)] for one in u])
     with np.errstate(invalid="ignore"):
-        sensitivity = np.nan_to_num((changed / middle - 1.0) / small)
+        sensitivity = np.nan_to_num((changed / own - 1.0) / small)
     return Paths(time, members, sensitivity)
 
 

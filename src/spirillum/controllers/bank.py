@@ -2,7 +2,8 @@
 
 The unknown factors of friction and gap are u, v in [-1, 1] as powers of their largest factors. The members stand at
 Chebyshev's points of both; between them a polynomial in u and v interpolates what they do (Trefethen 2013). Two more
-members, in the middle, tell how all of it changes with the battery's voltage and the fluid's viscosity.
+members at each friction, of the robot file's gap, tell how all of it changes with the battery's voltage and the fluid's
+viscosity: viscosity counts for more where friction is small.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _POINTS = 5
 _STEP = 0.1
 """Between two moments that are kept, s."""
 _CHANGE = 0.02
-"""Relative change of voltage and of viscosity of the two members in the middle."""
+"""Relative change of voltage and of viscosity of the two more members."""
 
 
 def points(factor: float) -> Samples:
@@ -55,7 +56,7 @@ class Paths:
     members: Samples
     """(friction, gap, quantity, n)."""
     sensitivity: Samples
-    """Relative change of each quantity in the middle per relative one of voltage and viscosity, (2, quantity, n)."""
+    """Relative change of each quantity per relative one of voltage and viscosity, (friction, 2, quantity, n)."""
 
 
 class Bank:
@@ -80,12 +81,10 @@ class Bank:
             InputError: for a robot that cannot have these factors.
         """
         self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)
-        places = [
-            Drawn(float(unknown.friction_factor**u), float(unknown.gap_factor**v))
-            for u in self.friction
-            for v in self.gap
-        ]
-        places += [Drawn(1.0, 1.0), Drawn(1.0, 1.0, None, 1.0 + _CHANGE), Drawn(1.0, 1.0, None, 1.0, 1.0 + _CHANGE)]
+        factors = [float(unknown.friction_factor**u) for u in self.friction]
+        places = [Drawn(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
+        for factor in factors:
+            places += [Drawn(factor, 1.0, None, 1.0 + _CHANGE), Drawn(factor, 1.0, None, 1.0, 1.0 + _CHANGE)]
         self._plants: list[Plant] = []
         for place in places:
             self._plants.append(plant_of(robot, arguments or {}, place))
@@ -107,7 +106,7 @@ class Bank:
     @property
     def current(self) -> float:
         """Predicted while the drive is on, A."""
-        return float(abs(self._plants[-3].steady.motor_current))
+        return float(abs(self._plants[0].steady.motor_current))
 
     def follow(self, time: float, duty: float) -> None:
         """Let all members go on to a time at a duty."""
@@ -120,10 +119,12 @@ class Bank:
     def paths(self) -> Paths:
         """What they have done."""
         rows = np.moveaxis(np.array(self._rows), 0, -1)
-        middle, changed = rows[-3], rows[-2:]
+        count = self.friction.size * self.gap.size
+        members = rows[:count].reshape(self.friction.size, self.gap.size, len(QUANTITIES_OF_BANK), -1)
+        changed = rows[count:].reshape(self.friction.size, 2, len(QUANTITIES_OF_BANK), -1)
+        own = members[:, self.gap.size // 2, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            sensitivity = np.nan_to_num((changed / middle - 1.0) / _CHANGE, posinf=0.0, neginf=0.0)
-        members = rows[:-3].reshape(self.friction.size, self.gap.size, len(QUANTITIES_OF_BANK), -1)
+            sensitivity = np.nan_to_num((changed / own - 1.0) / _CHANGE, posinf=0.0, neginf=0.0)
         return Paths(np.array(self._time), members, sensitivity)
 
 

@@ -5,10 +5,11 @@ speed that is asked for, t the time, d = 1 or -1 the robot's way.
 
 `HoldSpeed`, proportional and integral with back-calculation against windup (Astrom and Hagglund 2006):
 
-    e = d v - (u s + w),   u = sat(u_0 + K e + I),   dI/dt = K e / T_i + (sat(u) - u) / T_t.
+    e = d v - y,   u = sat(d v / s + K e + I),   dI/dt = K_i e + (sat(u) - u) / T_t,
 
-A robot without inertia answers at once, after a dead time: its integral gain K / T_i = 1 / (s_0 (T_c + theta)) is
-Skogestad's (2003) for such a process, with T_c = 2 s for the follower's own lag.
+with the followed way y over the last W = 2 s, per time. A robot without inertia answers at once, after a dead time:
+K_i = 1 / (s (T_c + theta)) is Skogestad's (2003) for such a process, K = 0.2 / s, and the dead time theta counts half
+of W. The speed s that is followed takes the robot's slow changes away from the integral.
 
 `KeepCourse`, place by a cascade whose inner loop inverts the robot as it is estimated, drift included:
 
@@ -19,6 +20,7 @@ Skogestad's (2003) for such a process, with T_c = 2 s for the follower's own lag
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
@@ -31,10 +33,12 @@ from spirillum.controllers.signals import News, Sight
 
 __all__ = ["HoldSpeed", "KeepCourse", "SaveBattery", "Steady"]
 
-_CLOSED = 2.0
+_CLOSED = 1.5
 """T_c, s."""
 _PROPORTIONAL = 0.2
-"""K s_0."""
+"""K s."""
+_WINDOW = 2.0
+"""W, s."""
 _BACK = 3.0
 """T_t, s."""
 _CATCH_UP = 3.0
@@ -102,21 +106,22 @@ class HoldSpeed(_Watching):
         """Begin; `asked` is the speed that is to be held, m/s, without sign."""
         super().__init__(lab, speed, duty)
         self._asked = self._way * asked
-        dead = lab.camera.latency + lab.remote.delay + 0.5 * lab.remote.period
-        self._gain = _PROPORTIONAL / self._full
-        self._integral_gain = 1.0 / (self._full * (_CLOSED + dead))
-        self._first = min(asked / abs(self._full), 1.0)
+        self._closed = _CLOSED + lab.camera.latency + lab.remote.delay + 0.5 * (lab.remote.period + _WINDOW)
         self._integral, self._before = 0.0, 0.0
+        self._places: deque[tuple[float, float]] = deque()
 
     def decide(self, news: News) -> float:
         """Proportional and integral, held within 0 and 1."""
-        ahead = self._follow(news)
-        duty = self._follower.duty_at(news.time + self._delay)
-        error = self._asked - (duty * ahead[1] + ahead[2])
-        wanted = self._first + self._gain * error + self._integral
+        full = self._follow(news)[1]
+        self._places.append((news.time, float(self._now[0])))
+        while len(self._places) > 1 and self._places[1][0] <= news.time - _WINDOW:
+            self._places.popleft()
+        (then, before), (now, place) = self._places[0], self._places[-1]
+        error = self._asked - (place - before) / (now - then) if now - then > 0.5 * _WINDOW else 0.0
+        wanted = (self._asked + _PROPORTIONAL * error) / full + self._integral
         held = float(np.clip(wanted, 0.0, 1.0))
         dt = news.time - self._before
-        self._integral += dt * (self._integral_gain * error + (held - wanted) / _BACK)
+        self._integral += dt * (error / (full * self._closed) + (held - wanted) / _BACK)
         self._before = news.time
         return self._sent(news, held)
 

@@ -26,6 +26,8 @@ _DURATION = 40.0
 """Of a run, s."""
 _STEP = 0.5
 """Step of the runs by which the open loop is found, s."""
+_SPEED_OVER = 2.0
+"""Time over which a speed is taken, s."""
 _WITHIN = 0.05
 """Relative error of a speed that is good."""
 
@@ -74,13 +76,11 @@ class _CourseTask(Task):
             carried=carried_by_flow(plant, lab.pulse.velocity, lab.pulse.duration),
         )
 
-    def _way_missed(self, run: LoopRun, brief: Brief, since: float) -> float:
-        """Way since a time less that of the course, m."""
-        time = np.array([moment.time for moment in run.moments])
-        place = np.array([moment.pose.position[0] for moment in run.moments])
-        ends = np.array([since, brief.duration])
-        gone = float(np.diff(np.interp(ends, time, place))[0])
-        return brief.way * gone - self.asked * (brief.duration - since)
+    def _way_missed(self, run: LoopRun, brief: Brief) -> float:
+        """Way of the run less that of the course, m."""
+        time, place = _path(run)
+        gone = float(np.interp(brief.duration, time, place) - place[0])
+        return brief.way * gone - self.asked * brief.duration
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
         """The course."""
@@ -91,7 +91,7 @@ class HoldSpeedTask(_CourseTask):
     """Hold a speed by PWM."""
 
     kind: ClassVar[str] = "hold-speed"
-    error_name: ClassVar[str] = "mean speed of the second half less that asked for"
+    error_name: ClassVar[str] = "median speed of the second half less that asked for"
     error_unit: ClassVar[str] = "m/s"
 
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
@@ -101,9 +101,11 @@ class HoldSpeedTask(_CourseTask):
         return _reference(name, brief, self.asked, flow)
 
     def score(self, run: LoopRun, brief: Brief) -> Score:
-        """Good within 5 % of the speed."""
-        half = 0.5 * brief.duration
-        error = self._way_missed(run, brief, half) / half
+        """Good within 5 % of the speed; speeds are over 2 s, so that turns of the tail and a pulse do not count."""
+        time, place = _path(run)
+        starts = np.arange(0.5 * brief.duration, brief.duration - _SPEED_OVER, 0.25)
+        ways = np.interp(starts + _SPEED_OVER, time, place) - np.interp(starts, time, place)
+        error = float(np.median(brief.way * ways / _SPEED_OVER)) - self.asked
         return Score(error, abs(error) <= _WITHIN * self.asked and not run.ended, energy(run))
 
 
@@ -125,7 +127,7 @@ class RideOutTask(_CourseTask):
 
     def score(self, run: LoopRun, brief: Brief) -> Score:
         """Good within the tolerance."""
-        error = self._way_missed(run, brief, 0.0)
+        error = self._way_missed(run, brief)
         return Score(error, abs(error) <= self.tolerance and not run.ended, energy(run))
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
@@ -150,7 +152,7 @@ class SaveBatteryTask(RideOutTask):
 
     def score(self, run: LoopRun, brief: Brief) -> Score:
         """Good if it has come as far as asked, within the tolerance; energy is what it is about."""
-        error = self._way_missed(run, brief, 0.0)
+        error = self._way_missed(run, brief)
         return Score(error, error >= -self.tolerance and not run.ended, energy(run))
 
 
@@ -159,6 +161,14 @@ def _reference(name: str, brief: Brief, asked: float, flow: FlowPulse | None) ->
     if name == "knowing":
         return KeepCourse(brief.lab, brief.speed, brief.duty, asked, knowing=True, flow=flow, carried=brief.carried)
     return Steady(brief.schedule[1] if name == "open-loop" else brief.duty)
+
+
+def _path(run: LoopRun) -> tuple[Samples, Samples]:
+    """Times, s, and places along the tube, m."""
+    return (
+        np.array([moment.time for moment in run.moments]),
+        np.array([moment.pose.position[0] for moment in run.moments]),
+    )
 
 
 def _mean_speed(plant: Plant, duty: float, duration: float, progress: Progress | None) -> float:
