@@ -39,7 +39,8 @@ def schema_of(name: str) -> dict[str, Any]:
         for field, words in meanings(models[title]).items():
             table["properties"][field].setdefault("description", words)
     if name == "robot":
-        extends = {"type": "string", "description": "Preset that the file starts from.", "title": "Extends"}
+        words = "Preset, or robot file beside this one, that the file starts from."
+        extends = {"type": "string", "description": words, "title": "Extends"}
         schema["properties"]["extends"] = extends
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

@@ -129,6 +129,10 @@ def predict(
         float | None,
         typer.Option(help="Model tube, free: coefficient of dry friction where asperities touch; else 0.1."),
     ] = None,
+    beyond_stokes: Annotated[
+        bool,
+        typer.Option("--beyond-stokes", help="Answer at Reynolds numbers above 10 too, where these models are wrong."),
+    ] = False,
     all_of_it: All = False,
     settings: Settings = None,
     json: Json = False,
@@ -156,6 +160,7 @@ def predict(
             motion=motion,
             roughness=roughness,
             in_tube={"friction_coefficient": friction_coefficient},
+            beyond_stokes=beyond_stokes,
             progress=progress,
         )
     renderer.show(result.to_dict(), json=json, all_of_it=all_of_it)

@@ -19,6 +19,9 @@ from spirillum.swimming.prediction import Prediction
 
 __all__ = ["predict"]
 
+_LARGEST_REYNOLDS = 10.0
+"""Reynolds number from which on an answer of Stokes flow is refused unless it is asked for."""
+
 
 def predict(
     robot: str | Path | Mapping[str, Any] | Robot,
@@ -36,6 +39,7 @@ def predict(
     motion: str = "held",
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
+    beyond_stokes: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Prediction:
     """Predict the steady swimming of one robot.
@@ -61,6 +65,7 @@ def predict(
         roughness: of free motion in the tube: height of the asperities, with its unit or a float in m; None: 1e-4 of
             the body's radius.
         in_tube: of free motion in the tube: `azimuth` of the start and `friction_coefficient`, see `InTube`.
+        beyond_stokes: answer at Reynolds numbers above 10 too, where inertia rules and these models are wrong.
         progress: told what is being computed, how much is done, and of how much.
 
     Raises:
@@ -80,7 +85,7 @@ def predict(
                     f"{name} = {str(value)[:40]} is of free motion in the tube; allowed: with model 'tube' and motion "
                     "'free'"
                 )
-        return prediction.predict(
+        answer = prediction.predict(
             robot,
             model=model,
             tail_rate=tail_rate,
@@ -95,6 +100,9 @@ def predict(
             motion=motion,
             progress=progress,
         )
+        if not beyond_stokes:
+            _check_stokes(answer)
+        return answer
     if posterior is not None:
         raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
     check_not_resolved(load(robot), resolution)
@@ -115,6 +123,21 @@ def predict(
         progress=progress,
     )
     return replace(found.prediction, choice=choice)
+
+
+def _check_stokes(answer: Prediction) -> None:
+    """Refuse an answer far outside Stokes flow.
+
+    Raises:
+        InputError: if a Reynolds number is above 10.
+    """
+    for name, what in (("reynolds_number", "body diameter"), ("tail_reynolds_number", "tail amplitude")):
+        value = float(getattr(answer, name))
+        if value > _LARGEST_REYNOLDS:
+            raise InputError(
+                f"Reynolds number ({what}) = {value:.3g}; allowed: at most {_LARGEST_REYNOLDS:g}, for these models "
+                "neglect inertia; a more viscous fluid, a slower or a smaller robot, or --beyond-stokes"
+            )
 
 
 def _free_in_tube(

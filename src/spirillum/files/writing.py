@@ -273,6 +273,10 @@ def netcdf_target(path: str | Path) -> Path:
     return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
 
 
+_FEW = 4
+"""Endings up to which their meanings stand in a sentence without them."""
+
+
 def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, replace: Replace = "own") -> Path:
     """The path of a file to write, checked before any work is done.
 
@@ -289,6 +293,8 @@ def output_target(path: str | Path, kinds: Mapping[str, str], example: str, *, r
     path = Path(path)
     if path.suffix not in kinds:
         endings, names = " or ".join(kinds), " or ".join(dict.fromkeys(kinds.values()))
+        if len(kinds) > _FEW:
+            names = ", ".join(f"{ending} ({what})" for ending, what in kinds.items())
         raise InputError(f"{str(path)[:200]!r} does not end in {endings}; allowed: {names}, for example {example}")
     real = check_replaceable(path, "any" if replace == "none" else replace)
     if real.exists() and not os.access(real, os.W_OK):

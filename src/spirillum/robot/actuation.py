@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from spirillum.robot.fields import (
     BackEmfConstant,
@@ -65,6 +66,11 @@ class MotorResistance(Section):
     """Slope of the linear term (with its sign)."""
 
 
+def _plain_resistance(value: Any) -> Any:
+    """A single value, which does not depend on the current, as the constant term."""
+    return value if isinstance(value, (Mapping, MotorResistance)) else {"constant": value}
+
+
 class Motor(Section):
     """The DC-motor of eqs (17) and (18)."""
 
@@ -76,8 +82,8 @@ class Motor(Section):
     """Inductance L (Table II)."""
     rotor_friction: RotaryFriction
     """Friction B_m of the rotor alone, on the motor's shaft (Table II)."""
-    resistance: MotorResistance
-    """Equivalent resistance R(I) of motor and driver (Table II)."""
+    resistance: Annotated[MotorResistance, BeforeValidator(_plain_resistance)]
+    """Equivalent resistance R(I) of motor and driver (Table II): its terms, or one value such as `"10.4 ohm"`."""
     gear_ratio: Annotated[float, Field(strict=True, ge=1e-3, le=1e4, allow_inf_nan=False)] = 1.0
     """Turns of the motor's shaft for one of the joint, G, of a gear without losses of its own; 1: driven directly."""
     polarity: Literal["forward", "reverse"] = "forward"

@@ -34,7 +34,12 @@ _WEIGHED = {
     "body": ("shape", "diameter", "length", "front", "rear", "fillet"),
     "coupling": ("diameter", "length", "clearance"),
 }
+# What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
+_SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's"}
+_SIZE = ("body.diameter", "body.length")
 _DEEPEST = 8
+_MOST_LAYERS = 8
+"""Robot files that lie over each other."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
 """Presets of the paper's robot, one for each of its channels."""
@@ -72,12 +77,11 @@ def load(robot: str | Path | Mapping[str, Any] | Robot, /, **overrides: Any) -> 
             raise InputError("overrides of a checked Robot; allowed: a preset's name, a file or a mapping with them")
         return robot
     table, source = raw_table(robot)
-    changes = [_touched(table)] if "extends" in table else []
-    table = _extended(table, source)
+    table, changes = _extended(table, source, _folder_of(robot))
     for path, value in overrides.items():
         _put(table, path.split("."), value, path)
     changes.append({field for path, value in overrides.items() for field in _touched(_nested(path, value))})
-    return _checked(table, source, _stale_mass(table, changes))
+    return _checked(table, source, (*_stale_mass(table, changes), *_left_over(table, changes)))
 
 
 def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -166,16 +170,46 @@ def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | N
     return robot.model_copy(update={"model": options})
 
 
-def _extended(table: dict[str, Any], source: str, depth: int = 0) -> dict[str, Any]:
-    """Lay the table over the preset that its `extends` names."""
+def _folder_of(robot: str | Path | Mapping[str, Any]) -> Path:
+    """Folder of a robot file, from which the files that it names are looked for."""
+    return Path() if isinstance(robot, Mapping) else Path(robot).parent
+
+
+def _extended(
+    table: dict[str, Any], source: str, folder: Path, above: tuple[Path, ...] = ()
+) -> tuple[dict[str, Any], list[set[str]]]:
+    """Lay the table over the preset or the robot file that its `extends` names.
+
+    Args:
+        table: raw tables, which are changed.
+        source: what to call them.
+        folder: where a file that they name is looked for.
+        above: the files that lie over these tables.
+
+    Returns:
+        The tables, and the fields that each layer has changed, from below.
+    """
     base = table.pop("extends", None)
     if base is None:
-        return table
-    if not isinstance(base, str) or base not in preset_names() or depth > 3:
+        return table, []
+    own = isinstance(base, str) and base.endswith(".toml")
+    if not own and (not isinstance(base, str) or base not in preset_names()):
         hint = did_you_mean(str(base), preset_names())
-        raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {', '.join(preset_names())}")
-    below = _extended(tomllib.loads(preset_text(base)), f"preset {base}", depth + 1)
-    return _merged(below, table)
+        allowed = f"{', '.join(preset_names())}, or a robot file (.toml) beside this one"
+        raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {allowed}")
+    if not own:
+        changed = _touched(table)
+        below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
+        return _merged(below, table), [*layers, changed]
+    path = folder / base
+    if len(above) >= _MOST_LAYERS or path.resolve() in above:
+        raise InputError(
+            f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
+            f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
+        )
+    changed = _touched(table)
+    below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, path.resolve()))
+    return _merged(below, table), [*layers, changed]
 
 
 def _merged(below: dict[str, Any], above: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
@@ -236,6 +270,22 @@ def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str,
     if not stale or not isinstance(body, dict) or "mass" not in body:
         return ()
     return (f"body.mass = {body['mass']} was measured before {', '.join(stale)} changed; set it anew",)
+
+
+def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
+    """Warn of what is older than the size of the body that it belongs to; arguments as `_stale_mass`."""
+    found = []
+    for field, whose in _SIZED.items():
+        section, name = field.split(".")
+        scaled: list[str] = []
+        for changed in changes:
+            scaled = [] if field in changed else scaled + [size for size in _SIZE if size in changed]
+        held = table.get(section)
+        if scaled and isinstance(held, dict) and held.get(name) is not None:
+            found.append(
+                f"{field} = {held[name]} is {whose} of another body, before {', '.join(scaled)} changed; set it anew"
+            )
+    return tuple(found)
 
 
 def _floating(robot: Robot) -> tuple[str, ...]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -102,6 +104,9 @@ class LaidDown(Section):
         return self
 
 
+_Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
+
+
 class Study(Section):
     """A study: a grid or a list of robots, answered by some models under some friction readings."""
 
@@ -122,6 +127,9 @@ class Study(Section):
     """A grid of robots."""
     robots: Annotated[list[_Name], Field(min_length=1, max_length=100_000)] | None = None
     """A list of robots (presets or files) instead of a grid."""
+    vary: Annotated[dict[_Name, _Values], Field(default_factory=dict, max_length=20)]
+    """Fields of the robot file with their values, such as `"tail.length" = ["40 mm", "60 mm"]`: every combination, for
+    each of `robots`."""
     placement: Placement = Placement()
     """Where in their channels the robots lie, for models that compute the walls."""
     band: Annotated[bool, Field(strict=True)] = False
@@ -156,6 +164,13 @@ class Study(Section):
             for name, items in lists.items()
             if len(set(items)) < len(items)
         ]
+        if self.vary and self.robots is None:
+            problems.append("vary without `robots`; allowed: with a list of robots, whose fields it sets")
+        problems += [
+            f"vary.{path} holds a value twice; allowed: each once"
+            for path, values in self.vary.items()
+            if len({repr(value) for value in values}) < len(values)
+        ]
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         problems += self._problems_of_the_band()
@@ -179,7 +194,7 @@ class Study(Section):
     def size(self) -> int:
         """Number of results."""
         grid = self.grid
-        robots = len(self.robots or ())
+        robots = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
         if grid is not None:
             robots = len(grid.channels) * len(grid.wavelengths) * len(grid.amplitudes)
         return robots * len(self.models) * len(self.friction) * (1 + len(self.assumed_motor_rates))
@@ -283,8 +298,10 @@ def load_study(
     if study.size > largest:
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
         raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
-    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
-    robots = tuple(_robot(entry, folder, overrides or {}) for entry in sources)
+    asked = list(_robots_of(study))
+    sources = [entry for entry, _ in asked]
+    robots = tuple(_robot(entry, folder, {**(overrides or {}), **varied}) for entry, varied in asked)
+    robots = _named_apart(robots, asked)
     _check_drives(study, sources, robots, name)
     if study.predicted and not (calibration is None and posterior is None):
         raise InputError(
@@ -315,6 +332,25 @@ def load_study(
     return loaded
 
 
+def _robots_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Source and varied fields of every robot that is to be loaded."""
+    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
+    for source in sources:
+        for values in product(*study.vary.values()):
+            yield source, dict(zip(study.vary, values, strict=True))
+
+
+def _named_apart(robots: tuple[Robot, ...], asked: Sequence[tuple[str, Mapping[str, Any]]]) -> tuple[Robot, ...]:
+    """The robots with what is varied in their names; the robot's own name only where there are several."""
+    several = len({robot.name for robot in robots}) > 1
+    found = []
+    for robot, (_, varied) in zip(robots, asked, strict=True):
+        words = [f"{path.rpartition('.')[2]} {value}" for path, value in varied.items()]
+        name = ", ".join([robot.name, *words] if several or not words else words)
+        found.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
+    return tuple(found)
+
+
 def _fitted(
     study: Study, calibration: str | Path | None, posterior: str | Path | None
 ) -> tuple[CalibrationFile | None, PosteriorFile | None]:
@@ -341,6 +377,9 @@ def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None
     Raises:
         InputError: if that is asked for.
     """
+    twice = [path for path in study.vary if path in overrides]
+    if twice:
+        raise InputError(f"{twice[0]} is set and varied by vary of {name}, which would win; allowed: one of them")
     both = [path for path in _VARIED if path in overrides] if study.grid is not None else []
     if both:
         own = f"grid.{both[0].removeprefix('tail.')}s"

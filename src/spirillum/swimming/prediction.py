@@ -46,7 +46,6 @@ from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["Prediction", "checked_batch", "least_gap", "predict", "prepared"]
 
-_LARGEST_REYNOLDS = 0.1
 _GAP_STEP = 1.02
 """Ratio of gaps to which the least one that a model resolves is told."""
 
