@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import PerRobot, Samples
-from spirillum.dynamics.held_model import PARAMETERS, HeldModel, held_model
+from spirillum.dynamics.held_model import PARAMETERS, HeldModel
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
-from spirillum.robot.robot import Robot
+from spirillum.robot.batch import RobotBatch, batches
 from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.steady import calibrated_balance
 
@@ -68,29 +68,33 @@ def drawn_numbers(
         else:
             numbers[:, _NAMES.index(name)] = rng.uniform(low, high, count)
     if any(name in ranges for name in FACTORS):
-        numbers[:, _FIRST_RESPONSE:] = _responses(held, factors["friction"], factors["viscosity"])
+        friction = held.prediction.effective_friction * factors["friction"]
+        numbers[:, _FIRST_RESPONSE:] = _responses(held, held.prediction.batch, friction, factors["viscosity"])
     return numbers
 
 
-def _responses(held: HeldModel, friction: PerRobot, viscosity: PerRobot) -> Samples:
-    """(U, Omega, omega) per joint torque, then per imposed flow, of robots with other friction and viscosity, (n, 6).
+def _responses(held: HeldModel, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
+    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6).
 
-    In Stokes flow all resistances, and the wrench of an imposed flow, are in proportion to the viscosity.
+    Args:
+        held: the robot, whose model, friction reading and place they share.
+        batch: the robots, or one for all.
+        effective: effective friction of each, N m s/rad, (n,).
+        viscosity: factor of each; in Stokes flow all resistances, and the wrench of a flow, are in proportion to it.
     """
     steady = held.prediction
     flow = None if held.flow is None else 1.0
-    batch = steady.batch.placed(steady.batch.placement.model_copy(update={"flow": flow}))
+    batch = batch.placed(steady.batch.placement.model_copy(update={"flow": flow}))
     s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
-    thick = {name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")}
-    s = s._replace(**thick)
+    if viscosity is not None:
+        s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
     rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
-    t = friction_torques(steady.friction, steady.effective_friction * friction, rotor)
-    still = s._replace(u_0=np.zeros(1))
+    t = friction_torques(steady.friction, effective, rotor)
     body, tail = rates_per_torque(s, t)
     coasting_body, coasting_tail = coasting_rates(s, t)
-    columns = [still.speed(body, tail), body, tail]
+    columns = [s._replace(u_0=np.zeros(1)).speed(body, tail), body, tail]
     columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
-    return np.stack([np.broadcast_to(column, friction.shape) for column in columns], axis=-1)
+    return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
 
 
 def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Samples:
@@ -104,13 +108,17 @@ def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Sam
     Raises:
         InputError: for a wrong file, or one that was fitted with another model or to places in the tube.
     """
-    name = held.prediction.model.name
-    known = read_posterior(posterior, name)
+    steady = held.prediction
+    known = read_posterior(posterior, steady.model.name)
     if known.places_robots:
         raise InputError(
             f"{posterior} was fitted to places in the tube, each of which is a flow of its own; allowed: one of drag "
             "factors and friction, or ranges"
         )
-    drawn: list[Robot] = known.drawn(held.robot, count, np.random.default_rng(1))
-    numbers = [held_model(robot, model=name, friction=held.prediction.friction).values for robot in drawn]
-    return np.array(numbers)
+    drawn = known.drawn(held.robot, count, np.random.default_rng(1))
+    numbers = np.tile(np.array(held.values), (len(drawn), 1))
+    for rows, batch in batches(drawn):
+        own = np.full(batch.size, steady.effective_friction)
+        effective = np.where(np.isnan(batch.effective_friction), own, batch.effective_friction)
+        numbers[rows, _FIRST_RESPONSE:] = _responses(held, batch, effective)
+    return numbers
