@@ -41,6 +41,7 @@ html_css_files = ["spirillum.css"]
 html_show_copyright = False
 html_show_sphinx = False
 
+suppress_warnings = ["ref.python"]  # two rooms may have a class of the same name
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": False, "exclude-members": "model_config"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -104,7 +104,7 @@ def _worth(missing: Sequence[Task | BandTask | LaidDownTask], crew: Crew) -> Cre
 def warnings_of(loaded: LoadedStudy) -> list[str]:
     """What to be careful about in the question, a sentence each."""
     warnings = list(loaded.cautions)
-    warnings += [f"{robot.name}: {sentence}" for robot in loaded.robots for sentence in robot.warnings]
+    warnings += _of_robots((robot.name, sentence) for robot in loaded.robots for sentence in robot.warnings)
     if any(robot.friction.effective is None and robot.motor for robot in loaded.robots):
         warnings.append(
             "friction.effective is unset: driven by their own motor, robots feel no more friction than the rotor's own "
@@ -124,9 +124,27 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
 
 def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
     """What to be careful about in the robots' own calibrations."""
-    return [
-        f"{robot.name}: {sentence}"
+    return _of_robots(
+        (robot.name, sentence)
         for robot in loaded.robots
         for name in loaded.study.models
         for sentence in calibration_warnings(robot, name)
+    )
+
+
+_NAMED = 3
+"""Robots that a sentence names; more are counted."""
+
+
+def _of_robots(said: Iterable[tuple[str, str]]) -> list[str]:
+    """Names and sentences as warnings; one that holds for more than three robots is said once."""
+    found: dict[str, list[str]] = {}
+    for name, sentence in said:
+        found.setdefault(sentence, []).append(name)
+    return [
+        line
+        for sentence, names in found.items()
+        for line in (
+            [f"{name}: {sentence}" for name in names] if len(names) <= _NAMED else [f"{len(names)} robots: {sentence}"]
+        )
     ]
