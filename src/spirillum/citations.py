@@ -113,6 +113,14 @@ REFERENCES: dict[str, str] = {
         "J. J. L. Higdon. The hydrodynamics of flagellar propulsion: helical waves. "
         "Journal of Fluid Mechanics 94:331-351, 1979."
     ),
+    "duchon1977": (
+        "J. Duchon. Splines minimizing rotation-invariant semi-norms in Sobolev spaces. In: Constructive Theory of "
+        "Functions of Several Variables, Lecture Notes in Mathematics 571:85-100, 1977."
+    ),
+    "owen1997": (
+        "A. B. Owen. Monte Carlo variance of scrambled net quadrature. "
+        "SIAM Journal on Numerical Analysis 34:1884-1910, 1997."
+    ),
     "clopper1934": (
         "C. J. Clopper and E. S. Pearson. The use of confidence or fiducial limits illustrated in the case of the "
         "binomial. Biometrika 26:404-413, 1934."

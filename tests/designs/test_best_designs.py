@@ -257,7 +257,6 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
         ({"subject_to": ["motor_current <= nan A"]}, "not finite"),
         ({"subject_to": ["__import__('os') <= 1 A"]}, "NAME <= VALUE UNIT"),
         ({"subject_to": ["forward_velocity >= 1 m/s"]}, "no design keeps all conditions"),
-        ({"model": "tube"}, "one tail at a time"),
         ({"model": "auto"}, "allowed: sbt, rft, slender"),
         ({"unknown": {"tail.wavelength": "5 mm:9 mm"}}, "varied and unknown"),
         ({"judged": {"draws": 1}}, "draws"),

@@ -30,6 +30,10 @@ def design(
     plot: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw objective, sensitivity and front: .png, .pdf or .svg.")
     ] = None,
+    stl: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The best design as one closed body for a printer (.stl, in mm)."),
+    ] = None,
     maximise: Annotated[
         list[str] | None,
         typer.Option(
@@ -47,7 +51,7 @@ def design(
         typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
     ] = None,
     posterior: Posterior = None,
-    model: Annotated[str, typer.Option(help="Hydrodynamic model: sbt, rft or slender.")] = "sbt",
+    model: Annotated[str, typer.Option(help="Hydrodynamic model: sbt, rft, slender or tube.")] = "sbt",
     tail_rate: TailRate = None,
     statistic: Annotated[
         str, typer.Option(metavar="mean|quantile", help="Of the objective over what is not known.")
@@ -76,6 +80,7 @@ def design(
 
     target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
     picture = None if plot is None else output_target(plot, PICTURES, "design.png")
+    printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
     loaded = loaded_robot(robot, settings)
     judged = {
         "statistic": statistic,
@@ -107,5 +112,10 @@ def design(
     if target is not None:
         words = f"Best design of {loaded.name}: {found.objectives[0].words}, model {found.model}."
         write_text(target, robot_text(found.robot, words))
+    if printed is not None:
+        from spirillum.exports.write import export
+
+        export(found.robot, printed)
     files = {"file": None if output is None else str(output), "picture": None if plot is None else str(plot)}
+    files |= {"stl": None if stl is None else str(stl)}
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
 from spirillum.swimming.answer import LEVEL, STEADY
 
-__all__ = ["Alternative", "Design", "Profile", "Uncertainty"]
+__all__ = ["Alternative", "Design", "Learned", "Profile", "Uncertainty"]
 
 _LANDSCAPE_POINTS = 41
 
@@ -75,6 +75,18 @@ class Uncertainty:
     """Unknown to the share of the objective's spread that goes with it: squared rank correlation over the draws."""
 
 
+class Learned(NamedTuple):
+    """How well a model that is learned is known where the best design is."""
+
+    solves: int
+    """Designs around which the flow was solved for."""
+    last: float
+    """Relative difference of the objective of the best design, learned and then solved."""
+    left_out: float
+    """Root mean square error of the objective of the better half of the solved designs, each learned from the others,
+    relative."""
+
+
 @dataclass(frozen=True)
 class Design(Shown):
     """The best values of some fields of a robot, SI."""
@@ -106,6 +118,8 @@ class Design(Shown):
     refused: int
     breaking: int
     warnings: tuple[str, ...]
+    learned: Learned | None = None
+    """How well a model that solves for the flow is known; None where it was asked for every design."""
 
     @property
     def winding(self) -> dict[str, float]:
@@ -173,6 +187,12 @@ class Design(Shown):
         }
         if self.uncertainty is not None:
             content["uncertainty"] = self._uncertainty(self.uncertainty)
+        if self.learned is not None:
+            content["learned"] = {
+                "solves": self.learned.solves,
+                "error_of_the_best": quantity(self.learned.last, "1"),
+                "error_left_out": quantity(self.learned.left_out, "1"),
+            }
         if self.front is not None:
             units = dict(self.units) | {item.name: item.unit for item in self.objectives}
             content["front"] = {name: quantity(column, units[name]) for name, column in self.front.items()}

@@ -26,7 +26,7 @@ _FEWEST = 24
 _CONVERGED = 1e-3
 _SAME = 1e-3
 """Share of a range within which two designs of a front are one."""
-_REFINED = {"xatol": 1e-7, "fatol": 1e-13, "adaptive": True}
+_REFINED = {"xatol": 1e-5, "fatol": 1e-12, "adaptive": True}
 _STEPS, _STEPS_ON_FRONT = 400, 80
 """Designs that the refinement may swim."""
 

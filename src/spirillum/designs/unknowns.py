@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,8 @@ class Drawn(NamedTuple):
     """Unknown to its values, (draws,)."""
     number: int
     """Number of draws."""
+    sets: int = 1
+    """Number of sets that fill the ranges evenly, each by itself and independent of the others, one after the other."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +48,13 @@ class Unknowns:
         """Whether there is nothing unknown."""
         return not self.ranges and self.posterior is None
 
-    def draws(self, count: int, seed: int) -> Drawn:
+    def draws(self, count: int, seed: int, sets: int = 1) -> Drawn:
         """Robots that may be.
 
         Args:
             count: number of draws; ranges are filled evenly (scrambled Sobol' points).
             seed: of the draws.
+            sets: number of independent sets, a divisor of `count`: how they differ tells how sure a mean is.
 
         Raises:
             InputError: for a posterior whose draws are not robots of one batch.
@@ -61,9 +65,12 @@ class Unknowns:
             return _of_posterior(self.robot, self.posterior, count, seed)
         from scipy.stats import qmc
 
-        points = qmc.Sobol(len(self.ranges), rng=np.random.default_rng(seed)).random(count)
+        rng = np.random.default_rng(seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # a number that is no power of two fills less evenly
+            points = np.concatenate([qmc.Sobol(len(self.ranges), rng=rng).random(count // sets) for _ in range(sets)])
         values = {item.path: item.low + points[:, n] * (item.high - item.low) for n, item in enumerate(self.ranges)}
-        return Drawn(RobotBatch.of(self.robot).with_values(values), values, count)
+        return Drawn(RobotBatch.of(self.robot).with_values(values), values, len(points), sets)
 
 
 def _of_posterior(robot: Robot, posterior: PosteriorFile, count: int, seed: int) -> Drawn:

@@ -49,13 +49,22 @@ def table(answer: Answer, console: Console) -> None:
         console.print(f"bound by: {escape('; '.join(answer['bound_by']))}", highlight=False, soft_wrap=True)
     if "front" in answer:
         _front(answer["front"], console)
+    if "learned" in answer:
+        known = answer["learned"]
+        best, rest = (100.0 * known[name]["value"] for name in ("error_of_the_best", "error_left_out"))
+        words = f"learned from {known['solves']} designs that were solved for: the objective of the best was missed by "
+        console.print(
+            f"{words}{best:.2g} %, those of the better half, each left out, by {rest:.2g} %",
+            highlight=False,
+            soft_wrap=True,
+        )
     counts = answer["designs"]
     console.print(
         f"{counts['swum']} designs: {counts['refused']} cannot be built or swum, "
         f"{counts['breaking_a_condition']} break a condition",
         highlight=False,
     )
-    for name, what in (("file", "robot file"), ("picture", "picture")):
+    for name, what in (("file", "robot file"), ("picture", "picture"), ("stl", "body for a printer")):
         if answer.get(name):
             console.print(f"{what} in {escape(answer[name])}", highlight=False, soft_wrap=True)
 

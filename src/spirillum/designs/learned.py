@@ -1,0 +1,246 @@
+"""Models that solve for the flow, learned from a few designs: a fast model, and a correction that is interpolated.
+
+What moves a robot along its tube is A, the symmetric positive definite resistance of (U, Omega, omega). Let
+A_0 = L L^T be that of the fast model (slender-body theory without calibration). At a few designs the flow is solved
+for, and the logarithm of C = L^-1 A L^-T, six numbers, is interpolated between them by cubic radial basis functions
+with a linear part (Duchon 1977, `scipy.interpolate.RBFInterpolator`). So A = L exp(log C) L^T is positive definite
+everywhere, exact where it was solved for, and as smooth as the two models. Viscosity, friction, motor and battery do
+not change C: what is not known of them costs no solve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from spirillum.arrays import Axial, Matrix6, Matrix12, PerRobot, Samples
+from spirillum.designs.space import TURNS, Space, Variable
+from spirillum.designs.unknowns import Unknowns
+from spirillum.errors import InputError
+from spirillum.fluid.closed.sbt import Sbt
+from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import find_swimmer_model, quickest
+from spirillum.fluid.tube.domain import seat_limits
+from spirillum.fluid.wire.slender import Slender
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import Limit
+from spirillum.swimming.balance import joined
+
+__all__ = ["Corrected", "Points", "check_learnable", "corrected", "solved_at"]
+
+_COLUMNS = {
+    "tail.wavelength": "wavelength",
+    "tail.amplitude": "amplitude",
+    "tail.length": "tail_length",
+    "tail.wire_diameter": "wire_diameter",
+}
+_FREE = ("fluid.", "friction.", "motor.", "battery.", "drive.")
+"""Fields that the correction does not depend on."""
+_MOST_FIELDS = 3
+_UPPER = np.triu_indices(3)
+_PLACES = np.array([0, 1, 3])
+"""U, Omega and omega in the axial form of both parts; the force on the whole stands with the body."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Designs at which the flow was solved for."""
+
+    variables: tuple[Variable, ...]
+    """Fields of the tail that are varied."""
+    features: Samples
+    """Where in their ranges the designs lie, (points, fields)."""
+    logarithms: Samples
+    """Upper triangle of log C, (points, 6)."""
+
+    def without(self, number: int) -> Points:
+        """All points but one."""
+        rest = np.arange(len(self.features)) != number
+        return replace(self, features=self.features[rest], logarithms=self.logarithms[rest])
+
+    def joined(self, more: Points) -> Points:
+        """These points and those of others that lie elsewhere."""
+        new = [row for row, at in enumerate(more.features) if not self.has(at)]
+        features = np.concatenate([self.features, more.features[new]])
+        return replace(self, features=features, logarithms=np.concatenate([self.logarithms, more.logarithms[new]]))
+
+    def has(self, feature: Samples) -> bool:
+        """Whether one of the points lies there."""
+        return bool(np.any(np.all(np.abs(self.features - feature) < 1e-9, axis=1)))
+
+    def at(self, features: Samples) -> Samples:
+        """Upper triangle of log C at designs, (designs, 6)."""
+        count, fields = self.features.shape
+        if fields == 0 or count <= fields + 1:
+            return np.tile(self.logarithms.mean(axis=0), (len(features), 1))
+        from scipy.interpolate import RBFInterpolator
+
+        found: Samples = RBFInterpolator(self.features, self.logarithms, kernel="cubic", degree=1)(features)
+        return found
+
+
+def features_of(batch: RobotBatch, variables: tuple[Variable, ...]) -> Samples:
+    """Where in the ranges of some fields of the tail the robots of a batch lie, (robots, fields)."""
+    found = np.zeros((batch.size, len(variables)))
+    for column, item in enumerate(variables):
+        values = batch.tail_length / batch.wavelength if item.path == TURNS else getattr(batch, _COLUMNS[item.path])
+        found[:, column] = (values - item.low) / max(item.high - item.low, 1e-300)
+    return found
+
+
+class Corrected(SwimmerModel):
+    """A model that solves for the flow, as it is learned: axial entries only."""
+
+    title = "learned"
+    references = ("lighthill1976", "perrin1934")
+    known_error = "interpolated between designs that were solved for"
+    parts = ()
+    axial_only = True
+
+    def __init__(self, points: Points) -> None:
+        """Answer between some points."""
+        self.points = points
+
+    def domain(self, batch: RobotBatch) -> list[Limit]:
+        """What the model itself asks for, and the fast model; asked once for each tail."""
+        features = features_of(batch, self.points.variables)
+        _, first, inverse = np.unique(features, axis=0, return_index=True, return_inverse=True)
+        few, place = batch.taken(first), np.ravel(inverse)
+        return [_spread(item, place, batch.size) for item in (*self._own_domain(few), *Sbt().domain(few))]
+
+    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
+        raise NotImplementedError
+
+    def axial(self, batch: RobotBatch) -> Axial:
+        """See `SwimmerModel.axial`."""
+        features = features_of(batch, self.points.variables)
+        each, inverse = np.unique(features, axis=0, return_inverse=True)
+        correction = _exponential(self.points.at(each))[np.ravel(inverse)]
+        fast, sound = _fast(batch)
+        lower = np.linalg.cholesky(fast)
+        whole = lower @ correction @ np.swapaxes(lower, -1, -2)
+        found = np.zeros((batch.size, 4, 4))
+        found[:, _PLACES[:, None], _PLACES] = np.where(sound[:, None, None], whole, np.nan)
+        return found
+
+    def resistance(self, batch: RobotBatch, phase: PerRobot) -> Matrix12:  # noqa: ARG002 - not known at any phase
+        """Not known: NaN."""
+        return np.full((batch.size, 12, 12), np.nan)
+
+    def part_matrix(self, batch: RobotBatch, part: str, phase: PerRobot) -> Matrix6:  # noqa: ARG002 - of no part
+        """Not known: NaN."""
+        return np.full((batch.size, 6, 6), np.nan)
+
+
+class LearnedTube(Corrected):
+    """`tube` as it is learned, at the reference place."""
+
+    name = "tube"
+
+    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
+        return [*Slender().part_domain(batch, "robot"), *seat_limits(batch, "robot")]
+
+
+class LearnedSlender(Corrected):
+    """`slender` as it is learned."""
+
+    name = "slender"
+
+    def _own_domain(self, batch: RobotBatch) -> list[Limit]:
+        return Slender().domain(batch)
+
+
+def corrected(name: str, points: Points) -> Corrected:
+    """A model as it is learned from some points."""
+    return {"tube": LearnedTube, "slender": LearnedSlender}[name](points)
+
+
+def _spread(limit: Limit, place: np.ndarray[Any, Any], size: int) -> Limit:
+    """A limit of a few tails for all robots that have one of them."""
+    few = int(place.max()) + 1
+
+    def all_of(column: Any) -> Any:
+        values = np.asarray(column)
+        return values[place] if values.size == few and size > 1 else column
+
+    return replace(limit, value=all_of(limit.value), bound=all_of(limit.bound), holds=all_of(limit.holds))
+
+
+def _fast(batch: RobotBatch) -> tuple[Samples, Samples]:
+    """A_0 of the fast model, (robots, 3, 3), one where it has none, and whether it has."""
+    with np.errstate(all="ignore"):
+        found = np.broadcast_to(joined(Sbt().axial(batch)), (batch.size, 3, 3))
+    size = np.sqrt(np.abs(np.diagonal(found, axis1=-2, axis2=-1)))
+    sound = np.all(np.isfinite(found), axis=(-2, -1)) & np.all(size > 0, axis=-1)
+    plain = np.where(sound[:, None, None], found, np.eye(3))
+    scale = np.where(sound[:, None], size, 1.0)
+    least = np.linalg.eigvalsh(plain / (scale[:, :, None] * scale[:, None, :]))[:, 0]
+    sound &= least > 0
+    return np.where(sound[:, None, None], plain, np.eye(3)), sound
+
+
+def _exponential(upper: Samples) -> Samples:
+    """Exponentials of symmetric matrices from their upper triangles, (n, 3, 3)."""
+    full = np.zeros((len(upper), 3, 3))
+    full[:, _UPPER[0], _UPPER[1]] = upper
+    full[:, _UPPER[1], _UPPER[0]] = upper
+    values, vectors = np.linalg.eigh(full)
+    found: Samples = (vectors * np.exp(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
+    return found
+
+
+def solved_at(name: str, batch: RobotBatch, variables: tuple[Variable, ...]) -> Points:
+    """Solve for the flow around some designs.
+
+    Args:
+        name: of the model, `tube` or `slender`.
+        batch: the designs.
+        variables: fields of the tail that are varied.
+    """
+    model = find_swimmer_model(name)
+    return points_of(batch, variables, lambda one: quickest(model, one).axial(one))
+
+
+def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callable[[RobotBatch], Samples]) -> Points:
+    """What some designs teach.
+
+    Args:
+        batch: the designs.
+        variables: fields of the tail that are varied.
+        solve: axial resistance of the robots of a batch.
+
+    Raises:
+        InputError: where one of them has no answer.
+    """
+    found = np.concatenate([joined(solve(one)) for _, one in batch.blocks(1)])
+    fast, sound = _fast(batch)
+    if not (np.all(np.isfinite(found)) and np.all(sound)):
+        raise InputError("the flow around a design is not resolved; allowed: narrower ranges")
+    lower = np.linalg.inv(np.linalg.cholesky(fast))
+    values, vectors = np.linalg.eigh(lower @ found @ np.swapaxes(lower, -1, -2))
+    logarithm = (vectors * np.log(values)[:, None, :]) @ np.swapaxes(vectors, -1, -2)
+    return Points(variables, features_of(batch, variables), logarithm[:, _UPPER[0], _UPPER[1]])
+
+
+def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variable, ...]:
+    """Fields of the tail that are varied, of which the flow has to be learned.
+
+    Raises:
+        InputError: for fields that change the flow in another way, too many of them, or a posterior.
+    """
+    if unknowns.posterior is not None:
+        raise InputError(f"model = '{name}' with a posterior; allowed: sbt or rft with it, or ranges (unknown)")
+    own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
+    strange = [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+    strange += [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
+    if strange:
+        raise InputError(
+            f"{strange[0]} with model = '{name}', which learns the flow around tails; allowed: to vary "
+            f"{', '.join(_COLUMNS)}, {TURNS}, and any fields of fluid, friction, motor, battery and drive"
+        )
+    if len(own) > _MOST_FIELDS:
+        raise InputError(f"{len(own)} fields of the tail with model = '{name}'; allowed: at most {_MOST_FIELDS}")
+    return own
