@@ -76,7 +76,7 @@ class Follower:
         if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
             found = self._found_again(frame.image, found)
         stripes = self.known.stripes
-        roll, edges = _UNREAD, np.full(len(stripes.stripes), np.nan)
+        roll, edges = _UNREAD, np.asarray(np.full(len(stripes.stripes), np.nan))
         if found.known:
             roll, edges = stripes.read_with_edges(frame.image, found.pose)
         tail = self.known.wire.read(frame.image, found.pose) if found.known else _UNREAD
