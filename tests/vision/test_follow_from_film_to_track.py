@@ -90,8 +90,18 @@ def test_a_robot_that_leaves_is_kept_as_far_as_it_was_seen(flat_pictures, tmp_pa
 
 def test_a_nose_on_the_other_side_gives_no_numbers(flat_pictures, tmp_path):
     found = track(flat_pictures.Flat(frames=4), tmp_path, robot_direction='"left"')
-    flag = next(flag for flag in found.flags if flag.name == "nose-on-the-other-side")
-    assert "forward_velocity" in flag.spoils
+    flag = next(flag for flag in found.flags if "forward_velocity" in flag.spoils)
+    assert flag.name == "nose-on-the-other-side"  # the reason that is given
+
+
+def test_a_robot_that_is_clear_only_the_other_way_round_names_the_direction(flat_pictures, tmp_path, monkeypatch):
+    from spirillum.vision.track import first_look
+
+    answers = iter([False, True])
+    monkeypatch.setattr(first_look, "_clear", lambda found: next(answers, False))
+    monkeypatch.setattr("spirillum.vision.track.identity.best_other_size", lambda *given: None)
+    with pytest.raises(InputError, match=r"robot.direction = 'right', but .* other side; allowed: 'left'"):
+        track(flat_pictures.Flat(frames=2), tmp_path)
 
 
 def test_two_robots_give_no_numbers(flat_pictures, tmp_path):

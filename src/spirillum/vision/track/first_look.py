@@ -90,6 +90,12 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     images, focal = [frames[k].image for k in every], body.optics.focal
     found = _places(body, images, still)
     if not _clear(found):
+        if _clear(_places(body, images, still, turn=np.pi)):
+            side, other = ("left", "right") if body.optics.leftward else ("right", "left")
+            raise InputError(
+                f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
+                f"the other side; allowed: '{other}', if it points there"
+            )
         raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
     chosen = most_likely(found, body.robot.body.length)
     rivals, flags = rivals_in(body, images, found, chosen), turned_flags(body, images, still, found, chosen)
@@ -111,10 +117,12 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
 
 
-def _places(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> list[list[Candidate]]:
-    """The likeliest places on some frames."""
+def _places(
+    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0
+) -> list[list[Candidate]]:
+    """The likeliest places on some frames, of a body that is turned by an angle in the picture's plane."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
-        return list(pool.map(lambda image: close_places(image, still, body), images))
+        return list(pool.map(lambda image: close_places(image, still, body, turn=turn), images))
 
 
 def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:

@@ -33,7 +33,7 @@ class Learnt(NamedTuple):
     def flags(self) -> tuple[Flag, ...]:
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
-        return (*known.flags, *known.start.flags, *known.stripes.flags, *known.wire.flags)
+        return (*known.start.flags, *known.flags, *known.stripes.flags, *known.wire.flags)
 
 
 def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None) -> Learnt:
