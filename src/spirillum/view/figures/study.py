@@ -226,7 +226,7 @@ def _bound_picture(shown: StudyView) -> Picture:
         f"{len(channels) * len(wavelengths)} panels, a row for each channel and a column for each wavelength: forward "
         f"velocity against wave amplitude{' as an upper bound' if bound else ''}. {shown.source_line}"
     )
-    draw = partial(_draw_bound, shown, channels, wavelengths, title, notes)
+    draw = partial(_draw_bound, shown, channels, wavelengths, title)
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
 
 
@@ -239,9 +239,7 @@ def _frictions(shown: StudyView) -> list[str]:
     return found if len(found) == 1 else [f"{one} ({mark})" for one, mark in zip(found, marks, strict=False)]
 
 
-def _draw_bound(
-    shown: StudyView, channels: list[int], wavelengths: list[int], title: str, notes: Sequence[str]
-) -> Figure:
+def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], title: str) -> Figure:
     speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
     legend = [*model_handles(shown, own_drive=True), *_paper_entry(shown, channels, speed_scale)]
     sheet = Sheet(
@@ -250,7 +248,7 @@ def _draw_bound(
         width=width_of(len(wavelengths), PANEL[0]),
         heights=[PANEL[1]] * len(channels),
         columns=len(wavelengths),
-        notes=notes,
+        notes=(),
         legend=legend,
     )
     add_letters(sheet.panels.flat)
@@ -275,6 +273,9 @@ def _draw_bound(
             if speed is not None:
                 axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)
         _finish_row(sheet.panels[number], Row(f"{name}\n{what} $U_x$ ({speed_scale.unit})", row.draw))
+    ends = [sheet.panels[number][0].get_ylim() for number in range(len(channels))]
+    for number in range(len(channels)):  # one scale for all rows, which are there to be compared
+        sheet.panels[number][0].set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
     return sheet.finished()
 
 
