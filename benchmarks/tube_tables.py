@@ -39,7 +39,7 @@ from spirillum.robot.seat import Seat
 
 Row = dict[str, Any]
 _MOST_PITCH = 0.97  # of the largest
-_MOST_YAW = 2.0  # of that of the nodes, if the tail leaves room
+_MOST_YAW = 1.0  # of the largest of all places, if the tail leaves room
 _GRID = (
     *((0.4, f, 0.0) for f in (0.45, -0.5)),
     *((0.66, f, 0.0) for f in (0.0, 0.45, 0.73, -0.45, -0.85)),
@@ -47,7 +47,7 @@ _GRID = (
     *((1.0, f, 0.0) for f in (0.15, 0.45, 0.73, 0.93)),
     *((0.66, 0.3, 0.7), (0.9, -0.4, -0.7), (0.4, 0.3, -0.7), (1.0, 0.5, 0.5), (0.4, -0.4, 0.9)),
 )
-"""Distance from the floor over that of the axis, pitch over the largest, yaw over that of the nodes."""
+"""Distance from the floor over that of the axis, pitch and yaw over the largest ones."""
 _GRID_PHASE, _GRID_TOLERANCE = 0.8, 0.005
 
 
@@ -65,9 +65,10 @@ def drawn(places: Places, count: int, yawed: float, gaps: Sequence[float], seed:
     room = contact_offset(places.rings, places.radius, 0.0)
     least, most = gaps[0] / room, min(gaps[1] / room, 1.0) if len(gaps) > 1 else 1.0
     found: list[tuple[Seat, float]] = []
+    most_yaw = _MOST_YAW * float(places.most_yaw.max())
     while len(found) < count:
         t, f = float(np.exp(draw.uniform(np.log(least), np.log(most)))), float(draw.uniform(-_MOST_PITCH, _MOST_PITCH))
-        yaw, phase = float(draw.uniform(-_MOST_YAW, _MOST_YAW)) * places.yaw, float(draw.uniform(0.0, 2.0 * np.pi))
+        yaw, phase = most_yaw * float(draw.uniform(-1.0, 1.0)), float(draw.uniform(0.0, 2.0 * np.pi))
         # evenly among them, so that the first few have both
         turned = int((len(found) + 1) * yawed) > int(len(found) * yawed)
         seat = places.seat_between(t, f, yaw if turned else 0.0)
@@ -134,7 +135,9 @@ def main() -> None:
         tails = tails_of(name, arguments.wavelength)
         places = Places(tails[0][1].geometry, tails[0][1].radius)
         if arguments.grid:
-            seats = [(places.seat_between(t, f, yaw * places.yaw), _GRID_PHASE) for t, f, yaw in _GRID]
+            seats = [
+                (places.seat_between(t, f, yaw * places.largest_yaw_near(t, f)), _GRID_PHASE) for t, f, yaw in _GRID
+            ]
         else:
             gaps = [1e-3 * gap for gap in arguments.gap]
             seats = drawn(places, arguments.places, arguments.yawed, gaps, arguments.seed)

@@ -3,7 +3,7 @@
 Robots of one channel and amplitude share all places: some 650 s of one core and a minute for each further tail. What
 was solved for is kept in the cache, as for `spirillum prepare`, until the solver's source changes.
 
-    OMP_NUM_THREADS=1 python tools/ship_tables.py [--channel wide] [--amplitude 2.5] [--workers 2]
+    OMP_NUM_THREADS=1 python tools/ship_tables.py [--channel wide] [--amplitude 2.5] [--wavelength 25]
 """
 
 from __future__ import annotations
@@ -27,12 +27,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--channel", choices=("wide", "narrow"), default=None, help="one channel only")
     parser.add_argument("--amplitude", type=float, default=None, help="one amplitude only, mm")
+    parser.add_argument("--wavelength", type=float, nargs="+", default=None, help="these wavelengths only, mm")
     parser.add_argument("--workers", type=int, default=2)
     arguments = parser.parse_args()
     study = load_study(paper_study())
     groups: dict[tuple[str, float], list[tuple[RobotGeometry, float]]] = {}
     for index in range(study.count):
         robot = study.robot_at(index)
+        if arguments.wavelength and round(1e3 * robot.tail.wavelength, 6) not in arguments.wavelength:
+            continue
         batch = RobotBatch.of(robot)
         group = robot.name.removeprefix("biorob2012-"), round(1e3 * robot.tail.amplitude, 6)
         groups.setdefault(group, []).append((RobotGeometry.of(batch), tube_radius(batch)))

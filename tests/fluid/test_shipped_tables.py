@@ -18,7 +18,7 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import INSIDE, YAW_SLACK
+from spirillum.kernels.tube_table import INSIDE, YAW_SLACK, largest_yaw
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
@@ -63,8 +63,9 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
         table = TubeTable.read(path)
         assert path.stem == table.key
         assert table.key in keys
-        assert all(0 < error < 0.08 for error in table.error.values())
-        assert path.stat().st_size < 80_000
+        # the largest: 8 % in sideways force at 0.96 of the largest yaw, 0.3 mm from the glass
+        assert all(0 < error < 0.09 for error in table.error.values())
+        assert path.stat().st_size < 90_000
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -74,7 +75,8 @@ def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None
     for _ in range(300):
         seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
         deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - seat.offset) if seat.pitch == 0 else 0.0
-        yaw, phase = draw.uniform(-1, 1) * YAW_SLACK * places.yaw, draw.uniform(0, 2 * np.pi)
+        most = largest_yaw(table.packed, seat.offset + deeper, seat.pitch)
+        yaw, phase = draw.uniform(-1, 1) * YAW_SLACK * most, draw.uniform(0, 2 * np.pi)
         matrix, left = table.at(seat.offset + deeper, seat.pitch, yaw, phase)
         scale = np.sqrt(np.diag(matrix))
         assert left == INSIDE

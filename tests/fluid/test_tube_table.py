@@ -11,9 +11,10 @@ import pytest
 
 import spirillum as sp
 from spirillum.fluid.tube import tube
+from spirillum.fluid.tube.building import _powers
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import Places, rings_of
+from spirillum.fluid.tube.places import YAW_SHARES, Places, rings_of
 from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.rest import (
     Solution,
@@ -56,12 +57,12 @@ def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.nda
     pitches = [*places.up, *(-places.down[1:])]
     rest = np.array([[coefficients(t, f) for f in pitches] for t in places.gaps])
     none = np.zeros(0)
-    turned = (none, none, none)
+    turned = (none, none, none, none)
     if yawed is not None:
         values = np.array([[yawed(t, f) for f in places.yaw_pitches] for t in places.yaw_gaps])
-        turned = (places.yaw_gaps, places.yaw_pitches, values)
+        turned = (places.yaw_gaps, places.yaw_pitches, places.most_yaw, values)
     parts = (places.gaps, places.up, places.down, places.most, rest)
-    return kernel.packed(R, places.yaw, places.rings, *parts, *turned, film)
+    return kernel.packed(R, places.rings, *parts, *turned, film)
 
 
 def smooth(t: float, f: float) -> np.ndarray:
@@ -113,7 +114,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
 
 def test_positive_definite_and_symmetric_everywhere(places: Places, film: np.ndarray) -> None:
     """Also where the interpolated factor is wild, below the first node, and outside the range."""
-    table = packed(places, film, lambda t, f: 3.0 * np.sin(9.0 * smooth(t, f)), lambda t, f: np.ones((2, 5, 36)))
+    table = packed(places, film, lambda t, f: 3.0 * np.sin(9.0 * smooth(t, f)), lambda t, f: np.ones((4, 5, 36)))
     draw = np.random.default_rng(1)
     for _ in range(300):
         matrix, _ = at(table, draw.uniform(0, 0.01099), draw.uniform(-0.02, 0.02), draw.uniform(-0.1, 0.1), 1.0)
@@ -138,13 +139,16 @@ def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np
 def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
     assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
-    turned = packed(places, film, smooth, lambda t, f: np.zeros((2, 5, 36)))
-    assert at(turned, 0.0, 0.0, 1.1 * kernel.YAW_SLACK * places.yaw)[1] == kernel.TOO_FAR_YAWED
-    assert at(turned, 0.0, 0.0, 0.9 * kernel.YAW_SLACK * places.yaw)[1] == kernel.INSIDE
+    turned = packed(places, film, smooth, lambda t, f: np.zeros((4, 5, 36)))
+    most = kernel.largest_yaw(turned, 0.0, 0.0)
+    assert most == pytest.approx(places.largest_yaw_near(1.0, 0.0))
+    assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == kernel.TOO_FAR_YAWED
+    assert at(turned, 0.0, 0.0, 0.98 * kernel.YAW_SLACK * most)[1] == kernel.INSIDE
 
 
-def test_yaw_enters_by_its_derivatives(places: Places, film: np.ndarray) -> None:
-    slope = np.stack([np.full((5, 36), 0.5), np.full((5, 36), -2.0)])
+def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndarray) -> None:
+    powers = np.array([0.5, -2.0, 0.3, 0.7])
+    slope = np.broadcast_to(powers[:, None, None], (4, 5, 36))
     table, straight = packed(places, film, smooth, lambda t, f: slope), packed(places, film, smooth)
     yaw, e = 0.03, 0.006
     turned, level = at(table, e, 0.0, yaw)[0], at(straight, e, 0.0)[0]
@@ -154,7 +158,8 @@ def test_yaw_enters_by_its_derivatives(places: Places, film: np.ndarray) -> None
     w = kernel.cut_of_film(1.0 - e / kernel.contact_offset(places.rings, R, 0.0))
     turned[:6, :6] -= w * thin[0]
     level[:6, :6] -= w * thin[1]
-    more = 3.0 * (0.5 * yaw - 2.0 * yaw**2)  # coefficients 1, cos and cos 2 at phase 0
+    s = kernel.stretched_yaw(yaw / kernel.largest_yaw(table, e, 0.0))
+    more = 3.0 * float(powers @ s ** np.arange(1, 5))  # coefficients 1, cos and cos 2 at phase 0
     assert np.log(turned[0, 0] / level[0, 0]) == pytest.approx(2.0 * more, rel=1e-9)
 
 
@@ -182,12 +187,12 @@ def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
 def test_yawed_places_keep_the_tail_off_the_glass(geometry: RobotGeometry, radius: float) -> None:
     yawed, wire = Places(geometry, radius), geometry.wire()
     clear = [
-        yawed.seat(float(t), float(f), yawed.yaw).tail_clearance(wire.points, wire.radius).clearance
-        for t in yawed.yaw_gaps
-        for f in yawed.yaw_pitches
+        yawed.seat(float(t), float(f), float(most)).tail_clearance(wire.points, wire.radius).clearance
+        for t, row in zip(yawed.yaw_gaps, yawed.most_yaw, strict=True)
+        for f, most in zip(yawed.yaw_pitches, row, strict=True)
     ]
     assert min(clear) > 0.7 * wire.radius
-    assert yawed.yaw > np.radians(2.0)
+    assert np.all(yawed.most_yaw > np.radians(2.0))
 
 
 def test_a_tail_much_wider_than_its_body_has_no_table(geometry: RobotGeometry) -> None:
@@ -201,6 +206,18 @@ def test_fourier_sums_give_the_values_back() -> None:
     phases = np.array(even_phases())
     waves = np.stack([np.ones(5), np.cos(phases), np.sin(phases), np.cos(2 * phases), np.sin(2 * phases)], axis=1)
     np.testing.assert_allclose(waves @ fourier(values), values, atol=1e-13)
+
+
+def test_yawed_nodes_are_met() -> None:
+    """What is solved for at a node with yaw comes back to either side."""
+    draw = np.random.default_rng(9)
+    middle, sides = draw.normal(size=(5, 36)), draw.normal(size=(2, 2, 5, 36))
+    powers = _powers(middle, sides)
+    for share, (left, right) in zip(YAW_SHARES, sides, strict=True):
+        for sign, expected in ((1.0, left), (-1.0, right)):
+            s = kernel.stretched_yaw(sign * share)
+            found = middle + np.tensordot(s ** np.arange(1, 5), powers, axes=1)
+            np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 def test_factors_give_the_matrix_back_and_refuse_an_indefinite_one() -> None:
@@ -281,7 +298,7 @@ def test_another_robot_or_tube_has_another_key(geometry: RobotGeometry) -> None:
 
 
 def test_the_mirror_image_of_a_table_is_the_mirror_image_of_its_answers(places: Places, film: np.ndarray) -> None:
-    table = packed(places, film, smooth, lambda t, f: np.stack([smooth(t, f), 3.0 - smooth(t, f)]))
+    table = packed(places, film, smooth, lambda t, f: np.stack([k * smooth(t, f) - k**2 for k in range(4)]))
     image = kernel.mirror_image(table)
     for e, pitch, yaw, phase in ((0.009, 0.02, 0.05, 0.3), (0.004, -0.04, -0.1, 2.0), (0.0, 0.01, 0.0, 5.0)):
         found = at(image, e, pitch, yaw, phase)[0]
@@ -296,7 +313,7 @@ def test_the_mirror_image_of_a_table_is_the_mirror_image_of_its_answers(places: 
 def test_tails_of_one_amplitude_have_all_places_in_common(geometry: RobotGeometry, places: Places) -> None:
     other = Places(geometry._replace(wavelength=0.01, hand=-1.0), R)
     np.testing.assert_array_equal(other.most, places.most)
-    assert other.yaw == places.yaw
+    np.testing.assert_array_equal(other.most_yaw, places.most_yaw)
     wider = Places(geometry._replace(amplitude=0.0035), R)
     assert np.all(wider.most[:, 0] < places.most[:, 0])
     np.testing.assert_array_equal(wider.gaps, places.gaps)

@@ -27,7 +27,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import calibrated_contact
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import yaw_of
+from spirillum.kernels.tube_table import contact_offset_of, largest_yaw
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -149,9 +149,15 @@ def _driven(links: TubeRobot, held: Prediction, *, prescribed: bool) -> TubeRobo
     return replace(links, drive=changed)
 
 
+def _checked_yaw(run: LongRun, links: TubeRobot) -> float:
+    """Yaw up to which the table was checked where it lies, rad."""
+    lying = run.lying
+    return float(largest_yaw(links.table, contact_offset_of(links.table, lying.pitch) - lying.gap, lying.pitch))
+
+
 def _yawed_beyond_check(run: LongRun, links: TubeRobot) -> bool:
     """Whether it lies yawed further than the places against which its table was checked."""
-    return abs(run.lying.yaw) > yaw_of(links.table)
+    return abs(run.lying.yaw) > _checked_yaw(run, links)
 
 
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
@@ -162,7 +168,7 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     if run.lying.state in ("steady", "orbits") and _yawed_beyond_check(run, links):
         found.append(
             f"it lies at a yaw of {np.degrees(run.lying.yaw):.3g} deg against the wall, and its table was checked up "
-            f"to {np.degrees(yaw_of(links.table)):.3g} deg: there is no error estimate"
+            f"to {np.degrees(_checked_yaw(run, links)):.3g} deg: there is no error estimate"
         )
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:

@@ -4,10 +4,12 @@ A place is the offset e of the body's mid-length from the tube's axis, pitch p (
 phase phi of the tail. The rest is interpolated over
 
     t = 1 - e/e_c(p), 0 where a robot without yaw touches the floor of the tube, 1 on its axis,
-    f = p/p_hi(t) nose up or p/p_lo(t) nose down, 1 at the largest pitch of the table.
+    f = p/p_hi(t) nose up or p/p_lo(t) nose down, 1 at the largest pitch of the table,
+    g = psi/psi_c(t, f), 1 at the largest yaw of the table there.
 
 Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - f) between the nodes,
-linear in t below the first, quadratic in yaw, and a Fourier sum in the phase: the rest is positive definite everywhere.
+linear in t below the first, quartic in artanh(g/1.2), and a Fourier sum in the phase: the rest is positive definite
+everywhere.
 """
 
 from __future__ import annotations
@@ -28,12 +30,15 @@ __all__ = [
     "PARAMETERS",
     "TOO_FAR_PITCHED",
     "TOO_FAR_YAWED",
+    "YAW_ORDERS",
     "YAW_SLACK",
     "Parts",
     "Range",
     "contact_offset",
+    "contact_offset_of",
     "cut_of_film",
     "film_start",
+    "largest_yaw",
     "mean_resistance_at",
     "mirror_image",
     "packed",
@@ -42,7 +47,7 @@ __all__ = [
     "resistance_at",
     "rest_coefficients",
     "shapes_of",
-    "yaw_of",
+    "stretched_yaw",
 ]
 
 MOTIONS = 8
@@ -54,17 +59,20 @@ PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
 INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED = 0, 1, 2
 _PITCH_SLACK = 1.1  # of the largest pitch: the tail's tip touches the glass a little beyond it
 _BEYOND = 1.3  # beyond the largest pitch, so that the logarithm stays finite at contact
-YAW_SLACK = 2.0  # of the yaw at which the rest was computed
+YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it
+YAW_ORDERS = 4
+"""Powers of the stretched yaw, from the first."""
+_BEYOND_YAW = 1.2  # beyond the largest yaw, so that the inverse tangent stays finite at contact
 
-# Header of a packed table: radius of the tube, yaw of the yawed places, rows, and the lengths of what follows.
-_RADIUS, _YAW, _RINGS, _GAPS, _UP, _DOWN, _PHASES, _YAW_GAPS, _YAW_PITCHES = 0, 1, 2, 3, 4, 5, 6, 7, 8
-_HEADER = 9
+# Header of a packed table: radius of the tube, rows, and the lengths of what follows.
+_RADIUS, _RINGS, _GAPS, _UP, _DOWN, _PHASES, _YAW_GAPS, _YAW_PITCHES = 0, 1, 2, 3, 4, 5, 6, 7
+_HEADER = 8
 _MOST = 12  # nodes in one direction
+_LEAST_YAW = 1e-3  # rad, where the tail nearly touches the glass without a yaw
 
 
 def packed(
     radius: float,
-    yaw: float,
     rings: Samples,
     gaps: Samples,
     up: Samples,
@@ -73,6 +81,7 @@ def packed(
     rest: Samples,
     yaw_gaps: Samples,
     yaw_pitches: Samples,
+    most_yaw: Samples,
     yawed: Samples,
     film: Samples,
 ) -> Samples:
@@ -80,7 +89,6 @@ def packed(
 
     Args:
         radius: R of the tube, m.
-        yaw: at which yawed places were computed, rad.
         rings: of `contact_offset`, (n, 4).
         gaps: nodes t, increasing, the last is 1.
         up: nodes f nose up, the first is 0.
@@ -90,25 +98,26 @@ def packed(
             pitches in the order of `up`, then `down` without its first.
         yaw_gaps: nodes t of the yawed places.
         yaw_pitches: nodes of signed f of the yawed places.
-        yawed: first and second derivatives (halved) with yaw, (yaw gaps, yaw pitches, 2, phases, 36).
+        most_yaw: largest yaws at the yawed places, (yaw gaps, yaw pitches), rad.
+        yawed: coefficients of the powers of the stretched yaw, (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
         film: packed film.
     """
-    header = [radius, yaw, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
-    parts = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, rest, yawed, film)
-    return np.concatenate([np.ravel(part) for part in parts])
+    header = [radius, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
+    nodes = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, most_yaw)
+    return np.concatenate([np.ravel(part) for part in (*nodes, rest, yawed, film)])
 
 
 class Range(NamedTuple):
     """Where a table holds."""
 
     gaps: Samples
-    """Gaps of a level robot at which the next two are stated, (n,), m."""
+    """Gaps of a level robot at which the next three are stated, (n,), m."""
     up: Samples
     """Largest pitch nose up, (n,), rad."""
     down: Samples
     """Largest pitch nose down, positive, (n,), rad."""
-    yaw: float
-    """Largest yaw to either side, rad."""
+    yaw: Samples
+    """Largest yaw of a level robot to either side, (n,), rad."""
 
 
 def range_of(table: Samples) -> Range:
@@ -117,8 +126,9 @@ def range_of(table: Samples) -> Range:
     gaps = int(table[_GAPS])
     at_most = at_gaps + gaps + int(table[_UP] + table[_DOWN])
     most = table[at_most : at_most + 2 * gaps].reshape(gaps, 2)
-    room = contact_offset(table[_HEADER:at_gaps].reshape(-1, 4), float(table[_RADIUS]), 0.0)
-    return Range(table[at_gaps : at_gaps + gaps] * room, most[:, 0], most[:, 1], YAW_SLACK * yaw_of(table))
+    room = contact_offset_of(table, 0.0)
+    levels = table[at_gaps : at_gaps + gaps] * room
+    return Range(levels, most[:, 0], most[:, 1], np.array([largest_yaw(table, room - gap, 0.0) for gap in levels]))
 
 
 class Parts(NamedTuple):
@@ -129,7 +139,7 @@ class Parts(NamedTuple):
     rest: Samples
     """(gaps, up + down - 1, phases, 36)."""
     yawed: Samples
-    """(yaw gaps, yaw pitches, 2, phases, 36)."""
+    """(yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36)."""
     film: Samples
     """Packed film."""
 
@@ -142,12 +152,7 @@ def shapes_of(table: Samples) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Shapes of `rest` and `yawed` of a packed table, or of its nodes."""
     gaps, pitches = int(table[_GAPS]), int(table[_UP] + table[_DOWN]) - 1
     yaw_gaps, yaw_pitches, phases = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES]), int(table[_PHASES])
-    return (gaps, pitches, phases, PARAMETERS), (yaw_gaps, yaw_pitches, 2, phases, PARAMETERS)
-
-
-def yaw_of(table: Samples) -> float:
-    """Yaw at which yawed places were computed, rad."""
-    return float(table[_YAW])
+    return (gaps, pitches, phases, PARAMETERS), (yaw_gaps, yaw_pitches, YAW_ORDERS, phases, PARAMETERS)
 
 
 def parts_of(table: Samples) -> Parts:
@@ -171,7 +176,7 @@ def mirror_image(table: Samples) -> Samples:
     phases = np.where(order % 2 == 0, -1.0, 1.0) * (-1.0) ** harmonic  # of sin, of cos
     phases[0] = 1.0
     signs = phases[:, None] * (MIRROR[row] * MIRROR[column])
-    yaws = np.array([-1.0, 1.0])[:, None, None]
+    yaws = ((-1.0) ** np.arange(1, YAW_ORDERS + 1))[:, None, None]
     return parts._replace(rest=parts.rest * signs, yawed=parts.yawed * signs * yaws).packed()
 
 
@@ -193,6 +198,12 @@ def _contact_offset(data: Samples, start: int, count: int, radius: float, pitch:
         along, across = data[start + 4 * i + 2] * s, data[start + 4 * i + 3] * c
         reach = max(reach, rho * c - x * s + math.sqrt(along * along + across * across))
     return float(radius - reach)
+
+
+@compiled
+def contact_offset_of(table: Samples, pitch: float) -> float:
+    """Offset at which the body of a packed table touches the floor of the tube without a yaw, m."""
+    return _contact_offset(table, _HEADER, int(table[_RINGS]), table[_RADIUS], pitch)
 
 
 @compiled
@@ -256,29 +267,37 @@ def _rooted(data: Samples, start: int, count: int, t: float, out: Samples) -> No
 
 
 @compiled
-def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Samples) -> tuple[int, float]:
-    """Fill the Fourier coefficients of the rest's factor, (phases, 36); how the range was left, and t."""
-    rings, gaps, up, down = int(table[_RINGS]), int(table[_GAPS]), int(table[_UP]), int(table[_DOWN])
+def _place(table: Samples, e: float, pitch: float, of_gap: Samples) -> tuple[float, float, bool]:
+    """Fill the weights of the nodes in t; t and signed f of a place, and whether it is within the range of pitch."""
+    rings, gaps = int(table[_RINGS]), int(table[_GAPS])
     at_gaps = _HEADER + 4 * rings
-    at_up = at_gaps + gaps
-    at_most = at_up + up + down
-    at_rest = at_most + 2 * gaps + int(table[_YAW_GAPS] + table[_YAW_PITCHES])
-    block = int(table[_PHASES]) * PARAMETERS
-
-    left = INSIDE
+    at_most = at_gaps + gaps + int(table[_UP] + table[_DOWN])
     t = 1.0 - e / _contact_offset(table, _HEADER, rings, table[_RADIUS], pitch)
     t = min(max(t, 0.0), 1.0)
-    of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
     _rooted(table, at_gaps, gaps, t, of_gap)
-    lowered = pitch < 0.0
     most = 0.0
     for i in range(gaps):
-        most += of_gap[i] * table[at_most + 2 * i + (1 if lowered else 0)]
-    f = abs(pitch) / most
-    if f > _PITCH_SLACK:
-        left, f = TOO_FAR_PITCHED, _PITCH_SLACK
+        most += of_gap[i] * table[at_most + 2 * i + (1 if pitch < 0.0 else 0)]
+    f = pitch / most
+    if abs(f) > _PITCH_SLACK:
+        return t, math.copysign(_PITCH_SLACK, f), False
+    return t, f, True
+
+
+@compiled
+def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Samples) -> tuple[int, float]:
+    """Fill the Fourier coefficients of the rest's factor, (phases, 36); how the range was left, and t."""
+    gaps, up, down = int(table[_GAPS]), int(table[_UP]), int(table[_DOWN])
+    at_up = _HEADER + 4 * int(table[_RINGS]) + gaps
+    block = int(table[_PHASES]) * PARAMETERS
+    at_rest = _rest_start(table)
+
+    of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
+    t, f, within = _place(table, e, pitch, of_gap)
+    left = INSIDE if within else TOO_FAR_PITCHED
+    lowered = pitch < 0.0
     pitches = down if lowered else up
-    _steep(table, at_up + up if lowered else at_up, pitches, f, of_pitch)
+    _steep(table, at_up + up if lowered else at_up, pitches, abs(f), of_pitch)
     flat = out.ravel()
     for n in range(block):
         flat[n] = 0.0
@@ -289,29 +308,61 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
             share = of_gap[i] * of_pitch[j]
             for n in range(block):
                 flat[n] += share * table[here + n]
-    if yaw != 0.0 and table[_YAW_GAPS] > 0:
-        most = YAW_SLACK * table[_YAW]
-        if abs(yaw) > most:
-            left, yaw = TOO_FAR_YAWED, math.copysign(most, yaw)
-        at_yawed = at_rest + gaps * (up + down - 1) * block
-        _add_yaw(table, at_most + 2 * gaps, at_yawed, t, -f if lowered else f, yaw, flat)
+    if yaw != 0.0 and table[_YAW_GAPS] > 0 and not _add_yaw(table, t, f, yaw, flat):
+        left = TOO_FAR_YAWED
     return left, t
 
 
 @compiled
-def _add_yaw(table: Samples, at_nodes: int, at_yawed: int, t: float, f: float, yaw: float, out: Samples) -> None:
-    """Add what a yaw makes of the coefficients."""
+def _yaw_weights(table: Samples, t: float, f: float, of_gap: Samples, of_pitch: Samples) -> float:
+    """Fill the weights of the yawed places; the largest yaw, rad."""
     gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
-    of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
-    _rooted(table, at_nodes, gaps, max(t, table[at_nodes]), of_gap)
-    _lagrange(table, at_nodes + gaps, pitches, f, of_pitch)
+    start = _rest_start(table) - gaps - pitches - gaps * pitches
+    _rooted(table, start, gaps, max(t, table[start]), of_gap)
+    _lagrange(table, start + gaps, pitches, f, of_pitch)
+    most = 0.0
     for i in range(gaps):
         for j in range(pitches):
-            here = at_yawed + (i * pitches + j) * 2 * out.size
-            first = of_gap[i] * of_pitch[j] * yaw
-            second = first * yaw
-            for n in range(out.size):
-                out[n] += first * table[here + n] + second * table[here + out.size + n]
+            most += of_gap[i] * of_pitch[j] * table[start + gaps + pitches + i * pitches + j]
+    return max(most, _LEAST_YAW)
+
+
+@compiled
+def largest_yaw(table: Samples, e: float, pitch: float) -> float:
+    """Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it."""
+    t, f, _ = _place(table, e, pitch, np.empty(_MOST))
+    return _yaw_weights(table, t, f, np.empty(_MOST), np.empty(_MOST))
+
+
+@compiled
+def stretched_yaw(share: float) -> float:
+    """What the rest is a polynomial of: what nears the glass varies as the logarithm of its clearance.
+
+    Args:
+        share: g, the yaw over the largest one.
+    """
+    return math.atanh(share / _BEYOND_YAW)
+
+
+@compiled
+def _add_yaw(table: Samples, t: float, f: float, yaw: float, out: Samples) -> bool:
+    """Add what a yaw makes of the coefficients; whether it is within the range."""
+    gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
+    of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
+    most = _yaw_weights(table, t, f, of_gap, of_pitch)
+    within = abs(yaw) <= YAW_SLACK * most
+    s = stretched_yaw(yaw / most if within else math.copysign(YAW_SLACK, yaw))
+    at_yawed = film_start(table) - gaps * pitches * YAW_ORDERS * out.size
+    for i in range(gaps):
+        for j in range(pitches):
+            here = at_yawed + (i * pitches + j) * YAW_ORDERS * out.size
+            share = of_gap[i] * of_pitch[j]
+            for _ in range(YAW_ORDERS):
+                share *= s
+                for n in range(out.size):
+                    out[n] += share * table[here + n]
+                here += out.size
+    return within
 
 
 @compiled
@@ -321,13 +372,19 @@ def rest_coefficients(table: Samples, e: float, pitch: float, out: Samples) -> N
 
 
 @compiled
+def _rest_start(table: Samples) -> int:
+    """Where in a packed table the rest begins."""
+    yaw_gaps, yaw_pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
+    own = 4 * int(table[_RINGS]) + 3 * int(table[_GAPS]) + int(table[_UP] + table[_DOWN])
+    return _HEADER + own + yaw_gaps + yaw_pitches + yaw_gaps * yaw_pitches
+
+
+@compiled
 def film_start(table: Samples) -> int:
     """Where in a packed table the film begins."""
-    gaps, pitches = int(table[_GAPS]), int(table[_UP] + table[_DOWN])
-    yaw_gaps, yaw_pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
+    pitches, yawed = int(table[_UP] + table[_DOWN]) - 1, int(table[_YAW_GAPS] * table[_YAW_PITCHES])
     block = int(table[_PHASES]) * PARAMETERS
-    nodes = 4 * int(table[_RINGS]) + 3 * gaps + pitches + yaw_gaps + yaw_pitches
-    return _HEADER + nodes + (gaps * (pitches - 1) + 2 * yaw_gaps * yaw_pitches) * block
+    return _rest_start(table) + (int(table[_GAPS]) * pitches + YAW_ORDERS * yawed) * block
 
 
 @compiled

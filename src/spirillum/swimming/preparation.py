@@ -73,10 +73,10 @@ class Prepared(Shown):
             "places": self.table.places,
             "error": {name: quantity(value, "1") for name, value in self.table.error.items()},
             "valid": {
-                "gap": quantity(held.gaps, "m", meaning="of a level robot, where the next two hold"),
+                "gap": quantity(held.gaps, "m", meaning="of a level robot, where the next three hold"),
                 "pitch_up": quantity(held.up, "rad", meaning="largest pitch nose up"),
                 "pitch_down": quantity(held.down, "rad", meaning="largest pitch nose down"),
-                "yaw": quantity(held.yaw, "rad", meaning="largest yaw to either side"),
+                "yaw": quantity(held.yaw, "rad", meaning="largest yaw of a level robot to either side"),
             },
             "seconds": quantity(self.table.seconds, "s"),
         }

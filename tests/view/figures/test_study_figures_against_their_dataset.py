@@ -205,7 +205,7 @@ def test_many_wavelengths_fill_several_figures_and_say_so() -> None:
         "wavelengths": [f"{value} mm" for value in range(10, 40)],
         "amplitudes": ["2 mm"],
     }
-    figures = figures_of(sp.study({"grid": grid}))
+    figures = figures_of(sp.study({"models": ["sbt"], "grid": grid}))
     parts = [name for name in figures if name.startswith("channel-one-part")]
     assert parts == [f"channel-one-part{number}" for number in (1, 2, 3, 4)]
     assert "24 of 30 wavelengths" in figures[parts[0]].caption

@@ -17,12 +17,10 @@ def table(answer: Answer, console: Console) -> None:
         rows.add_row(name.replace("_", " "), f"{100.0 * item['value']:.2g}")
     console.print(rows)
     valid = answer["valid"]
-    ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg")
-    columns = [
-        (valid[name]["value"], unit) for name, unit in (("gap", "mm"), ("pitch_up", "deg"), ("pitch_down", "deg"))
-    ]
+    ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")
+    units = (("gap", "mm"), ("pitch_up", "deg"), ("pitch_down", "deg"), ("yaw", "deg"))
+    columns = [(valid[name]["value"], unit) for name, unit in units]
     for index in range(len(valid["gap"]["value"])):
         ranges.add_row(*(in_unit(values[index], "m" if unit == "mm" else "rad", unit) for values, unit in columns))
     console.print(ranges)
-    yaw = in_unit(valid["yaw"]["value"], "rad", "deg")
-    console.print(f"yaw to {yaw} deg; {answer['places']} places in {answer['seconds']['value']:.0f} s", highlight=False)
+    console.print(f"{answer['places']} places in {answer['seconds']['value']:.0f} s", highlight=False)

@@ -6,7 +6,7 @@ __all__ = ["ANNOUNCED", "announcement"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-_SECONDS = 40.0
+_SECONDS = 15.0
 """Time that a place takes one process, s; measured for the paper's robot, less for short bodies and wide gaps."""
 
 

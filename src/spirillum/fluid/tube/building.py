@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.announced import announcement
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, Places
+from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, YAW_SHARES, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import (
     Progress,
@@ -27,6 +27,7 @@ from spirillum.fluid.tube.rest import (
     rest_at,
     seen_in_mirror,
     solutions,
+    solved_as_one,
 )
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable
@@ -61,7 +62,7 @@ def built_tables(
     every = [Places(geometry, radius) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
     if progress is not None:
-        count = sum(len(some) for some in nodes)
+        count = len(solved_as_one([place for some in nodes for place in some]))
         progress(announcement(count, workers), 0, count)
     found = iter(solutions([place for some in nodes for place in some], "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
@@ -118,12 +119,13 @@ def _level(places: Places) -> list[_Place]:
 
 
 def _yawed(places: Places) -> list[_Place]:
-    """Nodes with yaw that are solved for: those off the axis."""
+    """Nodes with yaw that are solved for, those off the axis, one after the other for each share of the largest yaw."""
     return [
-        _Place(float(t), float(f), places.seat(float(t), float(f), places.yaw))
-        for t in places.yaw_gaps
+        _Place(float(t), float(f), places.seat(float(t), float(f), share * float(most)))
+        for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
-        for f in places.yaw_pitches
+        for f, most in zip(places.yaw_pitches, row, strict=True)
+        for share in YAW_SHARES
     ]
 
 
@@ -142,18 +144,32 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     shape = len(places.gaps), len(places.up) + len(places.down) - 1, *rest[0].shape
     parts = (places.gaps, places.up, places.down, places.most, np.reshape(rest, shape))
     none = np.zeros(0)
-    straight = kernel.packed(places.radius, places.yaw, places.rings, *parts, none, none, none, film)
+    straight = kernel.packed(places.radius, places.rings, *parts, none, none, none, none, film)
     sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
-    for f in places.yaw_pitches:
+    for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
-        sides.append((on_axis.coefficients(pitch, places.yaw), on_axis.coefficients(pitch, -places.yaw)))
-    turned = []
-    for seat, (left, right) in zip(_yawed_seats(places), sides, strict=True):
-        middle = _interpolated(straight, seat, len(left))
-        turned.append([(left - right) / (2.0 * places.yaw), (0.5 * (left + right) - middle) / places.yaw**2])
-    return kernel.packed(
-        places.radius, places.yaw, places.rings, *parts, places.yaw_gaps, places.yaw_pitches, np.array(turned), film
-    )
+        for share in YAW_SHARES:
+            here = share * float(yaw)
+            sides.append((on_axis.coefficients(pitch, here), on_axis.coefficients(pitch, -here)))
+    of_node = np.reshape(sides, (-1, len(YAW_SHARES), *np.shape(sides)[1:]))
+    seats = _yawed_seats(places)
+    middles = [_interpolated(straight, seat, of_node.shape[-2]) for seat in seats]
+    turned = np.stack([_powers(middle, node) for middle, node in zip(middles, of_node, strict=True)])
+    yawed_nodes = places.yaw_gaps, places.yaw_pitches, places.most_yaw
+    return kernel.packed(places.radius, places.rings, *parts, *yawed_nodes, turned, film)
+
+
+def _powers(middle: Samples, sides: Samples) -> Samples:
+    """Coefficients of the powers of the stretched yaw from the values at `YAW_SHARES`, (4, phases, 36).
+
+    Args:
+        middle: values without yaw, (phases, 36).
+        sides: values to the left and to the right, (shares, 2, phases, 36).
+    """
+    s = np.array([kernel.stretched_yaw(share) for share in YAW_SHARES])[:, None, None]
+    odd, even = 0.5 * (sides[:, 0] - sides[:, 1]) / s, (0.5 * (sides[:, 0] + sides[:, 1]) - middle) / s**2
+    high_odd, high_even = (np.diff(part, axis=0)[0] / (s[1] ** 2 - s[0] ** 2) for part in (odd, even))
+    return np.stack([odd[0] - s[0] ** 2 * high_odd, even[0] - s[0] ** 2 * high_even, high_odd, high_even])
 
 
 def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> tuple[Samples, Samples]:
@@ -181,7 +197,7 @@ def _held_out(places: Places) -> list[Solution]:
     chosen: list[Solution] = []
     while len(chosen) < _HELD_OUT:
         t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
-        f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * places.yaw
+        f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
         seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > 0.4 * places.thinnest:

@@ -1,8 +1,8 @@
 """Places of a robot in its tube at which a table is computed.
 
 The coordinates are those of `spirillum.kernels.tube_table`: t runs from the floor (0) to the tube's axis (1), f from
-level (0) to the largest pitch (1), at which tail or coupling come as near to the glass as the model resolves. A place
-and its mirror image are the same for a robot without a tail; nothing here has a yaw.
+level (0) to the largest pitch (1), at which tail or coupling come as near to the glass as the model resolves, and a yaw
+is a share of the largest one at its place, at which the tail does.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
-__all__ = ["LARGEST_YAW", "STEEPEST", "Places", "rings_of"]
+__all__ = ["LARGEST_YAW", "STEEPEST", "YAW_SHARES", "Places", "rings_of"]
 
 STEEPEST = (np.radians(12.0), np.radians(8.0))
 """Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
@@ -38,8 +38,10 @@ _SPACED = 1.3
 """Least ratio of the first of these to the last of those."""
 _UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
 _DOWN = (0.0, 0.28, 0.55, 0.8, 1.0)
-LARGEST_YAW = float(np.radians(4.0))
-"""Largest yaw of yawed places, rad: nose up, the tail is near the glass there; see `YAW_SLACK` of the kernel."""
+LARGEST_YAW = float(np.radians(11.0))
+"""Largest yaw of a table, rad: at most places the glass holds the tail before."""
+YAW_SHARES = (0.6, 0.95)
+"""Yaws of yawed places over the largest one there."""
 _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
 _SWEPT = 121
 """Points along the tail between which it is asked how near it comes to the glass."""
@@ -132,16 +134,14 @@ class Places:
         return np.array(_YAW_PITCHES)
 
     @cached_property
-    def yaw(self) -> float:
-        """Yaw of yawed places, rad: at most 4 degrees, and at all of them the tail is off the glass as elsewhere."""
+    def most_yaw(self) -> Samples:
+        """Largest yaw at the yawed places, (yaw gaps, yaw pitches), rad: the tail is off the glass as elsewhere."""
+        return np.array([[self._widest(float(t), float(f)) for f in self.yaw_pitches] for t in self.yaw_gaps])
 
-        def spare(yaw: float) -> float:
-            seats = [self.seat(float(t), float(f), yaw) for t in self.yaw_gaps for f in self.yaw_pitches]
-            return min(self.tail_clearance(seat) for seat in seats) - self.least_clearance
-
-        return max(
-            float(_LEAST_PITCH), last_clear(spare, min(LARGEST_YAW, 2.0 / 3.0 * float(self.most[-1].min())), *_SEARCH)
-        )
+    def largest_yaw_near(self, t: float, f: float) -> float:
+        """Largest yaw of the nearest yawed place, rad."""
+        row = int(np.argmin(np.abs(self.yaw_gaps - t)))
+        return float(self.most_yaw[row, int(np.argmin(np.abs(self.yaw_pitches - f)))])
 
     @cached_property
     def most(self) -> Samples:
@@ -186,3 +186,11 @@ class Places:
             return found
 
         return max(float(_LEAST_PITCH), last_clear(spare, STEEPEST[0 if sign > 0 else 1], *_SEARCH))
+
+    def _widest(self, t: float, f: float) -> float:
+        """Largest yaw at a place."""
+
+        def spare(yaw: float) -> float:
+            return self.tail_clearance(self.seat(t, f, yaw)) - self.least_clearance
+
+        return max(float(_LEAST_PITCH), last_clear(spare, LARGEST_YAW, *_SEARCH))

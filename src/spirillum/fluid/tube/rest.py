@@ -34,6 +34,7 @@ __all__ = [
     "rest_at",
     "seen_in_mirror",
     "solutions",
+    "solved_as_one",
 ]
 
 PHASES = 5
@@ -84,20 +85,26 @@ def solutions(
         progress: told what is being solved, how many places are done, and of how many.
         workers: number of processes.
     """
-    shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
-    for number, place in enumerate(places):
-        bodies = {g.without_tail for g, _ in place.tails}
-        shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
+    shared = solved_as_one(places)
     together = [
         places[numbers[0]]._replace(tails=tuple(tail for number in numbers for tail in places[number].tails))
-        for numbers in shared.values()
+        for numbers in shared
     ]
     found: list[list[Samples]] = [[] for _ in places]
-    for numbers, answers in zip(shared.values(), _solutions(together, what, progress, workers), strict=True):
+    for numbers, answers in zip(shared, _solutions(together, what, progress, workers), strict=True):
         ahead = iter(answers)
         for number in numbers:
             found[number] = [next(ahead) for _ in places[number].tails]
     return found
+
+
+def solved_as_one(places: Sequence[Solution]) -> list[list[int]]:
+    """Numbers of the places that differ in their tails only, and are solved for together."""
+    shared: dict[tuple[RobotGeometry, Seat, Fineness], list[int]] = {}
+    for number, place in enumerate(places):
+        bodies = {g.without_tail for g, _ in place.tails}
+        shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
+    return list(shared.values())
 
 
 def _solutions(places: Sequence[Solution], what: str, progress: Progress | None, workers: int) -> list[list[Samples]]:

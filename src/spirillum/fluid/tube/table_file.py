@@ -36,8 +36,8 @@ def to_bytes(head: bytes, table: Samples) -> bytes:
     rows = _rows_of(parts.rest)
     counts = np.array([parts.nodes.size, rows.size], dtype="<f8")
     exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows, film_head))
-    rest, yawed = _steps(parts.nodes, rows)
-    coded = _coded(parts.rest / rest) + _coded(parts.yawed / yawed) + _coded(film / _FILM)
+    steps = _steps(rows)
+    coded = _coded(parts.rest / steps) + _coded(parts.yawed / steps) + _coded(film / _FILM)
     return sealed(zlib.compress(head + b"\n" + exact + coded, 9))
 
 
@@ -69,7 +69,7 @@ class _Reader:
         nodes, rows = self._exact(int(counts[0])), self._exact(int(counts[1]))
         head = self._exact(film_table.HEAD)
         shapes = kernel.shapes_of(nodes)
-        rest, yawed = (self._whole(shape) * steps for shape, steps in zip(shapes, _steps(nodes, rows), strict=True))
+        rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
         film = (self._whole(_film_shape(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
         return kernel.Parts(nodes, rest, yawed, packed).packed()
@@ -111,11 +111,11 @@ def _rows_of(rest: Samples) -> Samples:
     return found
 
 
-def _steps(nodes: Samples, rows: Samples) -> tuple[Samples, Samples]:
-    """Steps of the rest, (36,), and of its derivatives with yaw, (2, 1, 36): at the table's yaw they are the same."""
+def _steps(rows: Samples) -> Samples:
+    """Steps of the rest and of its powers in the stretched yaw, which is about 1 at most, (36,)."""
     row, column = np.tril_indices(kernel.MOTIONS)
-    steps = _REST * np.where(row == column, 1.0, rows[row])
-    return steps, steps / kernel.yaw_of(nodes) ** np.array([1.0, 2.0])[:, None, None]
+    found: Samples = _REST * np.where(row == column, 1.0, rows[row])
+    return found
 
 
 def _film_shape(head: Samples) -> tuple[int, ...]:
