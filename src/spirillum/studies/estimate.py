@@ -20,8 +20,8 @@ __all__ = ["Estimate", "estimate_of", "is_large"]
 _FEW, _MORE = 200, 2000
 """Robots that are computed to know the rest of them."""
 _SECONDS_PER_ROBOT, _SECONDS_PER_PLACE = 0.5, 10.0
-"""Of a model that solves for the flow, and of a place of one that solves for the walls, too; processor time measured for the paper's
-robot, with the second resolution for the error estimate."""
+"""Of a model that solves for the flow, and of a place of one that solves for the walls, too: processor time, measured
+for the paper's robot, with the second resolution for the error estimate."""
 _SOLVING_MEMORY = 5e8
 """Of a solve of body and walls, bytes; measured for the paper's robot."""
 
