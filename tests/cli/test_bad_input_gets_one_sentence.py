@@ -152,10 +152,10 @@ def test_a_link_keeps_pointing_to_its_file(run: Callable[..., Any], tmp_path: Pa
 def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from spirillum.studies import run as study_run
 
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **_more: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(study_run, "answer", interrupted)
+    monkeypatch.setattr(study_run, "shared_out", interrupted)
     outcome = run("study", "-o", str(tmp_path / "out"))
     assert outcome.code == 130
     assert "interrupted" in outcome.err
