@@ -119,7 +119,7 @@ def test_command_line(walled: Any, run: Callable[..., tuple[int, str, str]]) -> 
     assert (code, answer["placement"]["gap"]["value"], answer["placement"]["ends"]) == (0, 5e-4, "closed")
     direct = sp.predict(WIDE, model="walled", placement={"gap": 5e-4, "ends": "closed"}, band=False)
     assert answer["forward_velocity"]["value"] == direct.forward_velocity
-    code, out, _ = run("predict", WIDE, *model, "--flow", "-2mm/s", "--tail-rate", "1Hz", "--no-band")
+    code, out, _ = run("predict", WIDE, *model, "--flow", "-2mm/s", "--tail-rate", "1Hz", "--no-band", "--all")
     assert code == 0
     assert "placement: in the channel, gap - mm" not in out
     assert "plug velocity" in out
