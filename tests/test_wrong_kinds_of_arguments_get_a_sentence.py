@@ -52,7 +52,10 @@ def taken(annotation: str) -> set[str]:
     return words.union(*(ALSO.get(word, ()) for word in words))
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+MADE = ("HeldPlants", "LiveTracker", "Plant", "SerialRemote", "VirtualCamera")
+
+
+@pytest.mark.parametrize("name", [*FUNCTIONS, *MADE])
 def test_each_argument_of_a_wrong_kind_is_named(name: str) -> None:
     function = getattr(sp, name)
     parameters = [item for item in inspect.signature(function).parameters.values() if item.kind is not item.VAR_KEYWORD]
@@ -79,6 +82,17 @@ def test_each_option_of_a_wrong_kind_is_named(options: type[Options]) -> None:
             with pytest.raises(sp.InputError) as refused:
                 options.of({name: wrong})
             assert name.replace("_", "-") in str(refused.value).replace("_", "-"), (name, wrong, str(refused.value))
+
+
+def test_no_number_is_too_long_for_a_sentence() -> None:
+    plant = sp.Plant("biorob2012-wide", model="rft")
+    for wrong in (10**400, 10**5000, True, "1", None, 1j):
+        with pytest.raises(sp.InputError, match=r"dt = .*; allowed: above 0"):
+            plant.step(wrong)  # type: ignore[arg-type]
+    with pytest.raises(sp.InputError, match="state = 3; allowed: a PlantState"):
+        plant.reset(3)  # type: ignore[arg-type]
+    with pytest.raises(sp.InputError, match=r"foo is no argument of Plant\(\).*; allowed: robot"):
+        sp.Plant("biorob2012-wide", foo=1)  # type: ignore[call-arg]
 
 
 def test_sampler_wants_whole_numbers() -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 import os
 import types
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
-__all__ = ["check_kind", "checked"]
+__all__ = ["as_number", "check_kind", "checked"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -63,7 +64,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     """A function that looks at the kinds of its arguments first.
 
     Args:
-        function: a function whose annotations are text (`from __future__ import annotations`).
+        function: a function, or the `__init__` of a class, whose annotations are text
+            (`from __future__ import annotations`).
 
     Returns:
         The function; it raises `InputError` for an argument of a wrong kind, or one that it does not have.
@@ -71,6 +73,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     signature = inspect.signature(function)
     names = [name for name, item in signature.parameters.items() if item.kind is not item.VAR_KEYWORD]
     open_ended = len(names) < len(signature.parameters)
+    own = names[1:] if names[:1] == ["self"] else names
+    called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
 
     @cache
     def kinds_of(name: str) -> tuple[_Kind, ...]:
@@ -84,11 +88,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
         for name in kwargs:
             if name not in names and not open_ended:
                 raise InputError(
-                    f"{name} is no argument of {function.__name__}(){did_you_mean(name, names)}; allowed: "
-                    f"{', '.join(names)}"
+                    f"{name} is no argument of {called}(){did_you_mean(name, own)}; allowed: {', '.join(own)}"
                 )
         for name, value in {**dict(zip(names, args, strict=False)), **kwargs}.items():
-            if name in names:
+            if name in own:
                 _check(name, value, kinds_of(name))
         return function(*args, **kwargs)
 
@@ -107,6 +110,16 @@ def check_kind(name: str, value: Any, annotation: str) -> None:
         InputError: if it is of none of them.
     """
     _check(name, value, _kinds(ast.parse(annotation, mode="eval").body, {}))
+
+
+def as_number(value: Any) -> float:
+    """A value as a number; NaN, which is in no range, for what is none, and for one too large to be a float."""
+    if not isinstance(value, Real) or _is_true_or_false(value):
+        return math.nan
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:

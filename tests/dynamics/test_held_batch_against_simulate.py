@@ -102,6 +102,8 @@ def test_ranges_are_kept_and_seeds_repeat() -> None:
         ({"dt": 0.1, "duty": [0.0, 1.5]}, r"duty = 1\.5; allowed"),
         ({"dt": 0.1, "duty": [0.0, 1.0, 1.0]}, "no array of 2 numbers"),
         ({"dt": 0.1, "duty": 1.0, "remote": True}, "given together"),
+        ({"dt": 0.1, "remote": "no"}, "remote = 'no'; allowed: True or False"),
+        ({"dt": 0.1, "remote": [[True], [True, False]]}, "remote = "),
         ({"dt": 0.1, "flow": 1e-3}, "flow without one in the placement"),
     ],
 )
@@ -109,6 +111,10 @@ def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) 
     robots = sp.HeldPlants(WIDE, 2, model="rft")
     with pytest.raises(sp.InputError, match=sentence):
         robots.step(**arguments)
+    with pytest.raises(sp.InputError, match="which = "):
+        robots.reset(np.ones(3, dtype=bool))
+    with pytest.raises(sp.InputError, match="which = "):
+        robots.redraw(np.ones(3, dtype=bool))
     assert not robots.states.any()
 
 
@@ -124,6 +130,8 @@ def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) 
 def test_wrong_ranges_are_a_sentence(ranges: dict[str, Any], sentence: str) -> None:
     with pytest.raises(sp.InputError, match=sentence):
         sp.HeldPlants(WIDE, 2, model="rft", ranges=ranges)
+    with pytest.raises(sp.InputError, match="seed = -1; allowed: a whole number from 0"):
+        sp.HeldPlants(WIDE, 2, model="rft", seed=-1)
 
 
 def posteriors() -> Any:

@@ -116,6 +116,12 @@ def test_wrong_actions_are_a_sentence(name: str, action: float) -> None:
     one.reset(seed=1)
     with pytest.raises(sp.InputError, match="action = "):
         one.step(np.array([action]))
+    for wrong in ("on", {}, [[1], [1, 2]]):
+        with pytest.raises(sp.InputError, match="action = "):
+            one.step(wrong)
+    for seed in (-1, "a", 1.5):
+        with pytest.raises(sp.InputError, match="seed = "):
+            one.reset(seed=seed)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -123,6 +129,7 @@ def test_wrong_actions_are_a_sentence(name: str, action: float) -> None:
     [
         ({"duration": 0.0}, "duration = 0 s; allowed"),
         ({"goal": (2.0, 1.0)}, "goal = "),
+        ({"goal": (1.0, float("inf"))}, "goal = "),
         ({"robot": "nobody"}, "nobody"),
         ({"lab": {"camera": {"fps": -1}}}, r"camera\.fps"),
         ({"colour": "red"}, "allowed: options of its task"),
@@ -132,3 +139,8 @@ def test_wrong_actions_are_a_sentence(name: str, action: float) -> None:
 def test_wrong_options_are_a_sentence(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(sp.InputError, match=sentence):
         gymnasium.make(HOME + NAMES[0], **{"model": "rft", **options})
+    environments = pytest.importorskip("spirillum.interfaces.environments")
+    with pytest.raises(sp.InputError, match="render_mode = 'human'; allowed: ansi or None"):
+        environments.Environment(NAMES[0], render_mode="human")
+    with pytest.raises(sp.InputError, match="task = 'nobody'; allowed: spirillum/StopAt-v0"):
+        environments.Environment("nobody")

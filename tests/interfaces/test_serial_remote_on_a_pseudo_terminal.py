@@ -156,6 +156,26 @@ def test_ports_that_are_none_are_a_sentence() -> None:
 
 
 @pty
+@pytest.mark.parametrize("said", ["abc", "", "nan", "70000"])
+def test_answers_that_are_no_numbers_are_a_sentence(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    with sp.VirtualRemote() as far, sp.SerialRemote(far.port) as near:
+        monkeypatch.setattr(near, "_asked", lambda verb, more="": f"ACK 7 {said}")
+        with pytest.raises(sp.InputError, match="answers as no remote does"):
+            near.send(0.5)
+        with monkeypatch.context() as other:
+            other.setattr(sp.SerialRemote, "_asked", lambda self, verb, more="": f"WHO 1 x {said}")
+            with sp.VirtualRemote() as second, pytest.raises(sp.InputError, match="answers as no remote does"):
+                sp.SerialRemote(second.port)
+
+
+@pty
+@pytest.mark.parametrize("baud", [0, -1, 2**31, 10**30])
+def test_rates_of_symbols_that_no_port_has_are_a_sentence(baud: int) -> None:
+    with pytest.raises(sp.InputError, match=r"baud = .*; allowed: 1 to"):
+        sp.SerialRemote("/dev/no-such-port", baud=baud)
+
+
+@pty
 def test_command(capsys: pytest.CaptureFixture[str]) -> None:
     with sp.VirtualRemote() as far:
         with pytest.raises(SystemExit) as stopped:

@@ -32,7 +32,7 @@ def loop(tmp_path_factory):
 
 
 def test_the_tracker_sees_where_the_plant_is(loop):
-    now, time, x, true, tail, phase = loop[2]
+    now, time, x, true, tail, phase = loop[2][:6]
     assert now.size > 30
     assert time == pytest.approx(now - 0.5 / 120.0)  # the middle of the exposure
     assert x == pytest.approx(true, abs=2e-4)
@@ -44,5 +44,10 @@ def test_pictures_are_taken_in_order(loop):
     camera, moment, _ = loop
     with pytest.raises(InputError, match="allowed: later than the picture before"):
         camera.take(moment.time, moment.pose)
+    for wrong in (np.nan, None, 10**400):
+        with pytest.raises(InputError, match=r"time = .*; allowed: later than the picture before"):
+            camera.take(wrong, moment.pose)
+    with pytest.raises(InputError, match="pose = None; allowed: a Pose"):
+        camera.take(moment.time + 1.0, None)
     with pytest.raises(InputError, match="degradation = 'dirty'"):
         sp.VirtualCamera("biorob2012-wide", moment.pose, degradation="dirty")

@@ -136,6 +136,13 @@ def test_sources_that_are_not_there_get_a_sentence(filmed):
     with pytest.raises(InputError, match="'fast' with tcp"):
         track("tcp://127.0.0.1:1", setup, pace="fast")
     assert "secret" not in source_of("rtsp://me:secret@host/x").name
+    assert "secret" not in source_of("rtsp://me:a@secret@host/x").name
+    assert source_of("HTTP://127.0.0.1:1/X").options["file"] == "http://127.0.0.1:1/X"
+    with pytest.raises(InputError, match="fps = nan; allowed: above 0"):
+        source_of("camera:0", fps=float("nan"))
+    for address in ("00000199999", "..:55", f"{'a' * 70}:55", "99999", ":5"):
+        with pytest.raises(InputError, match=r"udp = .*allowed: PORT or HOST:PORT"):
+            Datagrams(address)
 
 
 def arrivals(count, step):

@@ -32,6 +32,9 @@ def test_chains_that_do_not_end_are_refused(tmp_path: Path) -> None:
     two.write_text('extends = "none.toml"\n', encoding="utf-8")
     with pytest.raises(sp.InputError, match=r"none\.toml does not exist"):
         sp.load(one)
+    two.write_text('extends = "a\\u0000b.toml"\n', encoding="utf-8")
+    with pytest.raises(sp.InputError, match="is no name of a file"):
+        sp.load(one)
     two.write_text('extends = "biorob2012-wise"\n', encoding="utf-8")
     with pytest.raises(sp.InputError, match=r"did you mean biorob2012-wide\?\); allowed: .* or a robot file"):
         sp.load(one)
@@ -81,6 +84,11 @@ def test_a_study_varies_any_field() -> None:
         ({"vary": {"tail.length": ["40 mm"]}, "grid": {"wavelengths": ["20 mm"]}}, "grid"),
         ({"vary": {"tail.lenght": ["40 mm"]}, "robots": ["biorob2012-wide"]}, "did you mean length?"),
         ({"vary": {"tail.length": ["40 mm", "40 mm"]}, "robots": ["biorob2012-wide"]}, "holds a value twice"),
+        ({"vary": {"a." * 1000: ["x"]}, "robots": ["biorob2012-wide"]}, "allowed: "),
+        (
+            {"vary": {f"tail.{k}": list(range(100)) for k in range(3)}, "robots": ["biorob2012-wide"]},
+            "vary makes 1000000 robots; allowed: at most 100000",
+        ),
         ({"vary": {"tail.length": []}, "robots": ["biorob2012-wide"]}, "at least one entry"),
         ({"vary": {"tail.turns": [3]}, "robots": ["biorob2012-wide"]}, "tail.turns is not a known field"),
     ],

@@ -63,6 +63,8 @@ def test_a_film_states_its_troubles_in_its_truth(tmp_path):
         times = [float(frame.time) for frame in container.decode(video=0)]
     assert len(times) == truth["frames"] == 25
     assert np.diff(times) == pytest.approx(1 / 30, abs=1e-4)
+    with pytest.raises(InputError, match="trouble ''; allowed"):
+        Troubles.of(",")
     with pytest.raises(InputError, match=r"trouble 'shaken'.*allowed: lost-frames, handheld, rolled, uneven-stripes"):
         Troubles.of("shaken")
     with pytest.raises(InputError, match="handheld"):

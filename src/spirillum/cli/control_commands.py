@@ -175,13 +175,10 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
         InputError: if one is wrong.
     """
     from spirillum.controllers.lab import Lab
-    from spirillum.errors import InputError
     from spirillum.robot.load import parse_setting
 
     found = {}
     for text in changes or []:
-        if "=" not in text:
-            raise InputError(f"--with {text[:60]!r} is not FIELD=VALUE; for example --with camera.latency=50ms")
-        name, value = parse_setting(text)
+        name, value = parse_setting(text, "--with", "camera.latency=50ms")
         found[name] = value
     return Lab.read(path, found)

@@ -86,8 +86,8 @@ def export(
             raise InputError("options of a robot with .mcap; allowed: --film and --speed, for the run has its robot")
         renderer.show(export_run(robot, target, film=film, speed=speed).to_dict(), json=json)
         return
-    if film is not None:
-        raise InputError(f"--film with {target.suffix or 'no ending'}; allowed: only with .mcap")
+    if film is not None or speed != 1.0:
+        raise InputError(f"--film or --speed with {target.suffix or 'no ending'}; allowed: only with .mcap")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
     found = answer(

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Integral, Real
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number, check_kind, checked
 from spirillum.arrays import Samples
 from spirillum.dynamics.held_draws import checked_ranges, drawn_numbers, posterior_numbers
 from spirillum.dynamics.held_model import PARAMETERS, STATES, HeldModel, held_model
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.kernels import held_motor as kernel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -22,6 +23,7 @@ __all__ = ["HeldPlants"]
 
 _MOST = 10_000_000
 _LONGEST = 1e6
+_LAST_SEED = 2**31 - 1
 _POOL = 500
 """Draws of a posterior that robots are taken from."""
 
@@ -32,6 +34,7 @@ class HeldPlants:
     All are the same robot, or are drawn around it. Arrays have one value for each robot, SI, signed about +x.
     """
 
+    @checked
     def __init__(
         self,
         robot: str | Path | Mapping[str, Any] | Robot,
@@ -62,7 +65,8 @@ class HeldPlants:
         Raises:
             InputError: for wrong input.
         """
-        _check_count(count)
+        _check_whole("count", count, 1, _MOST)
+        _check_whole("seed", seed, 0, _LAST_SEED)
         self.held: HeldModel = held_model(
             robot, model=model, friction=friction, calibration=calibration, placement=placement
         )
@@ -91,9 +95,13 @@ class HeldPlants:
         Args:
             which: truth value of each robot; None: all.
             rng: source of chance; None: that of the seed.
+
+        Raises:
+            InputError: for wrong input.
         """
+        check_kind("rng", rng, "Generator | None")
         rng = rng or self._rng
-        chosen = np.arange(self.count) if which is None else np.flatnonzero(which)
+        chosen = np.arange(self.count) if which is None else np.flatnonzero(self._chosen("which", which))
         if not len(chosen) or not (self._ranges or self._pool is not None):
             return
         numbers = drawn_numbers(self.held, len(chosen), rng, self._ranges)
@@ -109,8 +117,11 @@ class HeldPlants:
 
         Args:
             which: truth value of each robot; None: all.
+
+        Raises:
+            InputError: for wrong input.
         """
-        rows = slice(None) if which is None else np.asarray(which, dtype=bool)
+        rows = slice(None) if which is None else self._chosen("which", which)
         self.time[rows] = 0.0
         self.states[rows] = 0.0
         self._duty[rows] = self.held.duty
@@ -139,7 +150,7 @@ class HeldPlants:
         if remote is not None:
             if duty is not None:
                 raise InputError("remote and duty are given together; allowed: one of them")
-            duty = np.where(np.asarray(remote, dtype=bool), self.held.duty, 0.0)
+            duty = np.where(self._chosen("remote", remote), self.held.duty, 0.0)
         if flow is not None and self.held.flow is None:
             raise InputError("flow without one in the placement; allowed: placement with flow, also 0")
         asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
@@ -163,6 +174,22 @@ class HeldPlants:
         )
         return found
 
+    def _chosen(self, name: str, given: Any) -> np.ndarray:
+        """A truth value for each robot.
+
+        Raises:
+            InputError: for anything else.
+        """
+        try:
+            values = np.asarray(given)
+            if values.dtype == bool or np.isin(values, (0, 1)).all():
+                return np.broadcast_to(values.astype(bool), (self.count,))
+        except (TypeError, ValueError):
+            pass
+        raise InputError(
+            f"{name} = {clipped(given)}; allowed: True or False, one for all or one for each of {self.count} robots"
+        )
+
     def _one_each(self, name: str, given: Samples | float, low: float, high: float) -> Samples:
         try:
             values = np.array(np.broadcast_to(np.asarray(given, dtype=np.float64), (self.count,)))
@@ -174,13 +201,13 @@ class HeldPlants:
         return values
 
 
-def _check_count(count: Any) -> None:
-    if isinstance(count, bool) or not isinstance(count, Integral) or not 1 <= int(count) <= _MOST:
-        raise InputError(f"count = {str(count)[:40]}; allowed: a whole number from 1 to {_MOST}")
+def _check_whole(name: str, value: Any, low: int, high: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
+        raise InputError(f"{name} = {clipped(value)}; allowed: a whole number from {low} to {high}")
 
 
 def _time(dt: Any) -> float:
-    number = float(dt) if isinstance(dt, Real) else np.nan
+    number = as_number(dt)
     if not 0.0 < number <= _LONGEST:
-        raise InputError(f"dt = {str(dt)[:40]}; allowed: above 0, at most {_LONGEST:g} s")
+        raise InputError(f"dt = {clipped(dt)}; allowed: above 0, at most {_LONGEST:g} s")
     return number

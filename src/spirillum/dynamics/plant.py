@@ -9,12 +9,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number, check_kind, checked
 from spirillum.arrays import Samples
 from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.integration import BATTERY_EMPTY, Progress, Trajectory, integrate
@@ -29,7 +29,7 @@ from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.dynamics.two_links import TwoLinks
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
@@ -95,6 +95,7 @@ class PlantState:
 class Plant:
     """A free robot on its way, from rest, one step at a time; for one thread."""
 
+    @checked
     def __init__(
         self,
         robot: str | Path | Mapping[str, Any] | Robot,
@@ -212,6 +213,7 @@ class Plant:
             InputError: for a state of another kind of plant.
         """
         state = self._first if state is None else state
+        check_kind("state", state, "PlantState")
         if len(state.state) != len(self._first.state):
             raise InputError("state is none of this plant; allowed: its own, or that of the same robot and model")
         if state.flow != self._now.flow:
@@ -367,7 +369,7 @@ def _check_number(name: str, value: Any, low: float, high: float, unit: str, *, 
     Raises:
         InputError: if it is not.
     """
-    number = float(value) if isinstance(value, Real) else np.nan
+    number = as_number(value)
     if not (low <= number <= high) or (number == low and not closed):
         allowed = f"a number from {low:g} to {high:g}" if closed else f"above {low:g}, at most {high:g} {unit}".strip()
-        raise InputError(f"{name} = {str(value)[:40]}; allowed: {allowed}")
+        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")

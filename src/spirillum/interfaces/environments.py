@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from numbers import Integral
 from typing import Any
 
 import gymnasium
@@ -13,7 +14,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.interfaces.tasks import HoldSpeed, StopAt, Task
 
 __all__ = ["ENVIRONMENTS", "BatchEnvironment", "Environment"]
@@ -48,12 +49,19 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
         Raises:
             InputError: for wrong input.
         """
+        if render_mode not in (None, "ansi"):
+            raise InputError(f"render_mode = {clipped(render_mode)}; allowed: ansi or None")
         self._task = _task(task, 1, options)
         self.observation_space, self.action_space = _spaces(self._task)
         self.render_mode = render_mode
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, Any]:
-        """A new robot, goal and flow; see `gymnasium.Env.reset`."""
+        """A new robot, goal and flow; see `gymnasium.Env.reset`.
+
+        Raises:
+            InputError: for a seed that is no whole number.
+        """
+        _check_seed(seed)
         super().reset(seed=seed, options=options)
         self._task.reset(np.ones(1, dtype=bool), self.np_random)
         return self._task.observe(self.np_random)[0], self._info()
@@ -64,7 +72,7 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
         Raises:
             InputError: for an action that is none.
         """
-        reward = self._task.step(np.atleast_1d(np.asarray(action)), self.np_random)
+        reward = self._task.step(action, self.np_random)
         seen = self._task.observe(self.np_random)[0]
         return seen, float(reward[0]), False, bool(self._task.done[0]), self._info()
 
@@ -120,6 +128,7 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """
         if isinstance(seed, list):
             raise InputError("seed is a list; allowed: one whole number, from which all robots are drawn")
+        _check_seed(seed)
         super().reset(seed=seed, options=options)
         self._ended = np.zeros(self.num_envs, dtype=bool)
         self._task.reset(~self._ended, self.np_random)
@@ -144,7 +153,14 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         return self._task.observe(self.np_random), reward, never, self._ended.copy(), info
 
 
+def _check_seed(seed: Any) -> None:
+    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, Integral) or int(seed) < 0):
+        raise InputError(f"seed = {clipped(seed)}; allowed: a whole number from 0, or None")
+
+
 def _task(name: str, count: int, options: dict[str, Any]) -> Task:
+    if name not in ENVIRONMENTS:
+        raise InputError(f"task = {clipped(name)}; allowed: {', '.join(ENVIRONMENTS)}")
     try:
         return ENVIRONMENTS[name](count, **options)
     except TypeError as error:  # an option that no task has

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number
 from spirillum.arrays import Samples
 from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
 from spirillum.dynamics.held_model import STATES, HeldModel, held_model
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -111,9 +112,9 @@ def linear_system(
     held = held_model(
         robot, model=model, friction=friction, calibrated=calibrated, calibration=calibration, placement=placement
     )
-    at_duty = held.duty if duty is None else float(duty)
+    at_duty = held.duty if duty is None else as_number(duty)
     if not 0.0 <= at_duty <= 1.0:
-        raise InputError(f"duty = {at_duty:g}; allowed: a number from 0 to 1")
+        raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
     if flow is not None and held.flow is None:
         raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
     at_flow = (held.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])

@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, Self
 
 from spirillum.answer import envelope, quantity
-from spirillum.errors import InputError
+from spirillum.argument_kinds import as_number, checked
+from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.interfaces.remote_protocol import LONGEST_LINE, WATCHDOG, Receiver, framed, unframed
 from spirillum.shown import Shown
@@ -22,6 +22,7 @@ from spirillum.units import KINDS, parse_option
 __all__ = ["RemoteRun", "SerialRemote", "VirtualRemote", "remote"]
 
 _BAUD = 115_200
+_FASTEST = 100_000_000
 _PATIENCE = 0.15
 """Time in which an answer has to come, s: three tries end before the far end's watchdog does."""
 _TRIES = 3
@@ -33,6 +34,7 @@ _LONGEST_HOLD = 86_400.0
 class SerialRemote:
     """A remote at a serial port; leaving its `with` block switches the motor off, whatever happened inside."""
 
+    @checked
     def __init__(self, port: str, *, baud: int = _BAUD) -> None:
         """Open the port, and ask who is there.
 
@@ -41,9 +43,11 @@ class SerialRemote:
             baud: symbols a second.
 
         Raises:
-            InputError: if pyserial is missing, the port is not there or is in use, or nobody answers.
+            InputError: for wrong input, if pyserial is missing, the port is not there or is in use, or nobody answers.
         """
         serial = required("serial", "a remote at a serial port", "control")
+        if not 1 <= baud <= _FASTEST:
+            raise InputError(f"baud = {clipped(baud)}; allowed: 1 to {_FASTEST}")
         self.port = str(port)
         """The port."""
         self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
@@ -56,7 +60,7 @@ class SerialRemote:
             raise InputError(f"{self.port[:80]} cannot be opened ({_reason(error)}); allowed: {_ports()}") from error
         try:
             answer = self._asked("WHO").split(" ")
-            self.name, self.watchdog = _printable(answer[2]), float(answer[3]) * 1e-3
+            self.name, self.watchdog = _printable(answer[2]), _told(answer[3], 1e4) * 1e-3
         except InputError:
             self._line.close()
             raise
@@ -83,7 +87,11 @@ class SerialRemote:
             InputError: for what is no duty (nothing is then sent), an unplugged port, or no answer.
         """
         _check_duty(duty)
-        return float(self._asked("DUTY", f" {float(duty):.3f}").split(" ")[2])
+        answer = self._asked("DUTY", f" {float(duty):.3f}")
+        try:
+            return _told(answer.split(" ")[2], 1.0)
+        except ValueError as error:
+            raise InputError(f"{self.port[:80]} answers as no remote does; allowed: another port") from error
 
     def hold(self, duty: float, duration: float, told: Callable[[float], None] | None = None) -> None:
         """Keep a duty for a time, said again every tenth of a second; then the motor is off.
@@ -164,14 +172,25 @@ class SerialRemote:
 
 
 def _check_duty(duty: Any) -> None:
-    number = float("nan") if isinstance(duty, bool) or not isinstance(duty, Real) else float(duty)
-    if not 0.0 <= number <= 1.0:
-        raise InputError(f"duty = {str(duty)[:40]}; allowed: a number from 0 to 1")
+    if not 0.0 <= as_number(duty) <= 1.0:
+        raise InputError(f"duty = {clipped(duty)}; allowed: a number from 0 to 1")
 
 
 def _check_length(duration: Any) -> None:
-    if not (isinstance(duration, Real) and 0.0 < float(duration) <= _LONGEST_HOLD):
-        raise InputError(f"duration = {str(duration)[:40]}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
+    if not 0.0 < as_number(duration) <= _LONGEST_HOLD:
+        raise InputError(f"duration = {clipped(duration)}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
+
+
+def _told(word: str, high: float) -> float:
+    """A number of an answer.
+
+    Raises:
+        ValueError: if it is none from 0 to `high`.
+    """
+    number = float(word)
+    if not 0.0 <= number <= high:
+        raise ValueError(word)
+    return number
 
 
 def _printable(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
 from spirillum.dynamics.held_plants import HeldPlants
@@ -26,6 +27,8 @@ from spirillum.units import KINDS, parse_option
 __all__ = ["HoldSpeed", "StopAt", "Task"]
 
 _MM = 1e3
+_LARGEST_GOAL = 1e3
+"""In m, and as a share of a speed."""
 _SEEN_OVER = 0.5
 """Time over which the observed speed is an average, s."""
 _LATEST_PULSE = 0.9
@@ -261,7 +264,7 @@ class StopAt(Task):
         return rng.uniform(*self._range, count)
 
     def _duty(self, actions: np.ndarray) -> Samples:
-        asked = np.asarray(actions).reshape(-1)
+        asked = _numbers(actions)
         if len(asked) != self.count or not np.isin(asked, (0, 1)).all():
             raise InputError(
                 f"action = {str(actions)[:40]}; allowed: 0 (off) or 1 (on) for each of {self.count} robots"
@@ -310,7 +313,7 @@ class HoldSpeed(Task):
         return self.plants.held.prediction.forward_velocity * rng.uniform(*self._range, count)
 
     def _duty(self, actions: np.ndarray) -> Samples:
-        asked = np.asarray(actions, dtype=np.float64).reshape(-1)
+        asked = _numbers(actions)
         if len(asked) != self.count or not ((asked >= 0.0) & (asked <= 1.0)).all():
             raise InputError(
                 f"action = {str(actions)[:40]}; allowed: a duty from 0 to 1 for each of {self.count} robots"
@@ -326,8 +329,19 @@ class HoldSpeed(Task):
         return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._commands.ago(0), self._time_left()]
 
 
+def _numbers(actions: Any) -> Samples:
+    """Actions as numbers in a row; none where they are no numbers."""
+    try:
+        return np.asarray(actions, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        return np.empty(0)
+
+
 def _range_of(name: str, given: Any) -> tuple[float, float]:
     pair = tuple(given) if isinstance(given, (tuple, list)) and len(given) == 2 else ()
-    if not pair or not all(isinstance(item, (int, float)) for item in pair) or not 0.0 < pair[0] <= pair[1]:
-        raise InputError(f"{name} = {str(given)[:60]}; allowed: least and largest value, both above 0")
-    return float(pair[0]), float(pair[1])
+    low, high = map(as_number, pair or (None, None))
+    if not 0.0 < low <= high < _LARGEST_GOAL:
+        raise InputError(
+            f"{name} = {str(given)[:60]}; allowed: least and largest value, above 0 and below {_LARGEST_GOAL:g}"
+        )
+    return low, high

@@ -13,6 +13,7 @@ from spirillum.errors import InputError
 __all__ = ["Datagrams", "line_of"]
 
 _LOOPBACK = "127.0.0.1"
+_DIGITS = 5
 _WHAT = "PORT or HOST:PORT, a port from 1 to 65535; without a host, this computer"
 
 
@@ -34,11 +35,12 @@ class Datagrams:
             InputError: for anything else, or a host that is not known.
         """
         host, colon, port = address.rpartition(":")
-        if not (port.isascii() and port.isdigit() and 1 <= int(port[:6]) <= 65535) or (colon and not host):
+        number = port.isascii() and port.isdigit() and len(port) <= _DIGITS
+        if not number or not 1 <= int(port) <= 65535 or (colon and not host):
             raise InputError(f"udp = {address[:60]!r}; allowed: {_WHAT}")
         try:
             found = socket.getaddrinfo(host.strip("[]") or _LOOPBACK, int(port), type=socket.SOCK_DGRAM)[0]
-        except OSError as error:
+        except (OSError, UnicodeError) as error:  # the latter for a name that can be none
             raise InputError(f"udp = {address[:60]!r}: the host is not known ({error}); allowed: {_WHAT}") from error
         self._socket, self._to = socket.socket(found[0], socket.SOCK_DGRAM), found[4]
 

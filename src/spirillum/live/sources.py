@@ -11,7 +11,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from spirillum.errors import InputError
+from spirillum.argument_kinds import as_number
+from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.files.limits import MOST_PIXELS, SMALLEST_SIDE
 from spirillum.vision.video.frames import converter, open_video
@@ -32,6 +33,7 @@ _PROTOCOLS = {
 }
 """What a stream may use: its own protocol, no files and no playlists."""
 _FORMATS = "rtsp,mpegts,mpjpeg,mjpeg,matroska,webm,mov,mp4,h264,hevc,flv"
+_FASTEST = 1e4
 _SILENT = 5.0
 """Time without a picture after which a camera or stream has stopped, s."""
 
@@ -99,9 +101,11 @@ def source_of(
     """
     scheme = word.partition("://")[0].lower() if "://" in word else ""
     device = re.fullmatch(r"camera:(.+)", word) or re.fullmatch(r"/dev/video(\d+)", word)
-    if device is None and (size or fps):
+    if device is None and not (size is None and fps is None):
         raise InputError(f"size or fps is given with {word[:80]}; allowed: only with a camera")
     if device is not None:
+        if fps is not None and not 0.0 < as_number(fps) <= _FASTEST:
+            raise InputError(f"fps = {clipped(fps)}; allowed: above 0, at most {_FASTEST:g} frames a second")
         kind, place = _DEVICES.get(sys.platform, _DEVICES["linux"])
         asked = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
         asked |= {} if fps is None else {"framerate": f"{fps:g}"}
@@ -112,14 +116,17 @@ def source_of(
             raise InputError(f"source = {word[:80]!r}; allowed: {_ALLOWED}")
         quick = {"flags": "low_delay", "analyzeduration": "1000000"}  # in microseconds
         asked = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
-        return Source(_without_secrets(word), "stream", {"file": word, "format": None, "options": asked, "size": None})
+        address = scheme + word[len(scheme) :]
+        return Source(
+            _without_secrets(word), "stream", {"file": address, "format": None, "options": asked, "size": None}
+        )
     video = open_video(word, rate)  # says what is wrong with a film
     return Source(video.name, "film", {"path": word, "rate": rate, "between": between}, video.words)
 
 
 def _without_secrets(word: str) -> str:
     """An address without name and password."""
-    return re.sub(r"//[^/@]*@", "//", word)[:120]
+    return re.sub(r"//[^/]*@", "//", word)[:120]
 
 
 def _pictures(source: Source) -> Generator[Arrived, None, None]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spirillum.errors import InputError
+from spirillum.argument_kinds import as_number, checked
+from spirillum.errors import InputError, clipped
 from spirillum.live.following import Following
 from spirillum.live.observation import Observation
 from spirillum.measurement.trials import Trial
@@ -36,6 +36,7 @@ class LiveTracker:
     Nothing looks ahead: what is said of a frame follows from it and those before it.
     """
 
+    @checked
     def __init__(
         self,
         setup: str | Path | Setup,
@@ -131,9 +132,9 @@ class LiveTracker:
         if self._size is not None and size != self._size:
             width, height = self._size
             raise InputError(f"a frame has {size[0]} x {size[1]} pixels; allowed: {width} x {height}, as those before")
-        number = float(time) if isinstance(time, Real) else math.nan
+        number = as_number(time)
         if not number > self._last or number == math.inf:
-            raise InputError(f"time = {str(time)[:40]} s; allowed: later than the frame before, {self._last:g} s")
+            raise InputError(f"time = {clipped(time)} s; allowed: later than the frame before, {self._last:g} s")
         self._size = size
 
     def _collect(self, frame: Frame) -> None:

@@ -131,7 +131,7 @@ def _looks_like_a_name(robot: str | Path) -> bool:
     return isinstance(robot, str) and re.fullmatch(r"[\w-]{1,99}", robot) is not None
 
 
-def parse_setting(text: str) -> tuple[str, Any]:
+def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelength=20mm") -> tuple[str, Any]:
     """Split ``PATH=VALUE``; VALUE is read as TOML, else taken as text (a quantity or a word).
 
     Raises:
@@ -140,9 +140,9 @@ def parse_setting(text: str) -> tuple[str, Any]:
     path, equals, value = text.partition("=")
     path, value = path.strip(), value.strip()
     if not equals or not path or not value:
-        raise InputError(f"--set {text[:80]!r} is not PATH=VALUE; for example --set tail.wavelength=20mm")
+        raise InputError(f"{option} {text[:80]!r} is not PATH=VALUE; for example {option} {example}")
     try:
-        parsed = parse_toml(f"value = {value}", "--set", "PATH=VALUE")
+        parsed = parse_toml(f"value = {value}", option, "PATH=VALUE")
     except InputError:
         return path, value
     return path, parsed["value"] if set(parsed) == {"value"} else value
@@ -202,14 +202,23 @@ def _extended(
         below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
         return _merged(below, table), [*layers, changed]
     path = folder / base
-    if len(above) >= _MOST_LAYERS or path.resolve() in above:
+    if len(above) >= _MOST_LAYERS or _resolved(path, source) in above:
         raise InputError(
             f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
     changed = _touched(table)
-    below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, path.resolve()))
+    below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, _resolved(path, source)))
     return _merged(below, table), [*layers, changed]
+
+
+def _resolved(path: Path, source: str) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, ValueError) as error:  # such as for a name with a null character
+        raise InputError(
+            f"{source}: extends = {str(path)[:60]!r} is no name of a file; allowed: one beside it"
+        ) from error
 
 
 def _merged(below: dict[str, Any], above: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from spirillum.errors import InputError, clipped, did_you_mean
 
 __all__ = ["problems_in"]
 
+_LONGEST_FIELD = 200
+"""Characters of a field's name in a sentence, so that what is allowed has room."""
 _M = TypeVar("_M", bound=BaseModel)
 
 
@@ -42,7 +44,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
     names = [str(name) for name in problem["loc"] if name != "[key]"]
     if kind == "assembly":
         return str(context["sentences"]).split("\n")
-    field = ".".join([under, *names] if under else names)
+    field = ".".join([under, *names] if under else names)[:_LONGEST_FIELD]
     if kind == "value_error" and isinstance(context.get("error"), InputError):
         return [str(context["error"])]
     if kind == "quantity":

@@ -39,6 +39,8 @@ from spirillum.units import Hz, show
 
 __all__ = ["LARGEST_STORED", "LARGEST_STUDY", "Grid", "LaidDown", "LoadedStudy", "Study", "load_study"]
 
+_MOST_ROBOTS = 100_000
+"""Most robots that are loaded one by one."""
 LARGEST_STUDY = 5_000_000
 """Most results (robots times models times friction readings times rates) of one study."""
 LARGEST_STORED = 500_000_000
@@ -125,7 +127,7 @@ class Study(Section):
     """Motor rates at which B_eff is inferred as a curve, where no rates were observed."""
     grid: Grid | None = None
     """A grid of robots."""
-    robots: Annotated[list[_Name], Field(min_length=1, max_length=100_000)] | None = None
+    robots: Annotated[list[_Name], Field(min_length=1, max_length=_MOST_ROBOTS)] | None = None
     """A list of robots (presets or files) instead of a grid."""
     vary: Annotated[dict[_Name, _Values], Field(default_factory=dict, max_length=20)]
     """Fields of the robot file with their values, such as `"tail.length" = ["40 mm", "60 mm"]`: every combination, for
@@ -174,6 +176,9 @@ class Study(Section):
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
         problems += self._problems_of_the_band()
+        varied = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
+        if self.vary and varied > _MOST_ROBOTS:
+            problems.append(f"vary makes {varied} robots; allowed: at most {_MOST_ROBOTS}, or a [grid]")
         if self.size > LARGEST_STORED:
             problems.append(f"the study asks for {self.size} results; allowed: at most {LARGEST_STORED}")
         if problems:

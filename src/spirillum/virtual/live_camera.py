@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number, check_kind, checked
 from spirillum.dynamics.poses import Pose, Poses
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.files import write_text
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
@@ -44,6 +46,7 @@ class Shot(NamedTuple):
 class VirtualCamera:
     """Takes pictures of a robot whose poses come one by one, as from `spirillum.Plant`; all of it is synthetic."""
 
+    @checked
     def __init__(
         self,
         robot: str | Path | Mapping[str, Any] | Robot,
@@ -89,9 +92,12 @@ class VirtualCamera:
         Raises:
             InputError: for a time that does not rise, or a robot that turns across the channel.
         """
-        before = (time - 1.0, pose) if self._last is None else self._last
-        if not time > before[0]:
-            raise InputError(f"time = {time:g} s; allowed: later than the picture before, {before[0]:g} s")
+        check_kind("pose", pose, "Pose")
+        now = as_number(time)
+        before = (now - 1.0, pose) if self._last is None else self._last
+        if not before[0] < now < math.inf:
+            last = "a number of s" if self._last is None else f"later than the picture before, {self._last[0]:g} s"
+            raise InputError(f"time = {clipped(time)} s; allowed: {last}")
         trajectory, self._last = self._trajectory(*before, time, pose), (time, pose)
         exposure = min(self.camera.exposure, time - before[0])
         frames = Frames(self._painter, self._disturbances, trajectory, exposure)

@@ -55,7 +55,7 @@ class Troubles(Options):
         if not isinstance(value, str):
             return super().of(value)
         chosen: dict[str, Any] = {}
-        for word in filter(None, (part.strip() for part in value.split(","))):
+        for word in (part.strip() for part in value.split(",")):
             name = word.replace("-", "_")
             if name not in USUAL:
                 known = [trouble.replace("_", "-") for trouble in USUAL]

@@ -69,7 +69,14 @@ def plot(answer: Any) -> Plot:
     import xarray as xr
 
     with styled():
-        return Plot(_of_dataset(answer) if isinstance(answer, xr.Dataset) else _of_answer(answer))
+        if not isinstance(answer, xr.Dataset):
+            return Plot(_of_answer(answer))
+        try:
+            return Plot(_of_dataset(answer))
+        except KeyError as error:
+            raise InputError(
+                f"answer = a dataset without {str(error)[:80]} has no figure; allowed: {_ALLOWED}"
+            ) from error
 
 
 _ALLOWED = (
