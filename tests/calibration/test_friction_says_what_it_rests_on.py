@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 import spirillum as sp
 from spirillum.cli import main
+from spirillum.cli.tables.calibration import _show_friction
 
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 WIDE = PRESETS[0]
@@ -175,3 +177,11 @@ def test_a_narrow_channel_that_drags_less_is_remarked(made: Callable[..., Path])
     assert not any("narrower channel" in words for words in fitted(made(seed=3), PRESETS).warnings)
     close = fitted(made(drag=(2.02, 2.0), seed=3), PRESETS).warnings
     assert all("intervals overlap" in words for words in close if "narrower channel" in words)
+
+
+def test_the_friction_of_one_tail_is_shown_with_its_interval(capsys: pytest.CaptureFixture[str]) -> None:
+    friction = {"value": 1.2352e-5, "low": 1.0871e-5, "high": 1.4203e-5, "unit": "N m s/rad"}
+    answer = {"friction": "rotor", "tails": [{"effective_friction": friction}]}
+    for tails, said in ((1, "1.235e-05 (1.087e-05 to 1.42e-05) N m s/rad"), (2, "1.235e-05 N m s/rad")):
+        _show_friction({**answer, "tails": tails * answer["tails"]}, Console())
+        assert f"(friction reading rotor): {said}, tail by tail" in capsys.readouterr().out

@@ -58,15 +58,15 @@ def _add(rows: Table, name: str, item: Answer) -> None:
 
 
 def _show_friction(answer: Answer, console: Console) -> None:
-    values = [
-        tail["effective_friction"]["value"]
-        for tail in answer["tails"]
-        if "effective_friction" in tail and tail["effective_friction"]["value"] is not None
-    ]
-    if values:
+    found = [tail["effective_friction"] for tail in answer["tails"] if "effective_friction" in tail]
+    found = [item for item in found if item["value"] is not None]
+    if found:
+        values = [item["value"] for item in found]
+        only = found[0] if len(found) == 1 and found[0].get("low") is not None else {}
+        interval = f" ({only['low']:.4g} to {only['high']:.4g})" if only else ""
         console.print(
-            f"B_eff of {counted(len(values), 'tail')} (friction reading {answer['friction']}): {_range(values)} "
-            "N m s/rad, tail by tail in predictions.csv",
+            f"B_eff of {counted(len(values), 'tail')} (friction reading {answer['friction']}): {_range(values)}"
+            f"{interval} N m s/rad, tail by tail in predictions.csv",
             highlight=False,
             soft_wrap=True,
         )

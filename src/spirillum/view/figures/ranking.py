@@ -11,7 +11,7 @@ from spirillum.arrays import Values
 from spirillum.quantities import unit_of
 from spirillum.studies.ranking import RankedRobot, StudyRanking
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain
+from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, told_apart
 
 __all__ = ["ranking_picture"]
 
@@ -52,7 +52,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
     for panel, name in zip(panels[0], names, strict=True):
         _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike})
     first = panels[0][0]
-    first.set_yticks(range(len(robots)), [plain(robot.name, 34) for robot in robots])
+    first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
     title = ranking.message[:1].upper() + ranking.message[1:]
     figure.suptitle(plain(title, 90), x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")

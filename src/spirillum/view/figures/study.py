@@ -17,7 +17,7 @@ from spirillum.view.figures.picture import Picture, head_column, tail_axis
 from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
-from spirillum.view.figures.style import Scale, plain
+from spirillum.view.figures.style import Scale, plain, told_apart
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -310,7 +310,7 @@ def _robots_picture(shown: StudyView) -> Picture:
 
 
 def _draw_robots(shown: StudyView, places: list[int], title: str, rows: Sequence[Row], notes: Sequence[str]) -> Figure:
-    names = [plain(str(name), 28) for name in shown.whole["robot"].values[places]]
+    names = told_apart([str(name) for name in shown.whole["robot"].values[places]], 28)
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)
     upright = _TICK_LETTER * longest * len(names) < width

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -36,6 +36,7 @@ __all__ = [
     "save",
     "save_as",
     "styled",
+    "told_apart",
 ]
 
 COLOURS = {
@@ -201,6 +202,12 @@ def plain(text: str, longest: int = 60) -> str:
     line = " ".join(kept.split())
     line = line if len(line) <= longest else f"{line[: longest - 1]}…"
     return line.replace("$", r"\$")
+
+
+def told_apart(names: Sequence[str], longest: int) -> list[str]:
+    """Names as lines of at most ``longest`` letters; if two names would then look alike, of at most 80."""
+    short = [plain(name, longest) for name in names]
+    return short if len(set(short)) == len(set(names)) else [plain(name, 80) for name in names]
 
 
 def readable(text: str) -> str:
