@@ -144,6 +144,9 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
         "amplitude": quantity(robot.tail.amplitude, "m"),
         "rows": list(found.experiment.rows[place]),
     }
+    if found.friction:
+        item = found.friction[place]
+        content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
     for name, (values, low, high) in found.predicted.items():
         unit, _ = MEANINGS[name]
         ends = {}
@@ -152,8 +155,6 @@ def _tail(found: Calibrated, place: int) -> dict[str, Any]:
         content[f"{name}_observed"] = quantity(float(found.problem.ratio(name).mean[place]), unit)
         content[f"{name}_predicted"] = quantity(float(values[place]), unit, **ends)
     if found.friction:
-        item = found.friction[place]
-        content["effective_friction"] = quantity(item.value, "N m s/rad", **_interval(item))
         content["effective_friction_per_percent"] = {
             field: quantity(0.01 * float(change[place]), "N m s/rad")
             for field, change in found.friction_sensitivity.items()

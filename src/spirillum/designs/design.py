@@ -337,7 +337,8 @@ def _warnings(
     elif given.channel is not None:
         found.append(
             f"the channel's walls are left out, which makes a robot faster than it is (model '{stated.model.name}'): "
-            "let `spirillum predict` with model tube answer for the best design"
+            "let `spirillum predict` with model tube answer for the best design and others near it, whose order walls "
+            "may change"
         )
     if not {"friction.effective", "friction", "shared_friction"} & set(unknown):
         reading = friction_reading(given.friction.reading)
