@@ -57,6 +57,7 @@ def test_table_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_pa
         (["--at", "1mm", "--with", "optics.fps=1"], "lab.optics is not a known table"),
         (["--at", "1mm", "--with", "remote.delay=2h"], "remote.delay"),
         (["--at", "1mm", "--with", "camera"], "--with 'camera' is not FIELD=VALUE"),
+        (["--at", "1mm", "--with", "="], "--with '=' is not FIELD=VALUE"),
         (["--at", "1mm", "--task", "stopp"], "(did you mean stop-at?)"),
         (["--at", "1mm", "--controller", "pid"], "controller = 'pid'"),
         (["--at", "1mm", "--seeds", "-1"], "seeds = -1; allowed: 0 to"),

@@ -99,6 +99,7 @@ def test_ranges_are_kept_and_seeds_repeat() -> None:
         ({"dt": 0.0}, r"dt = 0\.0; allowed: above 0"),
         ({"dt": float("nan")}, "dt = nan"),
         ({"dt": 0.1, "duty": float("nan")}, "duty = nan; allowed"),
+        ({"dt": 0.1, "duty": 10**400}, "duty is no array"),
         ({"dt": 0.1, "duty": [0.0, 1.5]}, r"duty = 1\.5; allowed"),
         ({"dt": 0.1, "duty": [0.0, 1.0, 1.0]}, "no array of 2 numbers"),
         ({"dt": 0.1, "duty": 1.0, "remote": True}, "given together"),
@@ -123,6 +124,7 @@ def test_nothing_moves_on_wrong_input(arguments: dict[str, Any], sentence: str) 
     [
         ({"voltage": (3, 4)}, r"ranges\.voltage is not a number that can be drawn"),
         ({"friction": (0, 1)}, "for factors above 0"),
+        ({"friction": (1, 10**400)}, "for factors above 0"),
         ({"friction": (2, 1)}, "allowed: low and high"),
         ({"battery.voltage": 3.7}, "allowed: low and high"),
     ],

@@ -169,6 +169,15 @@ def test_answers_that_are_no_numbers_are_a_sentence(said: str, monkeypatch: pyte
 
 
 @pty
+def test_a_remote_has_a_word_for_its_name() -> None:
+    for name in ("", "a b", "a\n", "\x00"):
+        with pytest.raises(sp.InputError, match=r"name = .*; allowed: a word without spaces"):
+            sp.VirtualRemote(name)
+    with pytest.raises(sp.InputError, match="watchdog = 'x'; allowed: a number"):
+        sp.VirtualRemote(watchdog="x")  # type: ignore[arg-type]
+
+
+@pty
 @pytest.mark.parametrize("baud", [0, -1, 2**31, 10**30])
 def test_rates_of_symbols_that_no_port_has_are_a_sentence(baud: int) -> None:
     with pytest.raises(sp.InputError, match=r"baud = .*; allowed: 1 to"):

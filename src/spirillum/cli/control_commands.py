@@ -179,6 +179,6 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
 
     found = {}
     for text in changes or []:
-        name, value = parse_setting(text, "--with", "camera.latency=50ms")
+        name, value = parse_setting(text, "FIELD=VALUE; for example --with camera.latency=50ms")
         found[name] = value
     return Lab.read(path, found)

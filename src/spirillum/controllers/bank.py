@@ -19,7 +19,7 @@ from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.lab import Unknown
 from spirillum.controllers.sensors import Drawn
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Moment, Plant
+from spirillum.dynamics.plant import Moment, Plant, uninterrupted
 from spirillum.robot.robot import Robot
 
 __all__ = ["QUANTITIES_OF_BANK", "Bank", "Paths", "interpolation", "points"]
@@ -112,7 +112,7 @@ class Bank:
         """Let all members go on to a time at a duty."""
         while time - self.time > 1e-9:
             dt = min(_STEP, time - self.time)
-            moments = [plant.step(dt, duty=duty) for plant in self._plants]
+            moments = [uninterrupted(plant.step(dt, duty=duty)) for plant in self._plants]
             self._time.append(moments[0].time)
             self._rows.append(np.array([_kept(moment) for moment in moments]))
 

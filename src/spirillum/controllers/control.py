@@ -24,7 +24,7 @@ from spirillum.controllers.scores import Scores, scored
 from spirillum.controllers.sensors import Drawn
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
 from spirillum.dynamics.integration import Progress
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.processes import as_they_come
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
@@ -233,11 +233,11 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
         hint = did_you_mean(controller, CONTROLLERS)
         raise InputError(f"controller = {controller[:60]!r}{hint}; allowed: {', '.join(CONTROLLERS)}")
     if not 0 <= seeds <= _MOST_SEEDS:
-        raise InputError(f"seeds = {seeds}; allowed: 0 to {_MOST_SEEDS}")
+        raise InputError(f"seeds = {clipped(seeds)}; allowed: 0 to {_MOST_SEEDS}")
     if not 0 <= seed <= _LAST_SEED - seeds:
-        raise InputError(f"seed = {seed}; allowed: 0 to {_LAST_SEED - seeds}")
+        raise InputError(f"seed = {clipped(seed)}; allowed: 0 to {_LAST_SEED - seeds}")
     if not 1 <= workers <= 256:
-        raise InputError(f"workers = {workers}; allowed: 1 to 256")
+        raise InputError(f"workers = {clipped(workers)}; allowed: 1 to 256")
     for name in arguments:
         if name not in _ALLOWED:
             hint = did_you_mean(str(name)[:60], _ALLOWED)

@@ -15,7 +15,7 @@ from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
 from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy, positive
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.errors import InputError
 from spirillum.robot.fields import LengthOrZero, Velocity
 from spirillum.units import show
@@ -181,7 +181,7 @@ def _mean_speed(plant: Plant, duty: float, duration: float, progress: Progress |
     moment = other.observe()
     start = float(moment.pose.position[0])
     for number in range(count):
-        moment = other.step(duration / count, duty=duty)
+        moment = uninterrupted(other.step(duration / count, duty=duty))
         if progress is not None:
             progress("robot as its file says", number + 1, count)
         if moment.ended:

@@ -15,7 +15,7 @@ from spirillum.controllers.signals import Controller
 from spirillum.controllers.stopping import KnowingStop, StopAt, Timed
 from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy, positive
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.dynamics.start import reach_of
 from spirillum.errors import InputError
 from spirillum.robot.fields import LengthOrZero, SignedLength
@@ -113,7 +113,7 @@ class StopAtTask(Task):
         place = before = 0.0
         while way * place < way * self.goal:
             before = place
-            moment = other.step(_STEP, remote=True)
+            moment = uninterrupted(other.step(_STEP, remote=True))
             place = float(moment.pose.position[0])
             if progress is not None and moment.time > _STEP:
                 progress("way of the robot as its file says", int(100 * max(0.0, min(place / self.goal, 1.0))), 100)

@@ -15,7 +15,7 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.plant import Plant
+from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.robot.arguments import Options, refusal
 from spirillum.robot.fields import Time
 
@@ -134,5 +134,5 @@ def carried_by_flow(plant: Plant, velocity: float, duration: float) -> float:
     for flow in (None, velocity):
         other = plant.copy()
         other.impose_flow(flow)
-        moved.append(float(other.step(duration, duty=0.0).pose.position[0]))
+        moved.append(float(uninterrupted(other.step(duration, duty=0.0)).pose.position[0]))
     return (moved[1] - moved[0]) / (velocity * duration)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from spirillum.argument_kinds import as_number
 from spirillum.arrays import PerRobot, Samples
 from spirillum.dynamics.held_model import PARAMETERS, HeldModel
 from spirillum.errors import InputError, did_you_mean
@@ -42,7 +42,7 @@ def checked_ranges(ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, f
                 f"allowed: {', '.join(allowed)}"
             )
         pair = list(given) if isinstance(given, (tuple, list)) else []
-        numbers = len(pair) == 2 and all(isinstance(item, Real) and np.isfinite(float(item)) for item in pair)
+        numbers = len(pair) == 2 and all(np.isfinite(as_number(item)) for item in pair)
         if not numbers or pair[0] > pair[1] or (name in FACTORS and pair[0] <= 0):
             raise InputError(f"ranges.{name} = {str(given)[:60]}; allowed: low and high, numbers, for factors above 0")
         found[name] = (float(pair[0]), float(pair[1]))

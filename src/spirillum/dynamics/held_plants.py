@@ -193,7 +193,7 @@ class HeldPlants:
     def _one_each(self, name: str, given: Samples | float, low: float, high: float) -> Samples:
         try:
             values = np.array(np.broadcast_to(np.asarray(given, dtype=np.float64), (self.count,)))
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{name} is no array of {self.count} numbers; allowed: one for each robot") from error
         inside = (values >= low) & (values <= high)
         if not inside.all():

@@ -22,7 +22,7 @@ from spirillum.dynamics.poses import Pose
 from spirillum.dynamics.record import series_of
 from spirillum.dynamics.remote import Switch
 from spirillum.dynamics.start import reach_of
-from spirillum.dynamics.tube_integration import Checkpoint, TubeTrajectory, integrate_in_tube, observed_at
+from spirillum.dynamics.tube_integration import INTERRUPTED, Checkpoint, TubeTrajectory, integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
@@ -45,7 +45,7 @@ from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Moment", "Plant", "PlantState"]
+__all__ = ["Moment", "Plant", "PlantState", "uninterrupted"]
 
 _AT_ONCE = 1e-9
 """A time in which nothing moves, s."""
@@ -90,6 +90,17 @@ class PlantState:
     """Azimuth counted over whole turns, rad."""
     checkpoint: Checkpoint | None
     """Beginning of the integrator's last step, in a tube."""
+
+
+def uninterrupted(moment: Moment) -> Moment:
+    """The moment at the end of a step of a look ahead, of which nothing is kept.
+
+    Raises:
+        KeyboardInterrupt: if the step was interrupted, which a plant itself says as the end of its run.
+    """
+    if moment.ended == INTERRUPTED:
+        raise KeyboardInterrupt
+    return moment
 
 
 class Plant:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 
 __all__ = ["LONGEST_LINE", "WATCHDOG", "Receiver", "framed", "unframed"]
 
@@ -53,8 +53,10 @@ class Receiver:
             watchdog: time after which it switches off by itself, s.
 
         Raises:
-            InputError: for a watchdog that is no positive time up to 10 s.
+            InputError: for a name that is no word, or a watchdog that is no positive time up to 10 s.
         """
+        if not name.isprintable() or len(name.split()) != 1 or " " in name:
+            raise InputError(f"name = {clipped(name)}; allowed: a word without spaces")
         if not 0.0 < watchdog <= 10.0:
             raise InputError(f"watchdog = {watchdog:g} s; allowed: above 0, at most 10 s")
         self.name, self.watchdog = name, watchdog

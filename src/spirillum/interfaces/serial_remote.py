@@ -259,6 +259,7 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
 class VirtualRemote:
     """A remote without hardware: a pseudo-terminal with a receiver behind it, to try programs on; not on Windows."""
 
+    @checked
     def __init__(self, name: str = "virtual", watchdog: float = WATCHDOG) -> None:
         """Open a pseudo-terminal.
 

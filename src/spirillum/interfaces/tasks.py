@@ -333,7 +333,7 @@ def _numbers(actions: Any) -> Samples:
     """Actions as numbers in a row; none where they are no numbers."""
     try:
         return np.asarray(actions, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from spirillum.argument_kinds import as_number, checked
 from spirillum.errors import InputError, clipped
+from spirillum.files.limits import SMALLEST_SIDE
 from spirillum.live.following import Following
 from spirillum.live.observation import Observation
 from spirillum.measurement.trials import Trial
@@ -129,6 +130,8 @@ class LiveTracker:
         if kind != (np.uint8, 3) or frame.shape[2] != 3:
             raise InputError("frame is no picture; allowed: 8-bit RGB, an array of (height, width, 3)")
         size = frame.shape[1], frame.shape[0]
+        if min(size) < SMALLEST_SIDE:
+            raise InputError(f"a frame has {size[0]} x {size[1]} pixels; allowed: sides of at least {SMALLEST_SIDE}")
         if self._size is not None and size != self._size:
             width, height = self._size
             raise InputError(f"a frame has {size[0]} x {size[1]} pixels; allowed: {width} x {height}, as those before")
