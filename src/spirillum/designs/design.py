@@ -13,6 +13,7 @@ from spirillum.arrays import Flags, Samples
 from spirillum.designs.answer import Alternative, Design, Uncertainty
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
+from spirillum.designs.learned import is_learned
 from spirillum.designs.learning import learned_best
 from spirillum.designs.options import Judged
 from spirillum.designs.profiles import bound_by_of, profile_of
@@ -80,8 +81,9 @@ def design(
         posterior: file of a calibration's posterior, whose draws are what is not known.
         judged: `statistic`, `level`, `confidence`, `draws`, `seed`.
         bench: `mandrel`, `clearance`.
-        model: `sbt`, `rft`, `slender` or `tube`. `tube`, and `slender` where something is unknown, are learned: a fast
-            model with a correction from some designs that are solved for, the best of them in the end.
+        model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from
+            some designs that are solved for, the best of them in the end. `slender` is asked itself where more than
+            three fields of the tail, or fields of the body, are varied and nothing is unknown.
         tail_rate: lab rotation rate of the tail; None: the robot's own drive.
         progress: told what is being done, how much of it, and of how much.
 
@@ -112,7 +114,7 @@ def design(
     searched = under(unknowns.draws(options.draws, options.seed))
     archive, tell = Archive(), progress or (lambda _what, _done, _total: None)
     learned = None
-    if chosen.placed or not (chosen.closed_form or unknowns.known):
+    if is_learned(chosen, space, unknowns):
         searched, archive, best, learned = learned_best(searched, unknowns, model, options.seed, tell)
     else:
         best = best_design(searched, archive, seed=options.seed, tell=tell)

@@ -29,7 +29,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
 from spirillum.swimming.balance import joined
 
-__all__ = ["Corrected", "Points", "check_learnable", "corrected", "solved_at"]
+__all__ = ["Corrected", "Points", "check_learnable", "corrected", "is_learned", "solved_at"]
 
 _COLUMNS = {
     "tail.wavelength": "wavelength",
@@ -225,6 +225,23 @@ def points_of(batch: RobotBatch, variables: tuple[Variable, ...], solve: Callabl
     return Points(variables, features_of(batch, variables), logarithm[:, _UPPER[0], _UPPER[1]])
 
 
+def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
+    """Whether a search learns the flow of a model: always with walls, else where the fields allow it.
+
+    A model in closed form is asked itself.
+    """
+    if model.closed_form:
+        return False
+    own, strange = _own_fields(space)
+    return model.placed or not unknowns.known or (not strange and len(own) <= _MOST_FIELDS)
+
+
+def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
+    """Fields that are varied and change the flow; names of those of which it cannot be learned."""
+    own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
+    return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+
+
 def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variable, ...]:
     """Fields of the tail that are varied, of which the flow has to be learned.
 
@@ -233,8 +250,7 @@ def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variab
     """
     if unknowns.posterior is not None:
         raise InputError(f"model = '{name}' with a posterior; allowed: sbt or rft with it, or ranges (unknown)")
-    own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
-    strange = [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+    own, strange = _own_fields(space)
     strange += [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
     if strange:
         raise InputError(
