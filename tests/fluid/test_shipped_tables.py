@@ -40,6 +40,7 @@ def test_presets_have_tables_that_state_their_errors(name: str) -> None:
     table, _ = shipped(name)
     assert set(table.error) == set(RESPONSES)
     assert 0 < table.error["forward_velocity"] < 0.03
+    assert 0 < table.error_without_yaw["forward_velocity"] < 0.01
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -65,6 +66,7 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
         assert table.key in keys
         # the largest: 8 % in sideways force at 0.96 of the largest yaw, 0.3 mm from the glass
         assert all(0 < error < 0.09 for error in table.error.values())
+        assert all(0 < error < 0.05 for error in table.error_without_yaw.values())
         assert path.stat().st_size < 90_000
 
 

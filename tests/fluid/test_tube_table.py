@@ -277,10 +277,19 @@ def test_a_table_is_written_and_read(
     places: Places,
     film: np.ndarray,  # type: ignore[no-untyped-def]
 ) -> None:
-    table = TubeTable(geometry, R, packed(places, film, smooth), dict.fromkeys(RESPONSES, 0.004), 40, 300.0)
+    table = TubeTable(
+        geometry,
+        R,
+        packed(places, film, smooth),
+        dict.fromkeys(RESPONSES, 0.004),
+        dict.fromkeys(RESPONSES, 0.002),
+        40,
+        300.0,
+    )
     table.write(tmp_path / "robot.table")
     read = TubeTable.read(tmp_path / "robot.table")
     assert (read.geometry, read.radius, read.key) == (geometry, R, table.key)
+    assert (read.error_at(0.1)["sideways_force"], read.error_at(0.0)["sideways_force"]) == (0.004, 0.002)
     for offset, pitch in ((0.0101, 0.01), (0.003, -0.05), (0.0, 0.0)):
         kept, made = read.at(offset, pitch, 0.0, 0.4)[0], table.at(offset, pitch, 0.0, 0.4)[0]
         scale = np.sqrt(np.diag(made))

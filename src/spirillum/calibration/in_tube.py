@@ -89,7 +89,7 @@ def tube_forward(
     level = replace(batch, placement=Placement().model_copy(update={"pitch": 0.0}))
     contact = _contact(experiment, batch) if "friction_coefficient" in free else None
     forward = Forward(TubeResistance.of(level, model), batch.electrics, batch.viscosity, contact=contact)
-    errors: list[Mapping[str, float]] = [model.table_of(batch, index).error for index in range(batch.size)]
+    errors: list[Mapping[str, float]] = [model.table_of(batch, index).error_without_yaw for index in range(batch.size)]
     return forward, max(error[name] for error in errors for name in ("forward_velocity", "body_rotation_rate"))
 
 

@@ -120,7 +120,7 @@ def free_motion(
     swimming = _means(held, links, run, prescribed=tail_rate is not None)
     warnings = (*held.warnings, *_said(run, links, weight=weight))
     known = run.lying.state in ("steady", "orbits") and not _yawed_beyond_check(run, links)
-    error = held.error_estimate if known else float("nan")
+    error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
     return FreeMotion(found, run, links, gap)
 

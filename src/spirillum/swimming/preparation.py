@@ -48,8 +48,8 @@ class Prepared(Shown):
     def warnings(self) -> tuple[str, ...]:
         """What to be careful about, a sentence each."""
         worse = [
-            f"{name.replace('_', ' ')} is off by up to {100.0 * self.table.error[name]:.2g} % at places that were not "
-            f"used, more than the {100.0 * allowed:.2g} % that a table should have"
+            f"{name.replace('_', ' ')} is off by up to {100.0 * self.table.error[name]:.2g} % at yawed places that "
+            f"were not used, more than the {100.0 * allowed:.2g} % that a table should have"
             for name, allowed in RESPONSES.items()
             if self.table.error[name] > allowed
         ]
@@ -72,6 +72,7 @@ class Prepared(Shown):
             "model": "tube",
             "places": self.table.places,
             "error": {name: quantity(value, "1") for name, value in self.table.error.items()},
+            "error_without_yaw": {name: quantity(value, "1") for name, value in self.table.error_without_yaw.items()},
             "valid": {
                 "gap": quantity(held.gaps, "m", meaning="of a level robot, where the next three hold"),
                 "pitch_up": quantity(held.up, "rad", meaning="largest pitch nose up"),

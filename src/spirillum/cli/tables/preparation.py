@@ -12,9 +12,10 @@ __all__ = ["table"]
 
 def table(answer: Answer, console: Console) -> None:
     """Tables of `prepare`: errors at places that were not used, and where the table holds."""
-    rows = grid(f"{answer['robot']}: error of its table", "quantity", "largest error, %")
+    rows = grid(f"{answer['robot']}: error of its table", "quantity", "largest error without yaw, %", "with yaw, %")
     for name, item in answer["error"].items():
-        rows.add_row(name.replace("_", " "), f"{100.0 * item['value']:.2g}")
+        level = answer["error_without_yaw"][name]
+        rows.add_row(name.replace("_", " "), f"{100.0 * level['value']:.2g}", f"{100.0 * item['value']:.2g}")
     console.print(rows)
     valid = answer["valid"]
     ranges = grid("where it holds", "gap, level, mm", "pitch up to, deg", "nose down to, deg", "yaw, level, to, deg")

@@ -66,13 +66,14 @@ def built_tables(
         progress(announcement(count, workers), 0, count)
     found = iter(solutions([place for some in nodes for place in some], "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
-    held = [_held_out(places) for places in every]
-    true = iter(solutions([place for some in held for place in some], "checking the table", progress, workers))
+    held = [(_held_out(places), _held_out(places, yawed=False)) for places in every]
+    asked = [place for both in held for some in both for place in some]
+    true = iter(solutions(asked, "checking the table", progress, workers))
     tables = []
-    for places, some, table, checked in zip(every, nodes, packed, held, strict=True):
-        errors = _largest_errors(table, checked, [next(true) for _ in checked])
+    for places, some, table, both in zip(every, nodes, packed, held, strict=True):
+        with_yaw, without = (_largest_errors(table, checked, [next(true) for _ in checked]) for checked in both)
         seconds = (time.perf_counter() - start) / len(every)
-        tables.append(TubeTable(places.geometry, places.radius, table, errors, len(some), seconds))
+        tables.append(TubeTable(places.geometry, places.radius, table, with_yaw, without, len(some), seconds))
     return tables
 
 
@@ -191,14 +192,14 @@ def _interpolated(straight: Samples, seat: Seat, count: int) -> Samples:
     return out
 
 
-def _held_out(places: Places) -> list[Solution]:
+def _held_out(places: Places, *, yawed: bool = True) -> list[Solution]:
     """Random places of a table that are no nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
     chosen: list[Solution] = []
     while len(chosen) < _HELD_OUT:
         t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
         f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
-        seat, phase = places.seat_between(t, f, yaw), float(draw.uniform(0.0, 2.0 * np.pi))
+        seat, phase = places.seat_between(t, f, yaw if yawed else 0.0), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
         if clear and seat.clearance(places.geometry.body) > 0.4 * places.thinnest:
             chosen.append(Solution(((places.geometry, (phase,)),), seat, fineness_at(seat)))

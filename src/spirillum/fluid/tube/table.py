@@ -39,7 +39,9 @@ class TubeTable:
     packed: Samples = field(repr=False)
     """For `spirillum.kernels.tube_table.resistance_at`."""
     error: Mapping[str, float]
-    """Largest relative error at places that were not used: `forward_velocity`, `body_rotation_rate`, ..."""
+    """Largest relative error at places that were not used, all yawed: `forward_velocity`, `body_rotation_rate`, ..."""
+    error_without_yaw: Mapping[str, float]
+    """Largest relative error at other such places, none of them yawed."""
     places: int
     """Number of places that were solved."""
     seconds: float
@@ -63,6 +65,14 @@ class TubeTable:
         left = kernel.resistance_at(self.packed, offset, pitch, yaw, phase, out)
         return out, int(left)
 
+    def error_at(self, yaw: float) -> Mapping[str, float]:
+        """Largest relative errors at places with or without a yaw.
+
+        Args:
+            yaw: nose to the side, rad.
+        """
+        return self.error if yaw else self.error_without_yaw
+
     def mirrored(self) -> TubeTable:
         """The table of the robot's mirror image, whose tail has the other hand."""
         geometry = self.geometry._replace(hand=-self.geometry.hand)
@@ -75,6 +85,7 @@ class TubeTable:
             "geometry": self.geometry._asdict(),
             "radius": self.radius,
             "error": dict(self.error),
+            "error_without_yaw": dict(self.error_without_yaw),
             "places": self.places,
             "seconds": self.seconds,
         }

@@ -94,7 +94,7 @@ class TabledTube(Tube):
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
         """See `SwimmerModel.stated_speed_error`."""
-        return self.table_of(batch).error["forward_velocity"]
+        return self.table_of(batch).error_at(seat_of(batch, 0).yaw)["forward_velocity"]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
