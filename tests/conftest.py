@@ -1,6 +1,7 @@
 """Settings of all tests, and robots that many of them share."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -8,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import Phase, settings
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Without the phase that explains a failure: it can take a minute.
 phases = (Phase.explicit, Phase.generate, Phase.shrink)

@@ -222,7 +222,7 @@ def render(
             camera=_fields(CameraOptions, given),
             degradation=_degradation(given),
             setup_errors=_fields(SetupErrors, given),
-            troubles=trouble,
+            troubles=trouble or None,
             seed=seed,
             progress=progress,
         )
