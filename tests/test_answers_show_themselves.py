@@ -1,9 +1,10 @@
 """Answers in Python: text and HTML with units, tab completion, figures."""
 
 import pytest
+import xarray as xr
 
 import spirillum as sp
-from spirillum.shown import html_of, text_of
+from spirillum.shown import Shown, html_of, text_of
 
 ANSWER = {
     "schema": "spirillum.some-kind/1",
@@ -50,6 +51,46 @@ def test_comparison_and_resistance_print_their_numbers() -> None:
     assert str(found).count("mm/s") == 2
     matrix = sp.resistance("biorob2012-wide", part="body")
     assert f"{matrix.matrix[0, 0]:.4g}" in str(matrix)
+
+
+def test_control_shows_its_verdict_and_the_scores_of_all_controllers() -> None:
+    task = {"kind": "stop-at", "at": "2 mm"}
+    found = sp.control("biorob2012-wide", task, plant={"model": "slender"}, seeds=1)
+    text = str(found)
+    assert f"verdict: {'good enough' if found.score.good else 'not good enough'}" in text
+    assert all(f"controllers: {name}" in text for name in ("feedback", "nothing", "open-loop", "knowing"))
+    assert "<table>" in found._repr_html_()
+
+
+def test_study_shows_its_ranking_first_and_stays_a_dataset() -> None:
+    robots = ["biorob2012-wide", "biorob2012-narrow"]
+    dataset = sp.study({"models": ["sbt"], "friction": ["rotor"], "robots": robots})
+    speeds = dataset["forward_velocity"].squeeze().values
+    best = robots[int(speeds.argmax())]
+    lines = str(dataset).splitlines()
+    assert lines[0] == f"Study: fastest: {best}, {1e3 * speeds.max():.4g} mm/s"
+    assert [line.split()[0] for line in lines[3:5]] == [robots[number] for number in (-speeds).argsort()]
+    assert dataset._repr_html_().startswith("<table><caption>fastest: ")
+    part = dataset.sel(model="sbt")
+    assert str(part) == repr(part)
+    assert isinstance(part.mean(), xr.Dataset)
+
+
+def test_batches_and_systems_print_their_numbers() -> None:
+    batch = sp.RobotBatch.of(sp.load("biorob2012-wide")).with_values({"tail.wavelength": [0.010, 0.020, 0.030]})
+    swum = sp.swim(batch, "sbt")
+    low, middle, high = sorted(1e3 * swum.forward_velocity)
+    assert f"{middle:.4g} mm/s ({low:.4g} to {high:.4g})" in str(swum)
+    point = sp.linear_system("biorob2012-wide", model="rft", duty=0.5)
+    assert f"{1e3 * point.outputs['forward_velocity']:.4g} mm/s" in str(point)
+
+
+def test_every_public_answer_has_both_forms() -> None:
+    """All that has `to_dict`, and the datasets of xarray, which have both."""
+    public = [getattr(sp, name) for name in sp.__all__ if isinstance(getattr(sp, name), type)]
+    answers = [kind for kind in public if hasattr(kind, "to_dict")]
+    assert {"Control", "Flow", "LinearSystem", "Observation", "Swimming", "Tracked"} <= {a.__name__ for a in answers}
+    assert [kind.__name__ for kind in answers if not issubclass(kind, Shown)] == []
 
 
 def test_public_names_and_nothing_else() -> None:

@@ -42,7 +42,29 @@ def schema_of(name: str) -> dict[str, Any]:
         words = "Preset, or robot file beside this one, that the file starts from."
         extends = {"type": "string", "description": words, "title": "Extends"}
         schema["properties"]["extends"] = extends
+        schema |= _needed_unless_extended(schema)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _needed_unless_extended(schema: dict[str, Any]) -> dict[str, Any]:
+    """Take what every table requires out of a schema; it is required where the file extends no other one."""
+    tables = schema.get("$defs", {})
+
+    def needed(part: dict[str, Any]) -> dict[str, Any]:
+        whole = tables[part["$ref"].rpartition("/")[2]] if "$ref" in part else part
+        for form in whole.get("anyOf", ()):
+            if found := needed(form):
+                return found
+        below = {name: found for name, item in whole.get("properties", {}).items() if (found := needed(item))}
+        rest = whole.get("additionalProperties")
+        others = needed(rest) if isinstance(rest, dict) else {}
+        found = {"required": whole.get("required"), "properties": below, "additionalProperties": others}
+        return {name: item for name, item in found.items() if item}
+
+    condition = needed(schema)
+    for table in (schema, *tables.values()):
+        table.pop("required", None)
+    return {"if": {"required": ["extends"]}, "else": condition}
 
 
 def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:

@@ -78,7 +78,7 @@ def test_file_is_labelled_and_opens_with_xarray_alone(small: dict[str, object], 
     dataset = sp.study(small)
     write_dataset(dataset, tmp_path / "dataset.nc")
     with xr.open_dataset(tmp_path / "dataset.nc") as stored:
-        xr.testing.assert_identical(stored.load(), dataset)
+        assert stored.load().identical(dataset)
         for name, variable in stored.variables.items():
             assert "long_name" in variable.attrs, name
             if variable.dtype.kind == "f":

@@ -29,6 +29,7 @@ from spirillum.processes import as_they_come
 from spirillum.robot.fields import field_values
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ _ALLOWED = ("model", "friction", "calibrated", "calibration", "placement", "weig
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(Shown):
     """A controlled run, and scores over many."""
 
     robot: Robot
@@ -111,6 +112,16 @@ class Control:
             "scores": None if self.scores is None else self.scores.to_dict(),
         }
         return envelope("control", content, self.warnings)
+
+    def _shown(self) -> tuple[dict[str, Any], None]:
+        """See `Shown`: the task's error first, then every controller's scores."""
+        answer = self.to_dict()
+        error, scores = answer.pop("error"), answer.pop("scores") or {}
+        controllers = [{"controller": name, **one} for name, one in scores.get("controllers", {}).items()]
+        kept = {name: item for name, item in answer.items() if name not in ("commands", "frames", "lab", "warnings")}
+        verdict = "good enough" if self.score.good else "not good enough"
+        found = {**kept, error["meaning"]: error, "verdict": verdict, "controllers": controllers}
+        return {**found, "warnings": answer["warnings"]}, None
 
 
 def control(

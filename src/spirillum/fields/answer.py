@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.answer import envelope, quantity
+from spirillum.answer import quantity
 from spirillum.fields.flow import Flow
 from spirillum.quantities import unit_of
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["extremes", "flow_answer", "flow_rate"]
-
-_MOTION = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
 
 
 def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any]:
@@ -27,21 +25,9 @@ def flow_answer(flow: Flow, written: Mapping[Path, xr.Dataset]) -> dict[str, Any
         flow: the flow.
         written: what was computed, by the file that holds it.
     """
-    content = {
-        "robot": flow.robot.name,
-        **flow.prediction.answered_by,
-        "friction": flow.prediction.friction,
-        "calibrated": flow.prediction.calibrated,
-        "frame": flow.frame,
-        "phase": quantity(flow.phase, "rad"),
-        **{name: quantity(getattr(flow.prediction, name), unit_of(name)) for name in _MOTION},
-        **({} if flow.seat is None else {"plug_velocity": quantity(flow.prediction.plug_velocity, "m/s")}),
-        "held_force": quantity(flow.held_force, "N", direction="sideways"),
-        "placement": flow.prediction.placement,
-        "files": [_file(path, dataset) for path, dataset in written.items()],
-        "references": list(flow.prediction.references),
-    }
-    return envelope("flow", content, flow.warnings)
+    found = flow.to_dict()
+    warnings = found.pop("warnings")
+    return {**found, "files": [_file(path, dataset) for path, dataset in written.items()], "warnings": warnings}
 
 
 def _file(path: Path, dataset: xr.Dataset) -> dict[str, Any]:

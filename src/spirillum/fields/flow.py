@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 
+from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.fluid_field import FluidField
@@ -18,11 +19,13 @@ from spirillum.fields.grid import PLANES, Grid, Progress, dataset_on, plane_grid
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fields.unbounded import flow_field
 from spirillum.fluid.tube.domain import seat_of
+from spirillum.quantities import unit_of
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
+from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.prediction import Prediction, predict, prepared
 from spirillum.units import KINDS, Kind, parse_option
@@ -47,12 +50,13 @@ FLOW_MODELS = ("slender", "tube")
 """The models whose tractions give a flow: in unbounded fluid, and in the channel."""
 Frame = Literal["lab", "body"]
 _OFFSET = Kind("length", "m", "5 mm", "-100 m", "100 m")
+_MOTION = ("forward_velocity", "tail_rotation_rate", "body_rotation_rate")
 PLANE_RESOLUTION, VOLUME_RESOLUTION = 240, 80
 """Points along the longest side of a plane and of a box."""
 
 
 @dataclass(frozen=True)
-class Flow:
+class Flow(Shown):
     """The fluid around a swimming robot at one phase of its tail.
 
     SI; axes of the body, origin at its mid-length on the motor axis, x forward. The body's frame moves with the
@@ -92,6 +96,24 @@ class Flow:
             return self.prediction.warnings
         walls = "the channel's walls are not computed: this is the flow in unbounded fluid"
         return (*self.prediction.warnings, walls)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The motion and its settings, as data."""
+        motion = self.prediction
+        content = {
+            "robot": self.robot.name,
+            **motion.answered_by,
+            "friction": motion.friction,
+            "calibrated": motion.calibrated,
+            "frame": self.frame,
+            "phase": quantity(self.phase, "rad"),
+            **{name: quantity(getattr(motion, name), unit_of(name)) for name in _MOTION},
+            **({} if self.seat is None else {"plug_velocity": quantity(motion.plug_velocity, "m/s")}),
+            "held_force": quantity(self.held_force, "N", direction="sideways"),
+            "placement": motion.placement,
+            "references": list(motion.references),
+        }
+        return envelope("flow", content, self.warnings)
 
     def with_held_force(self) -> Flow:
         """The same with the sideways force that the fluid's traction amounts to."""

@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.robot.fields import (
+    AlsoReads,
     BackEmfConstant,
     Factor,
     Length,
@@ -56,7 +57,12 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, Mapping) else value
 
 
-_Entries = Annotated[tuple[Calibration, ...], BeforeValidator(_as_list), Field(min_length=1, max_length=1000)]
+_Entries = Annotated[
+    tuple[Calibration, ...],
+    Field(min_length=1, max_length=1000),
+    BeforeValidator(_as_list),
+    AlsoReads(lambda many: many["items"]),
+]
 
 
 class FittedValues(Section):

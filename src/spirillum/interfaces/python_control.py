@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from spirillum.answer import envelope, quantity
 from spirillum.argument_kinds import as_number
 from spirillum.arrays import Samples
 from spirillum.dynamics.held_equations import INPUTS, OUTPUTS, outputs, rates, slopes, steady_state
 from spirillum.dynamics.held_model import STATES, HeldModel, held_model
 from spirillum.errors import InputError, clipped
 from spirillum.extras import required
+from spirillum.quantities import unit_of
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import KINDS, parse_option
 
@@ -27,7 +30,7 @@ __all__ = ["LinearSystem", "control_system", "linear_system"]
 
 
 @dataclass(frozen=True)
-class LinearSystem:
+class LinearSystem(Shown):
     """A robot's equations linearised, and where."""
 
     system: control.StateSpace
@@ -38,6 +41,16 @@ class LinearSystem:
     """The steady rates, current and powers there, by name, SI; path, angles and charge counted from it."""
     time_constant: float
     """Of the motor's current there, s; path, angles and charge only add up."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The point, and the time constant there, as data; the matrices are those of `system`."""
+        point = {**self.inputs, **self.outputs}
+        content = {
+            "robot": str(self.system.name),
+            "time_constant": quantity(self.time_constant, "s"),
+            **{name: quantity(value, unit_of(name)) for name, value in point.items()},
+        }
+        return envelope("linear-system", content, ())
 
 
 def control_system(

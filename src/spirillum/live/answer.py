@@ -10,12 +10,13 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.measurement.trials import RATE_NAMES, Trial
+from spirillum.shown import Shown
 
 __all__ = ["Tracked"]
 
 
 @dataclass(frozen=True)
-class Tracked:
+class Tracked(Shown):
     """A source that was tracked to its end."""
 
     source: str

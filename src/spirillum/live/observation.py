@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from spirillum.answer import envelope, quantity
 from spirillum.measurement.trials import Measured
+from spirillum.shown import Shown
 from spirillum.vision.flag import Flag
 
 __all__ = ["Observation", "State"]
@@ -18,7 +19,7 @@ State = Literal["learning", "tracking", "lost"]
 
 
 @dataclass(frozen=True)
-class Observation:
+class Observation(Shown):
     """A robot on one frame, from this frame and those before it; SI, NaN where it was not seen."""
 
     frame: int

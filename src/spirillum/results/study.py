@@ -71,11 +71,13 @@ def study(
 
     Returns:
         Dataset with dimensions `channel`, `wavelength`, `amplitude` (or `robot`), `model`, `friction`; that of a store
-        reads its values where they are asked for.
+        reads its values where they are asked for. `print` and notebooks show its ranking first.
 
     Raises:
         InputError: if the study, a robot or the observations are wrong, or the folder holds another study.
     """
+    from spirillum.results.study_dataset import StudyDataset
+
     crew = checked_crew(1, workers) if isinstance(workers, str) else checked_crew(workers, None)
     if store is not None and output is not None:
         raise InputError(f"store = {str(store)[:80]!r} together with a folder for results; allowed: one of them")
@@ -97,9 +99,9 @@ def study(
     inputs = (None if isinstance(source, Mapping) else source, observations, calibration, posterior)
     if store is not None:
         with protected(*inputs):
-            return stored_study(loaded, observed, fingerprint, store, crew, tell)
+            return StudyDataset.of(stored_study(loaded, observed, fingerprint, store, crew, tell))
     if output is None:
-        return computed_study(loaded, observed, fingerprint, None, tell, crew)
+        return StudyDataset.of(computed_study(loaded, observed, fingerprint, None, tell, crew))
     mark = {"schema": "spirillum.study-folder/1", "title": loaded.study.title, "fingerprint": fingerprint}
     claim = {"mark": "study.json", "content": mark, "what": "study", "results": _RESULTS}
     with protected(*inputs), results_folder(output, claim=claim) as folder:
@@ -110,7 +112,7 @@ def study(
             write_dataset(dataset, folder / "dataset.nc", replace="any")
             shutil.rmtree(parts, ignore_errors=True)
         write_report(dataset, folder, tell)
-    return dataset
+    return StudyDataset.of(dataset)
 
 
 def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:

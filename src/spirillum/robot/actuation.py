@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from spirillum.robot.fields import (
+    AlsoReads,
     BackEmfConstant,
     Charge,
     Inductance,
@@ -25,7 +26,9 @@ from spirillum.robot.fields import (
     Torque,
     TorqueConstant,
     Voltage,
+    quantity_schema,
 )
+from spirillum.units import KINDS
 
 __all__ = ["Battery", "Drive", "DriveKind", "Friction", "FrictionReading", "Magnetic", "Motor", "MotorResistance"]
 
@@ -71,6 +74,9 @@ def _plain_resistance(value: Any) -> Any:
     return value if isinstance(value, (Mapping, MotorResistance)) else {"constant": value}
 
 
+_PLAIN_RESISTANCE = AlsoReads(lambda _: quantity_schema(KINDS["resistance"]))
+
+
 class Motor(Section):
     """The DC-motor of eqs (17) and (18)."""
 
@@ -82,7 +88,7 @@ class Motor(Section):
     """Inductance L (Table II)."""
     rotor_friction: RotaryFriction
     """Friction B_m of the rotor alone, on the motor's shaft (Table II)."""
-    resistance: Annotated[MotorResistance, BeforeValidator(_plain_resistance)]
+    resistance: Annotated[MotorResistance, BeforeValidator(_plain_resistance), _PLAIN_RESISTANCE]
     """Equivalent resistance R(I) of motor and driver (Table II): its terms, or one value such as `"10.4 ohm"`."""
     gear_ratio: Annotated[float, Field(strict=True, ge=1e-3, le=1e4, allow_inf_nan=False)] = 1.0
     """Turns of the motor's shaft for one of the joint, G, of a gear without losses of its own; 1: driven directly."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple, get_args
 
 from pydantic import (
@@ -11,17 +12,21 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     ValidatorFunctionWrapHandler,
     WithJsonSchema,
     WrapValidator,
 )
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from spirillum.errors import InputError
 from spirillum.units import KINDS, Kind, parse_quantity
 
 __all__ = [
+    "NONE",
+    "AlsoReads",
     "Angle",
     "BackEmfConstant",
     "Charge",
@@ -53,6 +58,7 @@ __all__ = [
     "Voltage",
     "Yaw",
     "field_values",
+    "quantity_schema",
 ]
 
 
@@ -73,20 +79,36 @@ def _reader(kind: Kind) -> Callable[[Any], float]:
     return read
 
 
-def _schema(kind: Kind) -> WithJsonSchema:
-    return WithJsonSchema(
-        {
-            "type": "string",
-            "x-quantity": {"kind": kind.name, "unit": kind.unit, "minimum": kind.low, "maximum": kind.high},
-            "examples": [kind.example],
-        }
-    )
+@dataclass(frozen=True)
+class AlsoReads:
+    """For the JSON schema of a field: a form that its reader takes beside that of its type."""
+
+    form: Callable[[JsonSchemaValue], JsonSchemaValue]
+    """Schema of that form, from the schema of the type."""
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """See pydantic."""
+        own = handler(core)
+        return {"anyOf": [own, self.form(own)]}
+
+
+NONE = AlsoReads(lambda _: {"const": "none"})
+"""The word `none` for a table that is left out."""
+
+
+def quantity_schema(kind: Kind) -> JsonSchemaValue:
+    """JSON schema of a quantity of a kind."""
+    return {
+        "type": "string",
+        "x-quantity": {"kind": kind.name, "unit": kind.unit, "minimum": kind.low, "maximum": kind.high},
+        "examples": [kind.example],
+    }
 
 
 def _quantity(name: str) -> tuple[Kind, BeforeValidator, WithJsonSchema]:
     """What makes a float a quantity; the kind stays with the field, so that `field_values` knows its unit."""
     kind = KINDS[name]
-    return kind, BeforeValidator(_reader(kind)), _schema(kind)
+    return kind, BeforeValidator(_reader(kind)), WithJsonSchema(quantity_schema(kind))
 
 
 def _printable(text: str) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from spirillum.robot.fields import Density, Length, LengthOrZero, Mass, Section, Viscosity
+from spirillum.robot.fields import NONE, Density, Length, LengthOrZero, Mass, Section, Viscosity
 
 __all__ = [
     "Body",
@@ -126,7 +126,7 @@ class Seal(Section):
     """Colours of equally wide stripes around; the first is centred on +z, the next follow from there towards -y."""
 
 
-SealOrNone = Annotated[Seal | None, BeforeValidator(_read_seal)]
+SealOrNone = Annotated[Seal | None, BeforeValidator(_read_seal), NONE]
 
 
 class Coupling(Section):
@@ -168,7 +168,7 @@ class Channel(Section):
     """Length L_ch (Table I)."""
 
 
-ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel)]
+ChannelOrNone = Annotated[Channel | None, BeforeValidator(_read_channel), NONE]
 
 
 class Fluid(Section):

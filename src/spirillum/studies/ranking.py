@@ -24,7 +24,7 @@ from spirillum.units import display_unit, in_unit, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Best", "RankedRobot", "StudyRanking", "ranking_of"]
+__all__ = ["Best", "RankedRobot", "StudyRanking", "can_be_ranked", "ranking_of"]
 
 _ALIKE = 0.01
 _MOST = 1000
@@ -123,6 +123,16 @@ class StudyRanking:
             "best": [best.to_dict() for best in self.best],
             "robots": [robot.to_dict() for robot in self.robots[:_MOST]],
         }
+
+
+def can_be_ranked(dataset: xr.Dataset) -> bool:
+    """Whether a dataset is a study with all its dimensions and the quantities that rank robots.
+
+    Args:
+        dataset: any dataset.
+    """
+    robots = {"robot"} if "robot" in dataset.dims else {"channel", "wavelength", "amplitude"}
+    return {"model", "friction", *robots} <= set(dataset.dims) and {*_WORDS} <= set(dataset.data_vars)
 
 
 def ranking_of(dataset: xr.Dataset) -> StudyRanking:

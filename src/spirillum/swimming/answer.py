@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from spirillum.answer import envelope, quantity
 from spirillum.arrays import Flags, PerRobot
 from spirillum.quantities import QUANTITIES, Quantity
+from spirillum.shown import Shown
 
 __all__ = ["HEADLINE", "LEVEL", "STEADY", "Intervals", "Swimming", "headline"]
 
@@ -18,7 +20,7 @@ LEVEL = 0.95
 
 
 @dataclass(frozen=True)
-class Swimming:
+class Swimming(Shown):
     """Steady motion of a batch, one value for each robot, SI, rates signed about +x; NaN where not `valid`.
 
     Units, meanings and sources stand in `spirillum.quantities`.
@@ -52,6 +54,26 @@ class Swimming:
     step_out_rate: PerRobot
     phase_lag: PerRobot
     valid: Flags
+
+    def to_dict(self) -> dict[str, Any]:
+        """Median, least and largest of every quantity over the robots, as data."""
+        found = {item.name: np.asarray(getattr(self, item.name))[self.valid] for item in STEADY}
+        known = {name: column[np.isfinite(column)] for name, column in found.items()}
+        content = {
+            "robots": int(self.valid.size),
+            "valid": int(np.count_nonzero(self.valid)),
+            **{
+                name: quantity(np.median(column), QUANTITIES[name].unit, low=column.min(), high=column.max())
+                for name, column in known.items()
+                if column.size
+            },
+        }
+        return envelope("swimming", content, ())
+
+    def _shown(self) -> tuple[Mapping[str, Any], list[str]]:
+        """See `Shown`: the quantities that matter most."""
+        answer = self.to_dict()
+        return answer, [name for name in HEADLINE if name in answer][:_SHOWN]
 
 
 STEADY: tuple[Quantity, ...] = tuple(QUANTITIES[item.name] for item in fields(Swimming) if item.name != "valid")

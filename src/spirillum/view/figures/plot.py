@@ -20,7 +20,7 @@ from spirillum.fields.flow import Flow
 from spirillum.files import PICTURES, output_target
 from spirillum.measurement.measure import Measurement
 from spirillum.robot.robot import Robot
-from spirillum.studies.ranking import ranking_of
+from spirillum.studies.ranking import can_be_ranked, ranking_of
 from spirillum.swimming.comparison import ModelComparison
 from spirillum.swimming.prediction import Prediction
 from spirillum.view.figures.style import DPI, save_as, styled
@@ -135,7 +135,7 @@ def _of_dataset(dataset: xr.Dataset) -> Figure:
         from spirillum.view.figures.magnetic import magnetic_figure
 
         return magnetic_figure(dataset)
-    if {"model", "friction"} <= set(dataset.dims) and "forward_velocity" in dataset:
+    if can_be_ranked(dataset):
         from spirillum.view.figures.ranking import ranking_picture
 
         ranking = ranking_of(dataset)

@@ -1,0 +1,64 @@
+"""A study as people read it: its ranking, before the variables of its dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+import xarray as xr
+
+from spirillum.results.study_content import shown_ranking
+from spirillum.studies.ranking import can_be_ranked, ranking_of
+
+__all__ = ["StudyDataset"]
+
+
+# xarray leaves __init_subclass__ without types.
+class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
+    """A study's dataset that shows its ranking to `print` and to notebooks; else as any dataset of xarray."""
+
+    __slots__ = ()
+
+    @classmethod
+    def of(cls, dataset: xr.Dataset) -> StudyDataset:
+        """The same values, coordinates and attributes.
+
+        Args:
+            dataset: a study.
+        """
+        return cls(dataset.data_vars, dataset.coords, dataset.attrs)
+
+    def __str__(self) -> str:
+        """The ranking and the warnings, or what xarray prints where nothing can be ranked."""
+        if not can_be_ranked(self):
+            return super().__str__()
+        shown = shown_ranking(ranking_of(self))
+        rows = [shown["header"], *shown["rows"]]
+        widths = [max(len(row[column]) for row in rows) for column in range(len(shown["header"]))]
+        lines = [f"{self.attrs.get('title', 'Study')}: {shown['message']}", f"  {shown['basis']}"]
+        lines += [_line(row, widths) for row in rows]
+        lines += [f"  and {shown['more']} more"] if shown["more"] else []
+        sizes = ", ".join(f"{name} {size}" for name, size in self.sizes.items())
+        dataset = f"dataset: {len(self.data_vars)} variables over {sizes}; list(study), study.info()"
+        return "\n".join([*lines, *shown["best"], dataset, *self._warnings()])
+
+    def _repr_html_(self) -> str:
+        """The ranking as a table, then the dataset as xarray shows it."""
+        if not can_be_ranked(self):
+            return str(super()._repr_html_())
+        shown = shown_ranking(ranking_of(self))
+        head = "".join(f"<th>{escape(name)}</th>" for name in shown["header"])
+        cells = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in shown["rows"])
+        body = "".join(f"<tr>{row}</tr>" for row in cells)
+        caption = f"<caption>{escape(shown['message'])}; {escape(shown['basis'])}</caption>"
+        said = "".join(f"<p>{escape(line)}</p>" for line in (*shown["best"], *self._warnings()))
+        table = f"<table>{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+        return f"{table}{said}{super()._repr_html_()}"
+
+    def _warnings(self) -> Iterator[str]:
+        return (f"warning: {line}" for line in str(self.attrs.get("warnings", "")).split("\n") if line)
+
+
+def _line(row: list[str], widths: list[int]) -> str:
+    cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+    return f"  {'  '.join(cells)}".rstrip()
