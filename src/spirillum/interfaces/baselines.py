@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.interfaces.tasks import HoldSpeed, StopAt, Task
+from spirillum.interfaces.tasks import TASKS, HoldSpeed, StopAt, Task
 
 __all__ = ["RULES", "Scored", "baseline"]
 
@@ -21,7 +21,7 @@ Rule = Callable[[np.ndarray, Task], np.ndarray]
 
 
 def _off(seen: np.ndarray, task: Task) -> np.ndarray:
-    return np.zeros((len(seen), 1) if isinstance(task, HoldSpeed) else len(seen))
+    return np.zeros(len(seen) if task.on_off else (len(seen), 1))
 
 
 def _bang_bang(seen: np.ndarray, _task: Task) -> np.ndarray:
@@ -63,7 +63,7 @@ class Scored(NamedTuple):
 
 
 def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **options: Any) -> Scored:
-    """What a rule scores, over robots, goals, flow and errors that a seed draws; the same for each rule.
+    """What a rule scores, over robots, goals, flow and errors that a seed draws, alike for every rule.
 
     Args:
         task: name of an environment, such as `spirillum/StopAt-v0`.
@@ -75,15 +75,14 @@ def baseline(task: str, rule: str, *, episodes: int = 1000, seed: int = 0, **opt
     Raises:
         InputError: for a name that is none.
     """
-    kinds: dict[str, type[Task]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
-    if task not in kinds:
-        raise InputError(f"task = {task[:60]!r}{did_you_mean(task, kinds)}; allowed: {', '.join(kinds)}")
-    rules = RULES[kinds[task]]
+    if task not in TASKS:
+        raise InputError(f"task = {task[:60]!r}{did_you_mean(task, TASKS)}; allowed: {', '.join(TASKS)}")
+    rules = RULES[TASKS[task]]
     if rule not in rules:
         raise InputError(f"rule = {rule[:60]!r}{did_you_mean(rule, rules)}; allowed: {', '.join(rules)}")
     if not 2 <= episodes <= 1_000_000:
         raise InputError(f"episodes = {episodes}; allowed: 2 to 1000000")
-    rng, robots = np.random.default_rng(seed), kinds[task](episodes, **options)
+    rng, robots = np.random.default_rng(seed), TASKS[task](episodes, **options)
     robots.reset(np.ones(episodes, dtype=bool), rng)
     total, seen = np.zeros(episodes), robots.observe(rng)
     for _ in range(robots.length):

@@ -15,21 +15,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from spirillum.errors import InputError, clipped
-from spirillum.interfaces.tasks import HoldSpeed, StopAt, Task
+from spirillum.interfaces.tasks import TASKS, HoldSpeed, Task
 
-__all__ = ["ENVIRONMENTS", "BatchEnvironment", "Environment"]
+__all__ = ["BatchEnvironment", "Environment"]
 
-ENVIRONMENTS: dict[str, type[Task]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
-"""Names of the environments and their tasks."""
 _BAR = 40
 
 
 def _spaces(task: Task) -> tuple[spaces.Box, spaces.Space[Any]]:
     """Observation and actions of one robot."""
     low, high = (np.array([getattr(item, end) for item in task.observed], dtype=np.float32) for end in ("low", "high"))
-    actions: spaces.Space[Any] = spaces.Discrete(2)
-    if isinstance(task, HoldSpeed):
-        actions = spaces.Box(0.0, 1.0, (1,), dtype=np.float32)
+    actions = spaces.Discrete(2) if task.on_off else spaces.Box(0.0, 1.0, (1,), dtype=np.float32)
     return spaces.Box(low, high, dtype=np.float32), actions
 
 
@@ -42,7 +38,7 @@ class Environment(gymnasium.Env[np.ndarray, Any]):
         """A task by its registered name.
 
         Args:
-            task: a key of `ENVIRONMENTS`.
+            task: a key of `spirillum.interfaces.tasks.TASKS`.
             render_mode: `ansi`: a line of text; None.
             options: arguments of the task, see `spirillum.interfaces.tasks`.
 
@@ -101,7 +97,7 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
         """A task by its registered name.
 
         Args:
-            task: a key of `ENVIRONMENTS`.
+            task: a key of `spirillum.interfaces.tasks.TASKS`.
             num_envs: how many robots.
             render_mode: None.
             options: arguments of the task, see `spirillum.interfaces.tasks`.
@@ -159,15 +155,15 @@ def _check_seed(seed: Any) -> None:
 
 
 def _task(name: str, count: int, options: dict[str, Any]) -> Task:
-    if name not in ENVIRONMENTS:
-        raise InputError(f"task = {clipped(name)}; allowed: {', '.join(ENVIRONMENTS)}")
+    if name not in TASKS:
+        raise InputError(f"task = {clipped(name)}; allowed: {', '.join(TASKS)}")
     try:
-        return ENVIRONMENTS[name](count, **options)
+        return TASKS[name](count, **options)
     except TypeError as error:  # an option that no task has
         raise InputError(f"{name}: {str(error).partition(') ')[2] or error}; allowed: options of its task") from error
 
 
-for _name in ENVIRONMENTS:
+for _name in TASKS:
     if _name not in gymnasium.registry:
         gymnasium.register(
             _name,

@@ -106,20 +106,21 @@ def linear_system(
     calibration: str | Path | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
 ) -> LinearSystem:
-    """The system of `control_system` linearised where a duty and a flow have become steady, in closed form.
+    """A robot held to its channel's axis, linearised in closed form where a duty and a flow have become steady.
 
     Args:
-        robot: as `control_system`.
+        robot: a preset's name, a robot file, its tables, or a loaded robot, with a `dc-motor` drive.
         duty: duty of the point, 0 to 1; None: the drive's own.
         flow: mean flow of the point, with its unit or a float in m/s; None: that of the placement.
-        model: as `control_system`.
-        friction: as `control_system`.
-        calibrated: as `control_system`.
-        calibration: as `control_system`.
-        placement: as `control_system`.
+        model: a hydrodynamic model, or `auto`.
+        friction: reading of the friction; None: the robot's own.
+        calibrated: apply the robot's calibration factors for this model.
+        calibration: calibration file whose factors replace the robot's.
+        placement: where the robot is held, for `tube`; with a `flow`, also 0, the imposed flow is an input.
 
     Raises:
-        InputError: as `control_system`, and for a flow without one in the placement.
+        InputError: for wrong input, another drive, a flow without one in the placement, or where python-control is not
+            installed.
     """
     library = required("control", "a system of python-control", "control")
     held = held_model(
@@ -131,19 +132,26 @@ def linear_system(
     if flow is not None and held.flow is None:
         raise InputError(f"flow = {flow} without one in the placement; allowed: placement with flow, or no flow")
     at_flow = (held.flow or 0.0) if flow is None else parse_option("flow", flow, KINDS["velocity"])
-    values = held.parameters
-    current = steady_state(values, at_duty, at_flow)
-    a, b, c, d = slopes(values, current, at_duty)
-    names = _inputs(held)
-    kept = len(names)
+    numbers = held.parameters
+    current = steady_state(numbers, at_duty, at_flow)
+    a, b, c, d = slopes(numbers, current, at_duty)
+    inputs = _inputs(held)
+    count = len(inputs)
     system = library.ss(
-        a, b[:, :kept], c, d[:, :kept], name=held.robot.name, inputs=names, states=list(STATES), outputs=list(OUTPUTS)
+        a,
+        b[:, :count],
+        c,
+        d[:, :count],
+        name=held.robot.name,
+        inputs=inputs,
+        states=list(STATES),
+        outputs=list(OUTPUTS),
     )
-    found = outputs(values, np.array([current, 0.0, 0.0, 0.0, 0.0]), at_duty, at_flow)
+    steady = outputs(numbers, np.array([current, 0.0, 0.0, 0.0, 0.0]), at_duty, at_flow)
     return LinearSystem(
         system=system,
-        inputs=dict(zip(names, (at_duty, at_flow), strict=False)),
-        outputs=dict(zip(OUTPUTS, found.tolist(), strict=True)),
+        inputs=dict(zip(inputs, (at_duty, at_flow), strict=False)),
+        outputs=dict(zip(OUTPUTS, steady.tolist(), strict=True)),
         time_constant=-1.0 / float(a[0, 0]),
     )
 

@@ -6,6 +6,7 @@ errors; what it commands reaches the drive after the remote's delay, or not at a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -24,7 +25,7 @@ from spirillum.robot.robot import Robot
 from spirillum.swimming.model_choice import AUTO, choose_model
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["HoldSpeed", "StopAt", "Task"]
+__all__ = ["TASKS", "HoldSpeed", "StopAt", "Task"]
 
 _MM = 1e3
 _LARGEST_GOAL = 1e3
@@ -65,12 +66,15 @@ class _Past:
         self._rows[:, which] = 0.0
 
 
-class Task:
-    """Robots with camera, remote and flow; a task adds goal, actions, observation and reward."""
+class Task(ABC):
+    """Robots with camera, remote and flow; a task adds goal, actions, observation and score."""
 
     observed: ClassVar[tuple[Observed, ...]]
     """The numbers of an observation."""
-    score_unit: ClassVar[str]
+    goals: ClassVar[tuple[float, float]]
+    """Least and largest goal, unless others are given."""
+    on_off: ClassVar[bool]
+    """Whether an action is 0 (off) or 1 (on); else it is a duty from 0 to 1."""
 
     def __init__(
         self,
@@ -83,6 +87,7 @@ class Task:
         lab: Lab | str | Path | Mapping[str, Any] | None = None,
         ranges: Mapping[str, Any] | None = None,
         posterior: str | Path | None = None,
+        goal: tuple[float, float] | None = None,
         duration: str | float = 20.0,
     ) -> None:
         """Put robots into their laboratory.
@@ -96,6 +101,7 @@ class Task:
             lab: camera, meter, remote, pulse, and how unknown the friction is, as for `sp.control`.
             ranges: what robots are drawn from besides, see `HeldPlants`; a range of `friction` instead of the lab's.
             posterior: file of a calibration's posterior, from whose draws they are taken.
+            goal: least and largest goal, between which goals are drawn evenly; None: those of the task.
             duration: of an episode, with its unit or a float in s.
 
         Raises:
@@ -106,15 +112,15 @@ class Task:
         self.dt = 1.0 / self.lab.camera.fps
         if not self.dt <= self.duration <= 1e5:
             raise InputError(f"duration = {self.duration:g} s; allowed: {self.dt:.3g} to 100000 s")
-        own, placed = load(robot), Placement.of(placement)
-        chosen = choose_model(model, own, placement=placed).model
+        loaded, placed = load(robot), Placement.of(placement)
+        chosen = choose_model(model, loaded, placement=placed).model
         if chosen == "tube" and self.lab.pulse.velocity and placed.flow is None and placed.ends is None:
             placed = placed.model_copy(update={"flow": 0.0})
         factor = self.lab.unknown.friction_factor
         known = posterior is not None or factor == 1.0
         drawn = {**({} if known else {"friction": (1.0 / factor, factor)}), **(ranges or {})}
         self.plants = HeldPlants(
-            own, count, model=chosen, friction=friction, placement=placed, ranges=drawn, posterior=posterior
+            loaded, count, model=chosen, friction=friction, placement=placed, ranges=drawn, posterior=posterior
         )
         self.steps = np.zeros(count, dtype=np.int64)
         self.length = max(1, round(self.duration / self.dt))
@@ -125,7 +131,9 @@ class Task:
         self._commands = _Past(round(self.lab.remote.delay / self.dt) + 1, count)
         self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
         self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
+        self._goal_range = _range_of("goal", self.goals if goal is None else goal)
         self.goal = np.zeros(count)
+        """The goal of each robot, SI."""
 
     @property
     def count(self) -> int:
@@ -163,10 +171,10 @@ class Task:
         self._pulse_start[which] = _LATEST_PULSE * self.duration * place if start is None else start
         sense = np.where(side < 0.5, 1.0, -1.0) if start is None else 1.0
         self._pulse[which] = lab.pulse.velocity * sense
-        self.goal[which] = self._goals(new, rng)
+        self.goal[which] = self._goal_scale() * rng.uniform(*self._goal_range, new)
 
     def step(self, actions: np.ndarray, rng: np.random.Generator) -> Samples:
-        """One frame; the reward of each robot.
+        """One frame; the reward of each robot: minus its score, times the step in s.
 
         Args:
             actions: of each robot.
@@ -182,30 +190,42 @@ class Task:
         self.plants.step(self.dt, duty=self._commands.ago(len(self._commands) - 1), flow=self._flow())
         self.steps += 1
         self._film(rng)
-        return self._reward() * self.dt
+        return -self.scores() * self.dt
 
     def observe(self, rng: np.random.Generator) -> np.ndarray:
-        """What each agent sees, (count, len(observed)), 32 bits."""
+        """What each agent sees, (count, len(observed)), 32-bit floats."""
         seen = np.empty((self.count, len(self.observed)), dtype=np.float32)
         for column, (item, values) in enumerate(zip(self.observed, self._observation(rng), strict=True)):
             np.clip(values, item.low, item.high, out=seen[:, column], casting="same_kind")
         return seen
 
+    @abstractmethod
     def scores(self) -> Samples:
         """How far each robot is from its goal now; the score of an episode is that at its end."""
-        raise NotImplementedError
 
-    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
-        raise NotImplementedError
+    @abstractmethod
+    def _goal_scale(self) -> float:
+        """What a goal of 1 is in SI."""
 
-    def _duty(self, actions: np.ndarray) -> Samples:
-        raise NotImplementedError
-
-    def _reward(self) -> Samples:
-        raise NotImplementedError
-
+    @abstractmethod
     def _observation(self, rng: np.random.Generator) -> list[Samples]:
-        raise NotImplementedError
+        """The numbers of `observed`, each (count,), before they are cut off at their bounds."""
+
+    def _duty(self, actions: Any) -> Samples:
+        """The duties that actions ask for.
+
+        Raises:
+            InputError: unless there is an allowed action for each robot.
+        """
+        try:
+            values = np.asarray(actions, dtype=np.float64).reshape(-1)
+        except (TypeError, ValueError, OverflowError):
+            values = np.empty(0)
+        allowed = np.isin(values, (0, 1)) if self.on_off else (values >= 0.0) & (values <= 1.0)
+        if len(values) != self.count or not allowed.all():
+            words = "0 (off) or 1 (on)" if self.on_off else "a duty from 0 to 1"
+            raise InputError(f"action = {str(actions)[:40]}; allowed: {words} for each of {self.count} robots")
+        return values * self.plants.held.duty if self.on_off else values
 
     def _flow(self) -> Samples | None:
         if self.plants.held.flow is None:
@@ -232,7 +252,7 @@ class Task:
 
 
 class StopAt(Task):
-    """Stop at a place with a remote that knows on and off."""
+    """Stop at a place, whose distance in m is drawn, with a remote that knows on and off."""
 
     observed = (
         Observed("distance", "mm", -100.0, 100.0),
@@ -240,39 +260,15 @@ class StopAt(Task):
         Observed("command", "1", 0.0, 1.0),
         Observed("time_left", "1", 0.0, 1.0),
     )
-    score_unit = "mm"
-
-    def __init__(self, count: int, *, goal: tuple[float, float] = (1e-3, 6e-3), **more: Any) -> None:
-        """As `Task`, with goals drawn evenly from a range of distances.
-
-        Args:
-            count: how many robots.
-            goal: least and largest distance, m.
-            more: arguments of `Task`.
-
-        Raises:
-            InputError: for wrong input.
-        """
-        super().__init__(count, **more)
-        self._range = _range_of("goal", goal)
+    goals = (1e-3, 6e-3)
+    on_off = True
 
     def scores(self) -> Samples:
         """Distance from the goal, mm."""
         return _MM * np.abs(self.position - self.goal)
 
-    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
-        return rng.uniform(*self._range, count)
-
-    def _duty(self, actions: np.ndarray) -> Samples:
-        asked = _numbers(actions)
-        if len(asked) != self.count or not np.isin(asked, (0, 1)).all():
-            raise InputError(
-                f"action = {str(actions)[:40]}; allowed: 0 (off) or 1 (on) for each of {self.count} robots"
-            )
-        return np.where(asked == 1, self.plants.held.duty, 0.0)
-
-    def _reward(self) -> Samples:
-        return -self.scores()
+    def _goal_scale(self) -> float:
+        return 1.0
 
     def _observation(self, rng: np.random.Generator) -> list[Samples]:  # noqa: ARG002 - no sensor but the camera
         place, speed = self._seen()
@@ -280,7 +276,7 @@ class StopAt(Task):
 
 
 class HoldSpeed(Task):
-    """Swim at a speed, by the duty of the drive."""
+    """Swim at a speed, drawn as a share of the steady speed of the robot as its file says, by the drive's duty."""
 
     observed = (
         Observed("target", "mm/s", -20.0, 20.0),
@@ -289,39 +285,15 @@ class HoldSpeed(Task):
         Observed("duty", "1", 0.0, 1.0),
         Observed("time_left", "1", 0.0, 1.0),
     )
-    score_unit = "1"
-
-    def __init__(self, count: int, *, goal: tuple[float, float] = (0.3, 0.8), **more: Any) -> None:
-        """As `Task`, with target speeds drawn evenly.
-
-        Args:
-            count: how many robots.
-            goal: least and largest target, as shares of the steady speed of the robot as its file says.
-            more: arguments of `Task`.
-
-        Raises:
-            InputError: for wrong input.
-        """
-        super().__init__(count, **more)
-        self._range = _range_of("goal", goal)
+    goals = (0.3, 0.8)
+    on_off = False
 
     def scores(self) -> Samples:
         """Relative error of the speed."""
         return np.abs(self.speed / self.goal - 1.0)
 
-    def _goals(self, count: int, rng: np.random.Generator) -> Samples:
-        return self.plants.held.prediction.forward_velocity * rng.uniform(*self._range, count)
-
-    def _duty(self, actions: np.ndarray) -> Samples:
-        asked = _numbers(actions)
-        if len(asked) != self.count or not ((asked >= 0.0) & (asked <= 1.0)).all():
-            raise InputError(
-                f"action = {str(actions)[:40]}; allowed: a duty from 0 to 1 for each of {self.count} robots"
-            )
-        return asked
-
-    def _reward(self) -> Samples:
-        return -self.scores()
+    def _goal_scale(self) -> float:
+        return self.plants.held.prediction.forward_velocity
 
     def _observation(self, rng: np.random.Generator) -> list[Samples]:
         noise = self.lab.meter.current_noise * rng.standard_normal(self.count)
@@ -329,12 +301,8 @@ class HoldSpeed(Task):
         return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._commands.ago(0), self._time_left()]
 
 
-def _numbers(actions: Any) -> Samples:
-    """Actions as numbers in a row; none where they are no numbers."""
-    try:
-        return np.asarray(actions, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError, OverflowError):
-        return np.empty(0)
+TASKS: dict[str, type[Task]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
+"""Tasks by the names of their environments."""
 
 
 def _range_of(name: str, given: Any) -> tuple[float, float]:
