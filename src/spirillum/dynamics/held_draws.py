@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from spirillum.argument_kinds import as_number
-from spirillum.arrays import PerRobot, Samples
-from spirillum.dynamics.held_model import PARAMETERS, HeldModel
+from spirillum.arrays import Samples
+from spirillum.dynamics.held_model import PARAMETERS, HeldModel, responses
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
-from spirillum.robot.batch import RobotBatch, batches
-from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
-from spirillum.swimming.steady import calibrated_balance
+from spirillum.robot.batch import batches
 
 __all__ = ["FACTORS", "checked_ranges", "drawn_numbers", "posterior_numbers"]
 
@@ -69,32 +67,8 @@ def drawn_numbers(
             numbers[:, _NAMES.index(name)] = rng.uniform(low, high, count)
     if any(name in ranges for name in FACTORS):
         friction = held.prediction.effective_friction * factors["friction"]
-        numbers[:, _FIRST_RESPONSE:] = _responses(held, held.prediction.batch, friction, factors["viscosity"])
+        numbers[:, _FIRST_RESPONSE:] = responses(held.prediction, held.prediction.batch, friction, factors["viscosity"])
     return numbers
-
-
-def _responses(held: HeldModel, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
-    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6).
-
-    Args:
-        held: the robot, whose model, friction reading and place they share.
-        batch: the robots, or one for all.
-        effective: effective friction of each, N m s/rad, (n,).
-        viscosity: factor of each; in Stokes flow all resistances, and the wrench of a flow, are in proportion to it.
-    """
-    steady = held.prediction
-    flow = None if held.flow is None else 1.0
-    batch = batch.placed(steady.batch.placement.model_copy(update={"flow": flow}))
-    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
-    if viscosity is not None:
-        s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
-    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
-    t = friction_torques(steady.friction, effective, rotor)
-    body, tail = rates_per_torque(s, t)
-    coasting_body, coasting_tail = coasting_rates(s, t)
-    columns = [s._replace(u_0=np.zeros(1)).speed(body, tail), body, tail]
-    columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
-    return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
 
 
 def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Samples:
@@ -120,5 +94,5 @@ def posterior_numbers(held: HeldModel, posterior: str | Path, count: int) -> Sam
     for rows, batch in batches(drawn):
         own = np.full(batch.size, steady.effective_friction)
         effective = np.where(np.isnan(batch.effective_friction), own, batch.effective_friction)
-        numbers[rows, _FIRST_RESPONSE:] = _responses(held, batch, effective)
+        numbers[rows, _FIRST_RESPONSE:] = responses(steady, batch, effective)
     return numbers

@@ -73,7 +73,14 @@ def rates(p: Mapping[str, float], current: float, duty: float, flow: float) -> S
 
 
 def outputs(p: Mapping[str, float], state: Samples, duty: float, flow: float) -> Samples:
-    """All of `OUTPUTS`, (12,); arguments as `rates`, with the whole state."""
+    """All of `OUTPUTS`, (12,).
+
+    Args:
+        p: the robot's numbers by name, see `held_model.PARAMETERS`.
+        state: (5,), see `held_model.STATES`.
+        duty: 0 to 1.
+        flow: imposed mean flow, m/s.
+    """
     current = float(state[0])
     speed, tail, body = rates(p, current, duty, flow)[1:4]
     voltage = p["battery.voltage"] - p["battery.internal_resistance"] * abs(current)

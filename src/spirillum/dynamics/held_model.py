@@ -13,19 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from spirillum.arrays import Samples
-from spirillum.dynamics.held import axial_response
+from spirillum.arrays import PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
-from spirillum.robot.batch import Electrics
+from spirillum.robot.batch import Electrics, RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.swimming.balance import coasting_rates, friction_torques
+from spirillum.swimming.balance import coasting_rates, friction_torques, rates_per_torque
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.steady import calibrated_balance
 
-__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "held_model"]
+__all__ = ["PARAMETERS", "STATES", "HeldModel", "Parameter", "held_model", "responses"]
 
 
 class Parameter(NamedTuple):
@@ -127,33 +126,43 @@ def held_model(
         InputError: for wrong input, another drive, or a robot or place that the model does not know.
     """
     placed = Placement.of(placement)
-    still = placed if placed.flow is None else placed.model_copy(update={"flow": 0.0})
     steady = predict(
         robot,
         model=model,
         friction=friction,
         calibrated=calibrated,
         calibration=calibration,
-        placement=still if placed.is_given else None,
+        placement=placed if placed.is_given else None,
         band=False,
     )
     motor = steady.batch.electrics
     if steady.batch.drive != "dc-motor" or motor is None:
         raise InputError(f"drive.kind = '{steady.batch.drive}'; allowed: 'dc-motor', which alone has a motor to switch")
-    response = axial_response(steady.batch, steady)
-    per_flow = np.zeros(3) if placed.flow is None else _per_flow(steady)
-    if placed.flow is not None:
-        steady = predict(
-            robot,
-            model=steady.model.name,
-            friction=friction,
-            calibrated=calibrated,
-            calibration=calibration,
-            placement=placed,
-            band=False,
-        )
-    values = (*_of_motor(motor), response.speed, response.body_rate, response.tail_rate, *per_flow.tolist())
-    return HeldModel(steady, values)
+    response = responses(steady, steady.batch, np.array([steady.effective_friction]))[0]
+    return HeldModel(steady, (*_of_motor(motor), *response.tolist()))
+
+
+def responses(steady: Prediction, batch: RobotBatch, effective: PerRobot, viscosity: PerRobot | None = None) -> Samples:
+    """(U, Omega, omega) per joint torque, then per imposed flow, of robots, (n, 6); the latter 0 without a flow.
+
+    Args:
+        steady: a prediction whose model, calibration, friction reading and place the robots share.
+        batch: the robots, or one for all.
+        effective: effective friction of each, N m s/rad, (n,).
+        viscosity: factor of each; in Stokes flow all resistances, and the wrench of a flow, are in proportion to it.
+    """
+    place = steady.batch.placement
+    batch = batch.placed(place if place.flow is None else place.model_copy(update={"flow": 1.0}))
+    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
+    if viscosity is not None:
+        s = s._replace(**{name: getattr(s, name) * viscosity for name in ("bb", "br", "rb", "rr", "t_b", "t_r")})
+    rotor = np.zeros(1) if batch.electrics is None else batch.electrics.joint_rotor_friction
+    t = friction_torques(steady.friction, effective, rotor)
+    body, tail = rates_per_torque(s, t)
+    coasting_body, coasting_tail = coasting_rates(s, t)
+    columns = [s._replace(u_0=np.zeros(1)).speed(body, tail), body, tail]
+    columns += [s.speed(coasting_body, coasting_tail), coasting_body, coasting_tail]
+    return np.stack([np.broadcast_to(column, effective.shape) for column in columns], axis=-1)
 
 
 def _of_motor(motor: Electrics) -> tuple[float, ...]:
@@ -172,13 +181,3 @@ def _of_motor(motor: Electrics) -> tuple[float, ...]:
         motor.polarity,
     )
     return tuple(float(column[0]) for column in columns)
-
-
-def _per_flow(steady: Prediction) -> Samples:
-    """(U, Omega, omega) per imposed mean flow while the motor gives no torque."""
-    batch = steady.batch.placed(steady.batch.placement.model_copy(update={"flow": 1.0}))
-    s = calibrated_balance(batch, steady.model, calibrated=steady.calibrated)
-    motor = batch.electrics
-    rotor = np.zeros(1) if motor is None else motor.joint_rotor_friction
-    body, tail = coasting_rates(s, friction_torques(steady.friction, np.array([steady.effective_friction]), rotor))
-    return np.array([float(s.speed(body, tail)[0]), float(body[0]), float(tail[0])])
