@@ -10,7 +10,7 @@ import pytest
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
-from spirillum.controllers.sensors import FlowPulse, drawn
+from spirillum.controllers.sensors import FlowPulse, draw
 from spirillum.controllers.signals import News
 
 SPEED = 1e-3
@@ -95,7 +95,7 @@ def test_runs_of_one_seed_meet_the_same_errors_under_any_controller(toy: Any) ->
 
 def test_draws_stay_within_their_factor() -> None:
     settings = Lab.of({"unknown": {"friction_factor": 3.0, "gap_factor": 2.0}})
-    found = [drawn(settings.unknown, settings.pulse, seed, 50.0) for seed in range(400)]
+    found = [draw(settings.unknown, settings.pulse, seed, 50.0) for seed in range(400)]
     for name, factor in (("friction", 3.0), ("gap", 2.0)):
         logs = np.log([getattr(one, name) for one in found]) / np.log(factor)
         assert np.abs(logs).max() <= 1.0

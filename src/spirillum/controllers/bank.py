@@ -1,4 +1,4 @@
-"""A bank of robots that differ in what is unknown and do what the real one is told: the model of the learner.
+"""A bank of robots that differ in what is unknown and get the commands of the real one: the model of the learner.
 
 The unknown factors of friction and gap are u, v in [-1, 1] as powers of their largest factors. The members stand at
 Chebyshev's points of both; between them a polynomial in u and v interpolates what they do (Trefethen 2013). Two more
@@ -22,10 +22,8 @@ from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Moment, Plant, uninterrupted
 from spirillum.robot.robot import Robot
 
-__all__ = ["QUANTITIES_OF_BANK", "Bank", "Paths", "interpolation", "points"]
+__all__ = ["Bank", "Paths", "interpolation", "points"]
 
-QUANTITIES_OF_BANK = ("tail_phase", "body_angle", "motor_current", "battery_voltage")
-"""What is kept of every member."""
 _POINTS = 5
 _STEP = 0.1
 """Between two moments that are kept, s."""
@@ -40,11 +38,11 @@ def points(factor: float) -> Samples:
 
 def interpolation(nodes: Samples, at: Samples) -> Samples:
     """Weights of the values at nodes for the polynomial through them, (at, nodes)."""
-    found = np.ones((at.size, nodes.size))
+    weights = np.ones((at.size, nodes.size))
     for number, node in enumerate(nodes):
         for other in np.delete(nodes, number):
-            found[:, number] *= (at - other) / (node - other)
-    return found
+            weights[:, number] *= (at - other) / (node - other)
+    return weights
 
 
 @dataclass(frozen=True)
@@ -54,9 +52,9 @@ class Paths:
     time: Samples
     """s, (n,)."""
     members: Samples
-    """(friction, gap, quantity, n)."""
+    """Tail's phase and body's angle, rad, current, A, and voltage, V, (friction, gap, 4, n)."""
     sensitivity: Samples
-    """Relative change of each quantity per relative one of voltage and viscosity, (friction, 2, quantity, n)."""
+    """Relative change of each quantity per relative one of voltage and viscosity, (friction, 2, 4, n)."""
 
 
 class Bank:
@@ -82,20 +80,20 @@ class Bank:
         """
         self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)
         factors = [float(unknown.friction_factor**u) for u in self.friction]
-        places = [Drawn(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
+        members = [Drawn(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]
         for factor in factors:
-            places += [Drawn(factor, 1.0, None, 1.0 + _CHANGE), Drawn(factor, 1.0, None, 1.0, 1.0 + _CHANGE)]
+            members += [Drawn(factor, 1.0, None, 1.0 + _CHANGE), Drawn(factor, 1.0, None, 1.0, 1.0 + _CHANGE)]
         self._plants: list[Plant] = []
-        for place in places:
-            self._plants.append(plant_of(robot, arguments or {}, place))
+        for member in members:
+            self._plants.append(plant_of(robot, arguments or {}, member))
             if progress is not None:
-                progress("bank of robots", len(self._plants), len(places))
+                progress("bank of robots", len(self._plants), len(members))
         self._time = [0.0]
-        self._rows = [np.array([_kept(plant.observe()) for plant in self._plants])]
+        self._rows = [[_quantities(plant.observe()) for plant in self._plants]]
 
     @property
     def time(self) -> float:
-        """Until when they have gone, s."""
+        """Up to when the members are simulated, s."""
         return self._time[-1]
 
     @property
@@ -109,25 +107,25 @@ class Bank:
         return float(abs(self._plants[0].steady.motor_current))
 
     def follow(self, time: float, duty: float) -> None:
-        """Let all members go on to a time at a duty."""
+        """Simulate all members up to a time at a duty."""
         while time - self.time > 1e-9:
             dt = min(_STEP, time - self.time)
             moments = [uninterrupted(plant.step(dt, duty=duty)) for plant in self._plants]
             self._time.append(moments[0].time)
-            self._rows.append(np.array([_kept(moment) for moment in moments]))
+            self._rows.append([_quantities(moment) for moment in moments])
 
     def paths(self) -> Paths:
-        """What they have done."""
+        """What the members have done so far."""
         rows = np.moveaxis(np.array(self._rows), 0, -1)
         count = self.friction.size * self.gap.size
-        members = rows[:count].reshape(self.friction.size, self.gap.size, len(QUANTITIES_OF_BANK), -1)
-        changed = rows[count:].reshape(self.friction.size, 2, len(QUANTITIES_OF_BANK), -1)
-        own = members[:, self.gap.size // 2, None]
+        members = rows[:count].reshape(self.friction.size, self.gap.size, *rows.shape[1:])
+        changed = rows[count:].reshape(self.friction.size, 2, *rows.shape[1:])
+        unchanged = members[:, self.gap.size // 2, None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            sensitivity = np.nan_to_num((changed / own - 1.0) / _CHANGE, posinf=0.0, neginf=0.0)
+            sensitivity = np.nan_to_num((changed / unchanged - 1.0) / _CHANGE, posinf=0.0, neginf=0.0)
         return Paths(np.array(self._time), members, sensitivity)
 
 
-def _kept(moment: Moment) -> list[float]:
+def _quantities(moment: Moment) -> list[float]:
     values = moment.values
     return [moment.pose.tail_phase, values["body_angle"], values["motor_current"], values["battery_voltage"]]

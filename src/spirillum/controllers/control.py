@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 import time as clock
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spirillum.answer import envelope, quantity
 from spirillum.controllers.bank import Bank
 from spirillum.controllers.drawn_plant import plant_of
-from spirillum.controllers.jobs import Job, Outcome, begun, done, finished, named
+from spirillum.controllers.jobs import Job, Outcome, draw_plant, outcome_of, run_job
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learner import Learner
 from spirillum.controllers.learning import Learnt
@@ -24,6 +23,7 @@ from spirillum.controllers.scores import Scores, scored
 from spirillum.controllers.sensors import Drawn
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.processes import as_they_come
 from spirillum.robot.fields import field_values
@@ -63,15 +63,12 @@ class Control(Shown):
     late: float | None
     """Live: by how much the last decision was late against the clock on the wall, s."""
     learnt: Learnt | None
-    """What was learnt of the robot by the end of the run, if that was asked for and there was enough to see."""
+    """Friction and gap as estimated by the end of the run; None without `learn` or with too few data."""
     scores: Scores | None
-    """Over many seeds, if they were asked for."""
+    """Over many seeds; None without `seeds`."""
+    interrupted: bool
+    """Whether run or scores were interrupted; what was done until then is here."""
     warnings: tuple[str, ...]
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether run or scores were interrupted; what was done is here."""
-        return self.run.interrupted or any(line.startswith("interrupted") for line in self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
         """The answer as data; with `settings`, `task`, `lab` and `seed` the run can be done again."""
@@ -88,7 +85,7 @@ class Control(Shown):
             "duration": quantity(last.time, "s"),
             "final_position_x": quantity(float(last.pose.position[0]), "m"),
             "electrical_energy": quantity(self.score.energy, "J"),
-            "time_on": quantity(_time_on(run), "s"),
+            "time_on": quantity(run.time_on, "s"),
             "ended": run.ended or None,
             "motor_off_at_end": last.values["duty"] == 0.0,
             "late": quantity(self.late, "s") if self.late is not None else None,
@@ -159,52 +156,35 @@ def control(
     Raises:
         InputError: for wrong input, or a task that the robot cannot be asked for.
     """
-    asked, there, arguments = task_of(task), Lab.of(lab), dict(plant or {})
+    task, lab, arguments = task_of(task), Lab.of(lab), dict(plant or {})
     _check(controller, seed, seeds, workers, arguments)
-    own = load(robot)
-    said: list[str] = []
-    nominal = plant_of(own, arguments, Drawn(1.0, 1.0), progress)
-    if there.pulse.velocity and nominal.model != "tube":
-        said.append(f"model '{nominal.model}' knows no flow: there is no pulse")
-        there = there.model_copy(update={"pulse": there.pulse.model_copy(update={"velocity": 0.0})})
-    brief = asked.brief(nominal, there, progress)
-    job = Job(own, arguments, asked, brief, controller, seed)
-    moving, found = begun(job)
-    learner = Learner(there, Bank(own, there.unknown, arguments, progress)) if learn else None
+    robot = load(robot)
+    nominal = plant_of(robot, arguments, Drawn(1.0, 1.0), progress)
+    lab, cautions = _without_unknown_flow(lab, nominal.model)
+    job = Job(robot, arguments, task, task.brief(nominal, lab, progress), controller, seed)
+    actual, drawn = draw_plant(job)
+    learner = Learner(lab, Bank(robot, lab.unknown, arguments, progress)) if learn else None
     pace = _Pace() if live else None
-    run = done(job, moving, found, learner, pace=pace, progress=progress)
-    scores = None
-    if seeds and not run.interrupted:
-        outcomes = _all(job, seeds, workers, progress)
-        scores = scored(asked, outcomes) if outcomes else None
-        if len(outcomes) < seeds * len(CONTROLLERS):
-            said.append(f"interrupted after {len(outcomes)} of {seeds * len(CONTROLLERS)} runs: scores are of these")
-    score = asked.score(run, brief)
-    dataset = record(run, moving)
-    settings = {"task": {"kind": asked.kind, **asked.model_dump()}, "lab": there.model_dump(), "controller": controller}
-    dataset = dataset.assign_attrs(
-        control=json.dumps({**settings, "seed": seed}, sort_keys=True),
-        task=asked.kind,
-        controller=controller,
-        seed=seed,
-        warnings="\n".join([*moving.steady.warnings, *said, *_of(run)]),
-    )
+    run = run_job(job, actual, drawn, learner, pace=pace, progress=progress)
+    scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
+    warnings = (*actual.steady.warnings, *cautions, *cut_short, *_warnings_of(run))
     return Control(
-        robot=own,
-        model=moving.model,
-        task=asked,
-        lab=there,
+        robot=robot,
+        model=actual.model,
+        task=task,
+        lab=lab,
         controller=controller,
         seed=seed,
-        speed=brief.speed,
-        drawn=found,
-        score=score,
+        speed=job.brief.speed,
+        drawn=drawn,
+        score=task.score(run, job.brief),
         run=run,
-        dataset=dataset,
+        dataset=_dataset(job, run, actual, warnings),
         late=None if pace is None else pace.late,
-        learnt=None if learner is None else learner.found,
+        learnt=None if learner is None else learner.learnt,
         scores=scores,
-        warnings=(*moving.steady.warnings, *said, *_of(run)),
+        interrupted=run.interrupted or bool(cut_short),
+        warnings=warnings,
     )
 
 
@@ -212,31 +192,58 @@ class _Pace:
     """The clock on the wall."""
 
     def __init__(self) -> None:
-        self._begun: float | None = None
+        self._start: float | None = None
         self.late = 0.0
 
     def __call__(self, time: float) -> None:
         """Wait for a time of the run."""
-        if self._begun is None:
-            self._begun = clock.monotonic() - time
-        left = self._begun + time - clock.monotonic()
+        if self._start is None:
+            self._start = clock.monotonic() - time
+        left = self._start + time - clock.monotonic()
         if left > 0.0:
             clock.sleep(left)
         self.late = max(0.0, -left)
 
 
-def _all(job: Job, seeds: int, workers: int, progress: Progress | None) -> list[Outcome]:
-    """Every controller from every seed, seed by seed; with an interrupt those that are done."""
-    jobs = [named(job, name, job.seed + number) for number in range(seeds) for name in CONTROLLERS]
-    found: list[Outcome] = []
+def _without_unknown_flow(lab: Lab, model: str) -> tuple[Lab, list[str]]:
+    """A lab without the pulse of flow where a model knows no flow, and the sentence that says so."""
+    if model == "tube" or not lab.pulse.velocity:
+        return lab, []
+    still = lab.pulse.model_copy(update={"velocity": 0.0})
+    return lab.model_copy(update={"pulse": still}), [f"model '{model}' knows no flow: there is no pulse"]
+
+
+def _scores(job: Job, seeds: int, workers: int, progress: Progress | None) -> tuple[Scores | None, list[str]]:
+    """Scores of every controller from every seed; with an interrupt of the runs that are done, and a sentence."""
+    jobs = [replace(job, controller=name, seed=job.seed + n) for n in range(seeds) for name in CONTROLLERS]
+    outcomes: list[Outcome] = []
     try:
-        for _job, outcome in as_they_come(finished, jobs, workers):
-            found.append(outcome)
+        for _job, outcome in as_they_come(outcome_of, jobs, workers):
+            outcomes.append(outcome)
             if progress is not None:
-                progress("scored runs", len(found), len(jobs))
+                progress("scored runs", len(outcomes), len(jobs))
     except KeyboardInterrupt:
         pass
-    return found
+    complete = len(outcomes) == len(jobs)
+    sentence = f"interrupted after {len(outcomes)} of {len(jobs)} runs: scores are of these"
+    return scored(job.task, outcomes) if outcomes else None, [] if complete else [sentence]
+
+
+def _dataset(job: Job, run: LoopRun, plant: Plant, warnings: tuple[str, ...]) -> xr.Dataset:
+    """The run as a dataset, with all that it can be done again from."""
+    settings = {
+        "task": {"kind": job.task.kind, **job.task.model_dump()},
+        "lab": job.brief.lab.model_dump(),
+        "controller": job.controller,
+        "seed": job.seed,
+    }
+    return record(run, plant).assign_attrs(
+        control=json.dumps(settings, sort_keys=True),
+        task=job.task.kind,
+        controller=job.controller,
+        seed=job.seed,
+        warnings="\n".join(warnings),
+    )
 
 
 def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapping[str, Any]) -> None:
@@ -255,14 +262,14 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
             raise InputError(f"plant.{str(name)[:60]} is not known{hint}; allowed: {', '.join(_ALLOWED)}")
 
 
-def _of(run: LoopRun) -> list[str]:
+def _warnings_of(run: LoopRun) -> list[str]:
     """What to be careful about in a run."""
-    said = []
+    warnings = []
     if run.silent is not None:
-        said.append(f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}")
+        warnings.append(f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}")
     if run.ended:
-        said.append(f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off")
-    return said
+        warnings.append(f"the run ended at {show(run.moments[-1].time, 's')}: {run.ended}; the drive is off")
+    return warnings
 
 
 def _fields(options: Any) -> dict[str, Any]:
@@ -271,7 +278,3 @@ def _fields(options: Any) -> dict[str, Any]:
         item.path: item.value if item.unit is None or item.value is None else quantity(item.value, item.unit)
         for item in field_values(options)
     }
-
-
-def _time_on(run: LoopRun) -> float:
-    return sum(after.time - before.time for before, after in pairwise(run.moments) if after.values["duty"] > 0.0)

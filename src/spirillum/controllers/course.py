@@ -1,7 +1,7 @@
 """Controllers of speed: by PWM at a set speed, along a course through pulses of flow, and with the remote alone.
 
 The follower (`spirillum.controllers.follower`) gives place x, speed s at full duty and drift w of the fluid; v is the
-speed that is asked for, t the time, d = 1 or -1 the robot's way.
+set speed, t the time, d = 1 or -1 the robot's way.
 
 `HoldSpeed`, proportional and integral with back-calculation against windup (Astrom and Hagglund 2006):
 
@@ -29,7 +29,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.follower import Follower
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import News, Sight
+from spirillum.controllers.signals import Controller, News, Sight
 
 __all__ = ["HoldSpeed", "KeepCourse", "SaveBattery", "Steady"]
 
@@ -48,11 +48,8 @@ _SLOWEST = 0.05
 _EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
 
 
-class _Watching:
-    """What follows the robot and says so; one that knows is told place and coming flow."""
-
-    blind = False
-    knowing = False
+class _Watching(Controller):
+    """A controller that follows the robot; one that knows is told place and coming flow."""
 
     def __init__(self, lab: Lab, speed: float, duty: float, *, knowing: bool = False) -> None:
         """Begin.
@@ -102,12 +99,19 @@ class _Watching:
 class HoldSpeed(_Watching):
     """A set speed by PWM."""
 
-    def __init__(self, lab: Lab, speed: float, duty: float, asked: float) -> None:
-        """Begin; `asked` is the speed that is to be held, m/s, without sign."""
+    def __init__(self, lab: Lab, speed: float, duty: float, set_speed: float) -> None:
+        """Begin.
+
+        Args:
+            lab: sensors and remote.
+            speed: predicted while the drive is on, m/s, with its sign.
+            duty: of the drive while it is on.
+            set_speed: speed that is to be held, m/s, without sign.
+        """
         super().__init__(lab, speed, duty)
-        self._asked = self._way * asked
+        self._set_speed = self._way * set_speed
         self._closed = _CLOSED + lab.camera.latency + lab.remote.delay + 0.5 * (lab.remote.period + _WINDOW)
-        self._integral, self._before = 0.0, 0.0
+        self._integral, self._decided_at = 0.0, 0.0
         self._places: deque[tuple[float, float]] = deque()
 
     def decide(self, news: News) -> float:
@@ -116,14 +120,14 @@ class HoldSpeed(_Watching):
         self._places.append((news.time, float(self._now[0])))
         while len(self._places) > 1 and self._places[1][0] <= news.time - _WINDOW:
             self._places.popleft()
-        (then, before), (now, place) = self._places[0], self._places[-1]
-        error = self._asked - (place - before) / (now - then) if now - then > 0.5 * _WINDOW else 0.0
-        wanted = (self._asked + _PROPORTIONAL * error) / full + self._integral
-        held = float(np.clip(wanted, 0.0, 1.0))
-        dt = news.time - self._before
-        self._integral += dt * (error / (full * self._closed) + (held - wanted) / _BACK)
-        self._before = news.time
-        return self._sent(news, held)
+        (start, first), (end, last) = self._places[0], self._places[-1]
+        error = self._set_speed - (last - first) / (end - start) if end - start > 0.5 * _WINDOW else 0.0
+        unlimited = (self._set_speed + _PROPORTIONAL * error) / full + self._integral
+        duty = float(np.clip(unlimited, 0.0, 1.0))
+        dt = news.time - self._decided_at
+        self._integral += dt * (error / (full * self._closed) + (duty - unlimited) / _BACK)
+        self._decided_at = news.time
+        return self._sent(news, duty)
 
 
 class KeepCourse(_Watching):
@@ -134,7 +138,7 @@ class KeepCourse(_Watching):
         lab: Lab,
         speed: float,
         duty: float,
-        asked: float,
+        set_speed: float,
         *,
         knowing: bool = False,
         flow: FlowPulse | None = None,
@@ -146,13 +150,13 @@ class KeepCourse(_Watching):
             lab: sensors and remote.
             speed: predicted while the drive is on, m/s, with its sign.
             duty: of the drive while it is on.
-            asked: speed of the course, m/s, without sign.
+            set_speed: speed of the course, m/s, without sign.
             knowing: whether it is told the truth.
             flow: for one that knows: the pulse.
             carried: way of the robot over the way of the mean flow.
         """
         super().__init__(lab, speed, duty, knowing=knowing)
-        self._asked, self._flow, self._carried = self._way * asked, flow, carried
+        self._set_speed, self._flow, self._carried = self._way * set_speed, flow, carried
 
     def decide(self, news: News) -> float:
         """The duty that leads back to the course in T, by the robot as it is estimated."""
@@ -160,34 +164,42 @@ class KeepCourse(_Watching):
         drift = ahead[2]
         if self._flow is not None and self._flow.start <= acts <= self._flow.end:
             drift = self._carried * self._flow.velocity
-        wanted = (self._asked + (self._asked * acts - ahead[0]) / _CATCH_UP - drift) / ahead[1]
-        return self._sent(news, float(np.clip(wanted, 0.0, 1.0)))
+        unlimited = (self._set_speed + (self._set_speed * acts - ahead[0]) / _CATCH_UP - drift) / ahead[1]
+        return self._sent(news, float(np.clip(unlimited, 0.0, 1.0)))
 
 
 class SaveBattery(_Watching):
     """A course at a set mean speed, with a remote that knows on and off."""
 
     def __init__(
-        self, lab: Lab, speed: float, duty: float, asked: float, band: float, *, knowing: bool = False
+        self, lab: Lab, speed: float, duty: float, set_speed: float, band: float, *, knowing: bool = False
     ) -> None:
-        """Begin; `asked` is the mean speed, m/s, without sign, `band` the half width of the relay, m."""
+        """Begin.
+
+        Args:
+            lab: sensors and remote.
+            speed: predicted while the drive is on, m/s, with its sign.
+            duty: of the drive while it is on.
+            set_speed: mean speed of the course, m/s, without sign.
+            band: half width of the relay, m.
+            knowing: whether it is told the truth.
+        """
         super().__init__(lab, speed, duty, knowing=knowing)
-        self._asked, self._band = asked, band
+        self._set_speed, self._band = set_speed, band
         self._on = True
 
     def decide(self, news: News) -> float:
         """On where the robot has fallen behind, off where it is ahead."""
         ahead = self._follow(news)
-        left = self._asked * (news.time + self._delay) - self._way * ahead[0]
+        left = self._set_speed * (news.time + self._delay) - self._way * ahead[0]
         self._on = left > (-self._band if self._on else self._band)
         return self._sent(news, self._duty if self._on else 0.0)
 
 
-class Steady:
+class Steady(Controller):
     """Open loop: a duty throughout, or on for a share of each cycle."""
 
     blind = True
-    knowing = False
 
     def __init__(self, duty: float, *, share: float = 1.0, cycle: float = 5.0) -> None:
         """Begin.
@@ -200,9 +212,5 @@ class Steady:
         self._duty, self._share, self._cycle = duty, share, cycle
 
     def decide(self, news: News) -> float:
-        """The same in every cycle."""
+        """The duty in the first part of each cycle, off in the rest."""
         return self._duty if (news.time / self._cycle) % 1.0 < self._share else 0.0
-
-    def estimate(self) -> Mapping[str, float]:
-        """Nothing."""
-        return {}

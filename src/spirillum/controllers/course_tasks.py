@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -13,11 +14,12 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
-from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy, positive
+from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.errors import InputError
-from spirillum.robot.fields import LengthOrZero, Velocity
+from spirillum.robot.arguments import refusal
+from spirillum.robot.fields import Length, Velocity
 from spirillum.units import show
 
 __all__ = ["HoldSpeedTask", "RideOutTask", "SaveBatteryTask"]
@@ -30,18 +32,26 @@ _SPEED_OVER = 2.0
 """Time over which a speed is taken, s."""
 _WITHIN = 0.05
 """Relative error of a speed that is good."""
+_BAND = 5e-4
+"""Half the width of the band around the course: what is good in `ride-out`, m."""
+_RELAY = 0.4
+"""Half the width of the relay's band over the tolerance."""
+
+
+def _check_forward(speed: float) -> float:
+    if not speed > 0.0:
+        raise refusal(f"= {speed:g} m/s; allowed: above 0 m/s")
+    return speed
 
 
 class _CourseTask(Task):
     """What the tasks of speed share."""
 
-    speed: Annotated[
-        Velocity | None, AfterValidator(lambda value: value if value is None else positive(value, "m/s"))
-    ] = None
+    speed: Annotated[Velocity, AfterValidator(_check_forward)] | None = None
     """Speed along the robot's way. It has to be given."""
 
     @property
-    def asked(self) -> float:
+    def set_speed(self) -> float:
         """`speed`, m/s.
 
         Raises:
@@ -54,59 +64,63 @@ class _CourseTask(Task):
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:
         """Check that the robot of the file swims so fast, and find the duty at which it does."""
         duration = _DURATION if self.duration is None else self.duration
-        speed, own = float(plant.steady.forward_velocity), plant.state.command
+        speed, full_duty = float(plant.steady.forward_velocity), plant.state.command
         way = float(np.sign(speed))
-        asked = self.asked
-        fastest = way * _mean_speed(plant, own, duration, progress)
-        if not asked < fastest:
+        fastest = way * _mean_speed(plant, full_duty, duration, progress)
+        if not self.set_speed < fastest:
             raise InputError(
-                f"task.speed = {show(asked, 'mm/s')}; allowed: below {show(fastest, 'mm/s')}, the mean of "
+                f"task.speed = {show(self.set_speed, 'mm/s')}; allowed: below {show(fastest, 'mm/s')}, the mean of "
                 f"{duration:g} s at the robot's own duty"
             )
-        first = own * asked / fastest
-        found = way * _mean_speed(plant, first, duration, progress)
-        power = np.log(fastest / found) / np.log(own / first) if 0.0 < found < fastest else 1.0
-        duty = float(min(own * (asked / fastest) ** (1.0 / power), 1.0))
+        share = self.set_speed / fastest
+        slower = way * _mean_speed(plant, share * full_duty, duration, progress)
+        power = np.log(slower / fastest) / np.log(share) if 0.0 < slower < fastest else 1.0
         return Brief(
             lab=lab,
             duration=duration,
             speed=speed,
-            duty=own,
-            schedule=(asked / fastest, duty),
+            duty=full_duty,
+            schedule=(share, float(min(full_duty * share ** (1.0 / power), 1.0))),
             carried=carried_by_flow(plant, lab.pulse.velocity, lab.pulse.duration),
         )
 
-    def _way_missed(self, run: LoopRun, brief: Brief) -> float:
-        """Way of the run less that of the course, m."""
-        time, place = _path(run)
-        gone = float(np.interp(brief.duration, time, place) - place[0])
-        return brief.way * gone - self.asked * brief.duration
+    def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
+        """A new controller; doing nothing leaves the drive on."""
+        if name == FEEDBACK:
+            return self._feedback(brief)
+        if name == "knowing":
+            return KeepCourse(
+                brief.lab, brief.speed, brief.duty, self.set_speed, knowing=True, flow=flow, carried=brief.carried
+            )
+        return Steady(brief.schedule[1] if name == "open-loop" else brief.duty)
+
+    @abstractmethod
+    def _feedback(self, brief: Brief) -> Controller:
+        """The task's own controller."""
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
         """The course."""
-        return way * self.asked * time, 5e-4
+        return way * self.set_speed * time, _BAND
 
 
 class HoldSpeedTask(_CourseTask):
-    """Hold a speed by PWM."""
+    """Hold a speed by PWM: good within 5 %. Speeds are over 2 s, so that turns of the tail and a pulse do not count."""
 
     kind: ClassVar[str] = "hold-speed"
     error_name: ClassVar[str] = "median speed of the second half less that asked for"
     error_unit: ClassVar[str] = "m/s"
 
-    def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
-        """A new controller; doing nothing leaves the drive on."""
-        if name == FEEDBACK:
-            return HoldSpeed(brief.lab, brief.speed, brief.duty, self.asked)
-        return _reference(name, brief, self.asked, flow)
+    def _feedback(self, brief: Brief) -> Controller:
+        return HoldSpeed(brief.lab, brief.speed, brief.duty, self.set_speed)
 
-    def score(self, run: LoopRun, brief: Brief) -> Score:
-        """Good within 5 % of the speed; speeds are over 2 s, so that turns of the tail and a pulse do not count."""
+    def _error(self, run: LoopRun, brief: Brief) -> float:
         time, place = _path(run)
         starts = np.arange(0.5 * brief.duration, brief.duration - _SPEED_OVER, 0.25)
         ways = np.interp(starts + _SPEED_OVER, time, place) - np.interp(starts, time, place)
-        error = float(np.median(brief.way * ways / _SPEED_OVER)) - self.asked
-        return Score(error, abs(error) <= _WITHIN * self.asked and not run.ended, energy(run))
+        return float(np.median(brief.way * ways / _SPEED_OVER)) - self.set_speed
+
+    def _is_good(self, error: float) -> bool:
+        return abs(error) <= _WITHIN * self.set_speed
 
 
 class RideOutTask(_CourseTask):
@@ -116,51 +130,50 @@ class RideOutTask(_CourseTask):
     error_name: ClassVar[str] = "distance from the course at the end"
     error_unit: ClassVar[str] = "m"
 
-    tolerance: Annotated[LengthOrZero, AfterValidator(lambda value: positive(value, "m"))] = 5e-4
+    tolerance: Length = _BAND
     """How far from the course is good."""
 
-    def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
-        """A new controller; doing nothing leaves the drive on."""
-        if name == FEEDBACK:
-            return KeepCourse(brief.lab, brief.speed, brief.duty, self.asked)
-        return _reference(name, brief, self.asked, flow)
-
-    def score(self, run: LoopRun, brief: Brief) -> Score:
-        """Good within the tolerance."""
-        error = self._way_missed(run, brief)
-        return Score(error, abs(error) <= self.tolerance and not run.ended, energy(run))
-
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
-        """The course."""
-        return way * self.asked * time, self.tolerance
+        """The course, and the tolerance around it."""
+        return super().target(time, way)[0], self.tolerance
+
+    def _feedback(self, brief: Brief) -> Controller:
+        return KeepCourse(brief.lab, brief.speed, brief.duty, self.set_speed)
+
+    def _error(self, run: LoopRun, brief: Brief) -> float:
+        time, place = _path(run)
+        travelled = float(np.interp(brief.duration, time, place) - place[0])
+        return brief.way * travelled - self.set_speed * brief.duration
+
+    def _is_good(self, error: float) -> bool:
+        return abs(error) <= self.tolerance
 
 
 class SaveBatteryTask(RideOutTask):
-    """Go a way in a time with as little from the battery as a remote that knows on and off allows."""
+    """Go a way in a time with as little from the battery as a remote that knows on and off allows.
+
+    A run is good if the robot has come as far as the course, within the tolerance; further does not count against it.
+    """
 
     kind: ClassVar[str] = "save-battery"
-    error_name: ClassVar[str] = "distance from the course at the end"
 
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
         """A new controller; doing nothing leaves the drive on."""
-        if name in (FEEDBACK, "knowing"):
-            band = 0.4 * self.tolerance
-            return SaveBattery(brief.lab, brief.speed, brief.duty, self.asked, band, knowing=name == "knowing")
+        if name == "knowing":
+            return self._relay(brief, knowing=True)
         if name == "open-loop":
             return Steady(brief.duty, share=brief.schedule[0])
-        return _reference(name, brief, self.asked, flow)
+        return super().controller(name, brief, flow)
 
-    def score(self, run: LoopRun, brief: Brief) -> Score:
-        """Good if it has come as far as asked, within the tolerance; energy is what it is about."""
-        error = self._way_missed(run, brief)
-        return Score(error, error >= -self.tolerance and not run.ended, energy(run))
+    def _feedback(self, brief: Brief) -> Controller:
+        return self._relay(brief, knowing=False)
 
+    def _relay(self, brief: Brief, *, knowing: bool) -> Controller:
+        band = _RELAY * self.tolerance
+        return SaveBattery(brief.lab, brief.speed, brief.duty, self.set_speed, band, knowing=knowing)
 
-def _reference(name: str, brief: Brief, asked: float, flow: FlowPulse | None) -> Controller:
-    """What a controller of speed is judged against."""
-    if name == "knowing":
-        return KeepCourse(brief.lab, brief.speed, brief.duty, asked, knowing=True, flow=flow, carried=brief.carried)
-    return Steady(brief.schedule[1] if name == "open-loop" else brief.duty)
+    def _is_good(self, error: float) -> bool:
+        return error >= -self.tolerance
 
 
 def _path(run: LoopRun) -> tuple[Samples, Samples]:

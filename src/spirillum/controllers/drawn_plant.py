@@ -16,20 +16,20 @@ from spirillum.robot.seat import gap_of
 __all__ = ["plant_of"]
 
 
-def plant_of(robot: Robot, arguments: Mapping[str, Any], found: Drawn, progress: Progress | None = None) -> Plant:
+def plant_of(robot: Robot, arguments: Mapping[str, Any], drawn: Drawn, progress: Progress | None = None) -> Plant:
     """The robot that a run has drawn, at rest where it starts.
 
     Args:
         robot: as its file says.
         arguments: further arguments of `spirillum.Plant`.
-        found: what was drawn.
+        drawn: what was drawn.
         progress: told how far a table is that has to be made.
 
     Raises:
         InputError: for wrong arguments, or a friction or gap factor where there is nothing to multiply.
     """
     arguments = dict(arguments)
-    if found.gap != 1.0:
+    if drawn.gap != 1.0:
         if robot.channel is None:
             raise InputError("unknown.gap_factor is given for a robot without a channel; allowed: 1")
         placed = Placement.of(arguments.get("placement"))
@@ -37,34 +37,34 @@ def plant_of(robot: Robot, arguments: Mapping[str, Any], found: Drawn, progress:
             raise InputError(
                 "unknown.gap_factor is given together with an eccentricity; allowed: a gap, or a factor of 1"
             )
-        own = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
-        arguments["placement"] = placed.model_copy(update={"gap": own * found.gap})
-    if found.friction != 1.0:
-        robot = _rubbing(robot, found.friction)
-    robot = _in_another_oil(robot, found)
+        gap = gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter)
+        arguments["placement"] = placed.model_copy(update={"gap": gap * drawn.gap})
+    if drawn.friction != 1.0:
+        robot = _with_friction(robot, drawn.friction)
+    robot = _with_supply_and_fluid(robot, drawn)
     return Plant(robot, **arguments, progress=progress)
 
 
-def _rubbing(robot: Robot, factor: float) -> Robot:
-    """A robot with another friction."""
-    own = robot.friction.effective
-    if own is None and robot.motor is not None:
-        own = robot.motor.joint_rotor_friction
-    if not own:
+def _with_friction(robot: Robot, factor: float) -> Robot:
+    """A robot whose friction is multiplied by a factor."""
+    effective = robot.friction.effective
+    if effective is None and robot.motor is not None:
+        effective = robot.motor.joint_rotor_friction
+    if not effective:
         raise InputError(
             f"unknown.friction_factor is given, but {robot.name} has no friction; allowed: a factor of 1, or a "
             "friction.effective"
         )
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * own})})
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * effective})})
 
 
-def _in_another_oil(robot: Robot, found: Drawn) -> Robot:
-    """A robot with another voltage and viscosity."""
+def _with_supply_and_fluid(robot: Robot, drawn: Drawn) -> Robot:
+    """A robot whose battery and fluid have the voltage and viscosity that were drawn."""
     changes: dict[str, Any] = {}
-    if found.viscosity != 1.0:
+    if drawn.viscosity != 1.0:
         fluid = robot.fluid
-        changes["fluid"] = fluid.model_copy(update={"viscosity": fluid.viscosity * found.viscosity})
-    if found.voltage != 1.0 and robot.battery is not None:
+        changes["fluid"] = fluid.model_copy(update={"viscosity": fluid.viscosity * drawn.viscosity})
+    if drawn.voltage != 1.0 and robot.battery is not None:
         battery = robot.battery
-        changes["battery"] = battery.model_copy(update={"voltage": battery.voltage * found.voltage})
+        changes["battery"] = battery.model_copy(update={"voltage": battery.voltage * drawn.voltage})
     return robot.model_copy(update=changes) if changes else robot

@@ -1,20 +1,21 @@
-"""One controlled run after another: the robot that a seed draws, the loop, and its score."""
+"""One controlled run from its job: the robot that its seed draws, the loop, and the score."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.learner import Learner, Learning
 from spirillum.controllers.loop import LoopRun, run_loop
-from spirillum.controllers.sensors import Drawn, drawn
+from spirillum.controllers.sensors import Drawn, draw
 from spirillum.controllers.task import Brief, Score, Task
+from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.robot.robot import Robot
 
-__all__ = ["Job", "Outcome", "begun", "done", "finished", "named"]
+__all__ = ["Job", "Outcome", "draw_plant", "outcome_of", "run_job"]
 
 
 @dataclass(frozen=True)
@@ -32,49 +33,58 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run."""
+    """The score of a run, and what it had drawn."""
 
     controller: str
     seed: int
     score: Score
     drawn: Drawn
-    """What was drawn for it."""
     ended: str
     """Why it ended before its time; empty if it did not."""
 
 
-def begun(job: Job) -> tuple[Plant, Drawn]:
-    """The plant of a run, and what was drawn for it."""
+def draw_plant(job: Job) -> tuple[Plant, Drawn]:
+    """The plant of a run, at rest where it starts, and what was drawn for it."""
     lab = job.brief.lab
-    found = drawn(lab.unknown, lab.pulse, job.seed, job.brief.duration)
-    return plant_of(job.robot, job.plant, found), found
+    drawn = draw(lab.unknown, lab.pulse, job.seed, job.brief.duration)
+    return plant_of(job.robot, job.plant, drawn), drawn
 
 
-def finished(job: Job) -> Outcome:
-    """Do a run for its score alone."""
-    plant, found = begun(job)
-    run = done(job, plant, found)
-    if run.interrupted:
-        raise KeyboardInterrupt
-    return Outcome(job.controller, job.seed, job.task.score(run, job.brief), found, run.ended)
-
-
-def done(job: Job, plant: Plant, found: Drawn, learner: Learner | None = None, **told: Any) -> LoopRun:
+def run_job(
+    job: Job,
+    plant: Plant,
+    drawn: Drawn,
+    learner: Learner | None = None,
+    *,
+    pace: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
+) -> LoopRun:
     """The loop of a run.
 
     Args:
         job: the run.
         plant: its robot; it is moved.
-        found: what was drawn for it.
+        drawn: what was drawn for it.
         learner: learns beside the controller.
-        told: `pace` and `progress` of `run_loop`.
+        pace: told the time of each decision before it is taken, s; it may wait.
+        progress: told what is being computed, how much is done, and of how much.
     """
-    controller = job.task.controller(job.controller, job.brief, found.pulse)
+    lab, controller = job.brief.lab, job.task.controller(job.controller, job.brief, drawn.pulse)
     if learner is not None:
         controller = Learning(controller, learner)
-    return run_loop(plant, controller, job.brief.lab, job.brief.duration, seed=job.seed, flow=found.pulse, **told)
+    return run_loop(
+        plant, controller, lab, job.brief.duration, seed=job.seed, flow=drawn.pulse, pace=pace, progress=progress
+    )
 
 
-def named(job: Job, controller: str, seed: int) -> Job:
-    """The same run by another controller or from another seed."""
-    return replace(job, controller=controller, seed=seed)
+def outcome_of(job: Job) -> Outcome:
+    """Do a run for its score alone.
+
+    Raises:
+        KeyboardInterrupt: if the run was interrupted.
+    """
+    plant, drawn = draw_plant(job)
+    run = run_job(job, plant, drawn)
+    if run.interrupted:
+        raise KeyboardInterrupt
+    return Outcome(job.controller, job.seed, job.task.score(run, job.brief), drawn, run.ended)

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator
 
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import read_toml
-from spirillum.robot.arguments import Options, in_range, refusal
+from spirillum.robot.arguments import Options, in_range, refusal, within
 from spirillum.robot.fields import Angle, Current, LengthOrZero, Section, Time, Velocity
 
 __all__ = ["Camera", "Lab", "Meter", "Pulse", "Remote", "Unknown"]
@@ -19,26 +19,14 @@ _WHAT = "a lab file (TOML with the tables [camera], [meter], [remote], [pulse], 
 _LONGEST_DELAY = 60.0
 
 
-def _short(value: float) -> float:
-    if not 0.0 <= value <= _LONGEST_DELAY:
-        raise refusal(f"= {value:g} s; allowed: 0 to {_LONGEST_DELAY:g} s")
-    return value
-
-
 def _not_negative(value: float) -> float:
     if value < 0.0:
         raise refusal(f"= {value:g} rad; allowed: at least 0")
     return value
 
 
-def _lasting(value: float) -> float:
-    if not 1e-3 <= value <= _LONGEST_DELAY:
-        raise refusal(f"= {value:g} s; allowed: 0.001 to {_LONGEST_DELAY:g} s")
-    return value
-
-
-_Delay = Annotated[Time, AfterValidator(_short)]
-_Period = Annotated[Time, AfterValidator(_lasting)]
+_Delay = Annotated[Time, within(0.0, _LONGEST_DELAY, "s")]
+_Period = Annotated[Time, within(1e-3, _LONGEST_DELAY, "s")]
 _AngleNoise = Annotated[Angle, AfterValidator(_not_negative)]
 _Share = Annotated[float, BeforeValidator(in_range(0.0, 0.95))]
 
@@ -65,25 +53,25 @@ class Camera(Options):
     position_noise: LengthOrZero = 1e-5
     """Standard deviation of the place along the channel, of each frame by itself."""
     heading_noise: _AngleNoise = 7e-4
-    """The same of the heading (yaw, as seen from above)."""
+    """Standard deviation of the heading (yaw, as seen from above), of each frame by itself."""
     body_angle_noise: _AngleNoise = 3e-3
-    """The same of the body's angle."""
+    """Standard deviation of the body's angle, of each frame by itself."""
     tail_phase_noise: _AngleNoise = 1e-2
-    """The same of the tail's phase."""
+    """Standard deviation of the tail's phase, of each frame by itself."""
     position_wander: LengthOrZero = 3e-5
     """Standard deviation of the slow error of the place along the channel."""
     heading_wander: _AngleNoise = 2.5e-3
-    """The same of the heading."""
+    """Standard deviation of the slow error of the heading."""
     body_angle_wander: _AngleNoise = 7e-3
-    """The same of the body's angle."""
+    """Standard deviation of the slow error of the body's angle."""
     tail_phase_wander: _AngleNoise = 1.8e-2
-    """The same of the tail's phase."""
+    """Standard deviation of the slow error of the tail's phase."""
     memory: _Period = 1.0
     """Correlation time of the slow errors."""
 
 
 class Meter(Options):
-    """Motor current and battery voltage, as a circuit on board would tell them; the paper's robot has none."""
+    """Motor current and battery voltage, as a circuit on board would send them; the paper's robot has none."""
 
     argument: ClassVar[str] = "meter"
     prefixed: ClassVar[bool] = True
@@ -140,7 +128,7 @@ class Unknown(Options):
     friction_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 3.0
     """The true friction is the robot's times a factor from 1/this to this, evenly in its logarithm; 1: known."""
     gap_factor: Annotated[float, BeforeValidator(in_range(1.0, 100.0))] = 1.0
-    """The same for the gap at which the robot is laid down; 1: known."""
+    """The gap at the start is the given one times a factor from 1/this to this, evenly in its logarithm; 1: known."""
     voltage_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.0
     """Relative standard deviation of the battery's voltage."""
     viscosity_error: Annotated[float, BeforeValidator(in_range(0.0, 0.2))] = 0.0

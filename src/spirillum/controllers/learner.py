@@ -1,4 +1,4 @@
-"""The learner beside a controller: it tells from the meter when the drive is on, lets its bank follow, and learns.
+"""The learner beside a controller: it infers from the meter when the drive is on, simulates its bank, and estimates.
 
 The current follows a switching within milliseconds, so that a reading tells whether a command has arrived; without a
 meter the commands are believed as they were sent.
@@ -22,7 +22,7 @@ _NAMES = ("friction", "gap")
 
 
 class Learner:
-    """What has been seen of a run, and what it tells."""
+    """What has been seen of a run, and the factors estimated from it."""
 
     def __init__(self, lab: Lab, bank: Bank) -> None:
         """Begin.
@@ -38,10 +38,10 @@ class Learner:
         """From when on the drive has which duty, s."""
         self._sent: list[tuple[float, float]] = [(0.0, 0.0)]
         self._next = SETTLING + 2.0 * BLOCK
-        self.found: Learnt | None = None
+        self.learnt: Learnt | None = None
 
     def take(self, news: News, duty: float) -> None:
-        """Take in what a controller was told, and what it sent."""
+        """Take in what reached a controller, and the duty that it sent."""
         self._sights += news.sights
         acts = news.time + self._lab.remote.delay
         if duty != self._sent[-1][1]:
@@ -65,7 +65,7 @@ class Learner:
         self._readings.append(reading)
 
     def _last_sent(self, time: float) -> float:
-        """Duty that was last asked for while it was not 0; the robot's own if none was."""
+        """Last duty that was sent and not 0; the robot's own if there is none."""
         sent = [duty for start, duty in self._sent if start <= time and duty > 0.0]
         return sent[-1] if sent else self._bank.duty
 
@@ -74,36 +74,37 @@ class Learner:
             if end > self._bank.time:
                 self._bank.follow(min(end, until), duty if start <= until else 0.0)
         self._next = until + BLOCK
-        self.found = learnt(self._bank.paths(), self._lab, self._on(until), self._sights, self._readings)
+        self.learnt = learnt(self._bank.paths(), self._lab, self._on(until), self._sights, self._readings)
 
     def _on(self, until: float) -> list[Stretch]:
-        found: list[Stretch] = []
+        """Stretches of time in which the drive was on."""
+        stretches: list[Stretch] = []
         for (start, duty), (end, _) in zip(self._duties, [*self._duties[1:], (until, 0.0)], strict=True):
-            if duty > 0.0 and found and found[-1].end == start:
-                found[-1] = Stretch(found[-1].start, end)
+            if duty > 0.0 and stretches and stretches[-1].end == start:
+                stretches[-1] = Stretch(stretches[-1].start, end)
             elif duty > 0.0:
-                found.append(Stretch(start, end))
-        return found
+                stretches.append(Stretch(start, end))
+        return stretches
 
 
-class Learning:
-    """A controller with a learner beside it, which changes nothing of what it does."""
+class Learning(Controller):
+    """A controller with a learner beside it, which leaves its decisions alone."""
 
     def __init__(self, controller: Controller, learner: Learner) -> None:
         self._controller, self.learner = controller, learner
         self.blind, self.knowing = controller.blind, controller.knowing
 
     def decide(self, news: News) -> float:
-        """As the controller."""
+        """The controller's duty, which the learner takes note of."""
         duty = self._controller.decide(news)
         self.learner.take(news, duty)
         return duty
 
     def estimate(self) -> Mapping[str, float]:
-        """As the controller, and median and 95 % interval of the factors of friction and gap; NaN before."""
-        found: dict[str, Any] = dict(self._controller.estimate())
+        """The controller's, and median and 95 % interval of the factors of friction and gap; NaN before."""
+        estimate: dict[str, Any] = dict(self._controller.estimate())
         for name in _NAMES:
-            factor = None if self.learner.found is None else getattr(self.learner.found, name)
+            factor = None if self.learner.learnt is None else getattr(self.learner.learnt, name)
             for end, part in (("", "value"), ("_low", "low"), ("_high", "high")):
-                found[f"estimated_{name}_factor{end}"] = np.nan if factor is None else float(getattr(factor, part))
-        return found
+                estimate[f"estimated_{name}_factor{end}"] = np.nan if factor is None else float(getattr(factor, part))
+        return estimate

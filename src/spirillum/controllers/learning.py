@@ -1,4 +1,4 @@
-"""Friction and gap from what camera and meter tell: the posterior on a bank of robots.
+"""Friction and gap from the data of camera and meter: the posterior on a bank of robots.
 
 Blocks of a second of the tail's phase and the body's angle, and the mean current and voltage, are compared with what
 the bank did under the same commands (multiple-model estimation, Magill 1965). Given the unknown factors theta all else
@@ -7,8 +7,8 @@ is linear and Gaussian, and is integrated out:
     z = m(theta) + H eta + e,   eta ~ N(0, P),  e ~ N(0, R),   log p(z | theta) = -r' (R + H P H')^-1 r / 2 + const,
 
 with r = z - m(theta). In eta are the relative errors of voltage and viscosity, the gains of the meter, and where each
-angle began (unknown). R holds the camera's errors of a frame and its slow ones, averaged over blocks, and what the bank
-leaves in the rates. The prior is even in the logarithms of the factors.
+angle began (unknown). R holds the camera's errors of a frame and its slow ones, averaged over blocks, and the bank's
+errors of the rates. The prior is even in the logarithms of the factors.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ SETTLING = 0.3
 """What is seen so soon after the drive was switched is left out, s."""
 _FEWEST = 4
 """Frames of a block at least."""
-_LEFT = (1e-2, 1e-2)
-"""Relative standard deviations of what the bank leaves in the rates of tail and body: interpolation, a pulse of flow,
-which lifts the robot a little, and voltage and viscosity, which change more than a factor once the robot's rear touches
-the wall. Chosen on 120 seeds, checked on others, see `docs/control.md`."""
-_LEFT_MEMORY = 4.0
-"""Correlation time of that, s."""
+_BANK_ERROR = 1e-2
+"""Relative standard deviation of the bank's rates of tail and body: interpolation, a pulse of flow, which lifts the
+robot a little, and voltage and viscosity, which change more than a factor once the robot's rear touches the wall.
+Chosen on 120 seeds, checked on others, see `docs/control.md`."""
+_BANK_MEMORY = 4.0
+"""Correlation time of the bank's errors, s."""
 _ANYWHERE = 1e2
 """Standard deviation of where an angle began, rad."""
 _COARSE, _FINE = 41, 61
 _NEGLIGIBLE = 15.0
-"""Differences of the log posterior beyond which nothing is looked for."""
-_UNTOLD = 0.8
-"""A 95 % interval that is as wide as this share of the prior's tells nothing."""
+"""Points whose log posterior lies so far below the highest are left out of the finer grid."""
+_UNINFORMED = 0.8
+"""A factor counts as not learnt where its 95 % interval is at least this share of the prior's."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,8 @@ class _Block:
     frames: int
     seen: tuple[float, float]
     """Tail's phase and body's angle, rad."""
-    done: Samples
-    """The same of every member, (friction, gap, 2)."""
+    predicted: Samples
+    """Tail's phase and body's angle of every member of the bank, rad, (friction, gap, 2)."""
     sensitivity: Samples
     """(friction, 2, 2): voltage and viscosity, by quantity."""
 
@@ -122,25 +122,24 @@ def learnt(
         return None
     means, electric = _electric(paths, lab, stretches, readings)
     nodes = points(lab.unknown.friction_factor), points(lab.unknown.gap_factor)
-    members = np.concatenate([np.moveaxis(np.array([block.done for block in blocks]), 0, -2), electric.done], axis=-2)
+    members = np.concatenate(
+        [np.moveaxis(np.array([block.predicted for block in blocks]), 0, -2), electric.predicted], axis=-2
+    )
     flat = members.reshape(nodes[0].size, nodes[1].size, -1)
     seen = np.concatenate([[block.seen for block in blocks], means]).ravel()
-    axes = [np.linspace(-1.0, 1.0, _COARSE) if one.size > 1 else np.zeros(1) for one in nodes]
-    near_truth = (np.zeros(1), np.zeros(1))
-    for size in (_FINE, _FINE):
-        spread = _spread(lab, blocks, electric, flat, nodes, near_truth)
-        log = _log_likelihood(seen, _between(flat, nodes, axes), spread)
-        best = np.unravel_index(np.argmax(log), log.shape)
-        near_truth = (axes[0][best[0] : best[0] + 1], axes[1][best[1] : best[1] + 1])
-        near = log > log.max() - _NEGLIGIBLE
-        axes = [_narrowed(axis, near.any(axis=1 - side), size) for side, axis in enumerate(axes)]
-    spread = _spread(lab, blocks, electric, flat, nodes, near_truth)
-    log = _log_likelihood(seen, _between(flat, nodes, axes), spread)
+    axes = [np.linspace(-1.0, 1.0, _COARSE) if node.size > 1 else np.zeros(1) for node in nodes]
+    best = [np.zeros(1), np.zeros(1)]
+    for refine in (True, True, False):
+        covariance = _covariance(lab, blocks, electric, flat, nodes, best)
+        log = _log_likelihood(seen, _interpolated(flat, nodes, axes), covariance)
+        if refine:
+            best = [axis[[at]] for axis, at in zip(axes, np.unravel_index(np.argmax(log), log.shape), strict=True)]
+            near = log > log.max() - _NEGLIGIBLE
+            axes = [_refined(axis, near.any(axis=1 - side)) for side, axis in enumerate(axes)]
     weight = np.exp(log - log.max())
-    unknown = lab.unknown
     return Learnt(
-        _factor(axes[0], weight.sum(axis=1), unknown.friction_factor),
-        _factor(axes[1], weight.sum(axis=0), unknown.gap_factor),
+        _factor(axes[0], weight.sum(axis=1), lab.unknown.friction_factor),
+        _factor(axes[1], weight.sum(axis=0), lab.unknown.gap_factor),
     )
 
 
@@ -148,7 +147,7 @@ def learnt(
 class _Electric:
     """Current and voltage; one row, or none without a meter."""
 
-    done: Samples
+    predicted: Samples
     """(friction, gap, rows, 2)."""
     sensitivity: Samples
     """(rows, friction, 2, 2)."""
@@ -157,22 +156,23 @@ class _Electric:
 
 
 def _blocks(paths: Paths, number: int, stretch: Stretch, sights: Sequence[Sight]) -> list[_Block]:
-    found: list[_Block] = []
+    """Blocks of one stretch, without those that have too few frames."""
+    blocks: list[_Block] = []
     begin, end = stretch.start + SETTLING, min(stretch.end, float(paths.time[-1]))
     inside = [sight for sight in sights if begin <= sight.time <= end]
     for part in range(int((end - begin) / BLOCK)):
         start = begin + part * BLOCK
-        here = [sight for sight in inside if start <= sight.time < start + BLOCK]
-        if len(here) < _FEWEST:
+        frames = [sight for sight in inside if start <= sight.time < start + BLOCK]
+        if len(frames) < _FEWEST:
             continue
-        weights = _means_at(paths.time, np.array([sight.time for sight in here]))
+        weights = _means_at(paths.time, np.array([sight.time for sight in frames]))
         seen = (
-            float(np.mean([sight.tail_phase for sight in here])),
-            float(np.mean([sight.body_angle for sight in here])),
+            float(np.mean([sight.tail_phase for sight in frames])),
+            float(np.mean([sight.body_angle for sight in frames])),
         )
-        done, sensitivity = paths.members[:, :, :2] @ weights, paths.sensitivity[:, :, :2] @ weights
-        found.append(_Block(number, start, len(here), seen, done, sensitivity))
-    return found
+        predicted, sensitivity = paths.members[:, :, :2] @ weights, paths.sensitivity[:, :, :2] @ weights
+        blocks.append(_Block(number, start, len(frames), seen, predicted, sensitivity))
+    return blocks
 
 
 def _means_at(time: Samples, moments: Samples) -> Samples:
@@ -196,53 +196,53 @@ def _electric(
             np.empty((*shape[:2], 0, 2)), np.empty((0, shape[0], 2, 2)), np.empty((0, 2))
         )
     weights = _means_at(paths.time, np.array([one.time for one in inside]))
-    done, sensitivity = paths.members[:, :, 2:] @ weights, paths.sensitivity[:, :, 2:] @ weights
+    predicted, sensitivity = paths.members[:, :, 2:] @ weights, paths.sensitivity[:, :, 2:] @ weights
     means = np.array([[np.mean([one.current for one in inside]), np.mean([one.voltage for one in inside])]])
     meter = lab.meter
     noise = np.array([[meter.current_noise, meter.voltage_noise * abs(means[0, 1])]]) ** 2 / len(inside)
-    return means, _Electric(done[:, :, None], sensitivity[None], noise)
+    return means, _Electric(predicted[:, :, None], sensitivity[None], noise)
 
 
-def _between(flat: Samples, nodes: tuple[Samples, Samples], axes: Sequence[Samples]) -> Samples:
-    """What robots between the members do, (friction, gap, data)."""
+def _interpolated(flat: Samples, nodes: Sequence[Samples], axes: Sequence[Samples]) -> Samples:
+    """Predicted data of robots between the members, (friction, gap, data)."""
     first, second = (interpolation(node, axis) for node, axis in zip(nodes, axes, strict=True))
-    found: Samples = np.einsum("ai,ijd,bj->abd", first, flat, second)
-    return found
+    return np.asarray(np.einsum("ai,ijd,bj->abd", first, flat, second))
 
 
-def _spread(
+def _covariance(
     lab: Lab,
     blocks: Sequence[_Block],
     electric: _Electric,
     flat: Samples,
-    nodes: tuple[Samples, Samples],
-    near_truth: tuple[Samples, Samples],
+    nodes: Sequence[Samples],
+    best: Sequence[Samples],
 ) -> Samples:
-    """R + H P H' at what a robot near the truth does, (data, data)."""
+    """R + H P H' of the data, as it is for the robot that is the best estimate so far, (data, data)."""
     rows = len(blocks)
-    done = _between(flat, nodes, near_truth)[0, 0].reshape(-1, 2)
-    weights = interpolation(nodes[0], near_truth[0])[0]
+    predicted = _interpolated(flat, nodes, best)[0, 0].reshape(-1, 2)
+    weights = interpolation(nodes[0], best[0])[0]
     members = np.concatenate([[block.sensitivity for block in blocks], electric.sensitivity])
     sensitivity = np.tensordot(members, weights, axes=(1, 0))
     columns: list[Samples] = []
     for number, size in enumerate((lab.unknown.voltage_error, lab.unknown.viscosity_error)):
-        columns.append(size * (done * sensitivity[:, number]).ravel())
-    for seen in range(2):
-        gain = np.zeros_like(done)
-        gain[rows:, seen] = lab.meter.gain_error * done[rows:, seen]
+        columns.append(size * (predicted * sensitivity[:, number]).ravel())
+    for part in range(2):
+        gain = np.zeros_like(predicted)
+        gain[rows:, part] = lab.meter.gain_error * predicted[rows:, part]
         columns.append(gain.ravel())
         for stretch in {block.stretch for block in blocks}:
-            began = np.zeros_like(done)
-            began[:rows, seen] = [_ANYWHERE * (block.stretch == stretch) for block in blocks]
-            columns.append(began.ravel())
+            offset = np.zeros_like(predicted)
+            offset[:rows, part] = [_ANYWHERE * (block.stretch == stretch) for block in blocks]
+            columns.append(offset.ravel())
     across = np.array(columns)
-    found: Samples = across.T @ across
-    for seen, name in enumerate(("tail_phase", "body_angle")):
-        found[seen : 2 * rows : 2, seen : 2 * rows : 2] += _errors_of_blocks(lab, blocks, name)
-        found[seen : 2 * rows : 2, seen : 2 * rows : 2] += _errors_of_bank(blocks, done[:rows, seen], _LEFT[seen])
-    last = np.arange(2 * rows, found.shape[0])
-    found[last, last] += electric.noise.ravel() + 1e-12
-    return found
+    covariance: Samples = across.T @ across
+    for angle, name in enumerate(("tail_phase", "body_angle")):
+        of_angle = slice(angle, 2 * rows, 2)
+        covariance[of_angle, of_angle] += _errors_of_blocks(lab, blocks, name)
+        covariance[of_angle, of_angle] += _errors_of_bank(blocks, predicted[:rows, angle])
+    last = np.arange(2 * rows, covariance.shape[0])
+    covariance[last, last] += electric.noise.ravel() + 1e-12
+    return covariance
 
 
 def _errors_of_blocks(lab: Lab, blocks: Sequence[_Block], name: str) -> Samples:
@@ -252,35 +252,36 @@ def _errors_of_blocks(lab: Lab, blocks: Sequence[_Block], name: str) -> Samples:
     starts = np.array([block.start for block in blocks])
     over = BLOCK / camera.memory
     apart = np.abs(starts[:, None] - starts) / camera.memory
-    found = slow**2 * ((1.0 - np.exp(-over)) / over) ** 2 * np.exp(-np.maximum(apart - over, 0.0))
+    covariance = slow**2 * ((1.0 - np.exp(-over)) / over) ** 2 * np.exp(-np.maximum(apart - over, 0.0))
     same = 2.0 * slow**2 * (over - 1.0 + np.exp(-over)) / over**2
-    np.fill_diagonal(found, same + white**2 / np.array([block.frames for block in blocks]) + 1e-10)
-    return np.asarray(found)
+    np.fill_diagonal(covariance, same + white**2 / np.array([block.frames for block in blocks]) + 1e-10)
+    return np.asarray(covariance)
 
 
-def _errors_of_bank(blocks: Sequence[_Block], done: Samples, size: float) -> Samples:
-    """Covariance of what the bank leaves in an angle: the integral of a rate's relative error, which has a memory."""
+def _errors_of_bank(blocks: Sequence[_Block], predicted: Samples) -> Samples:
+    """Covariance of the bank's error of an angle: the integral of a rate's relative error, which has a memory."""
     starts = np.array([block.start for block in blocks])
-    alike = np.exp(-np.abs(starts[:, None] - starts) / _LEFT_MEMORY)
-    sums = np.tril(np.ones((done.size, done.size))) * np.diff(done, prepend=done[0])
-    return np.asarray(size**2 * sums @ alike @ sums.T)
+    alike = np.exp(-np.abs(starts[:, None] - starts) / _BANK_MEMORY)
+    sums = np.tril(np.ones((predicted.size, predicted.size))) * np.diff(predicted, prepend=predicted[0])
+    return np.asarray(_BANK_ERROR**2 * sums @ alike @ sums.T)
 
 
-def _log_likelihood(seen: Samples, done: Samples, spread: Samples) -> Samples:
+def _log_likelihood(seen: Samples, predicted: Samples, covariance: Samples) -> Samples:
+    """Log likelihood at each point of a grid, but for a constant, (friction, gap)."""
     from scipy.linalg import cholesky, solve_triangular
 
-    rest = (seen - done).reshape(-1, seen.size).T
-    white = solve_triangular(cholesky(spread, lower=True), rest, lower=True)
-    return np.asarray(-0.5 * np.sum(white**2, axis=0).reshape(done.shape[:2]))
+    residuals = (seen - predicted).reshape(-1, seen.size).T
+    white = solve_triangular(cholesky(covariance, lower=True), residuals, lower=True)
+    return np.asarray(-0.5 * np.sum(white**2, axis=0).reshape(predicted.shape[:2]))
 
 
-def _narrowed(axis: Samples, near: Samples, size: int) -> Samples:
-    """A finer axis over what is near the best."""
+def _refined(axis: Samples, near: Samples) -> Samples:
+    """A finer axis over the points near the best."""
     if axis.size == 1:
         return axis
-    found = np.flatnonzero(near)
-    low, high = max(found[0] - 1, 0), min(found[-1] + 1, axis.size - 1)
-    return np.linspace(axis[low], axis[high], size)
+    inside = np.flatnonzero(near)
+    low, high = max(inside[0] - 1, 0), min(inside[-1] + 1, axis.size - 1)
+    return np.linspace(axis[low], axis[high], _FINE)
 
 
 def _factor(axis: Samples, weight: Samples, largest: float) -> Factor:
@@ -291,5 +292,5 @@ def _factor(axis: Samples, weight: Samples, largest: float) -> Factor:
     cumulative = np.concatenate([[0.0], np.cumsum(parts)]) / parts.sum()
     low, value, high = np.interp([0.025, 0.5, 0.975], cumulative, axis)
     return Factor(
-        float(largest**value), float(largest**low), float(largest**high), told=bool(high - low < 1.9 * _UNTOLD)
+        float(largest**value), float(largest**low), float(largest**high), told=bool(high - low < 1.9 * _UNINFORMED)
     )

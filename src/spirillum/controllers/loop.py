@@ -11,7 +11,7 @@ import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from itertools import count
+from itertools import count, pairwise
 from typing import Any
 
 from spirillum.controllers.lab import Lab
@@ -28,8 +28,8 @@ SILENCE = 1.0
 _AT_ONCE = 1e-9
 _LEAST_OFF = 0.05
 """The run goes on for at least so long after the last command, s."""
-_SIGNS = 200
-"""Signs of life of a run."""
+_REPORTS = 200
+"""How often a run reports its progress."""
 
 
 class _Kind(IntEnum):
@@ -53,7 +53,7 @@ class Decision:
     duty: float
     """Duty that was sent."""
     estimate: dict[str, float]
-    """What it made of the robot."""
+    """Its estimate of the robot."""
 
 
 @dataclass
@@ -69,7 +69,7 @@ class LoopRun:
     readings: list[Reading] = field(default_factory=list)
     """Readings of the meter."""
     decisions: list[Decision] = field(default_factory=list)
-    """What was decided."""
+    """Decisions of the controller."""
     lost: int = 0
     """Commands that did not arrive."""
     silent: float | None = None
@@ -81,6 +81,17 @@ class LoopRun:
     def interrupted(self) -> bool:
         """Whether it was interrupted."""
         return self.ended == INTERRUPTED
+
+    @property
+    def time_on(self) -> float:
+        """Time in which the drive was on, s."""
+        return sum(after.time - before.time for before, after in pairwise(self.moments) if after.values["duty"] > 0.0)
+
+    @property
+    def energy(self) -> float:
+        """From the battery's terminals (without a motor: of the drive), J."""
+        values = self.moments[-1].values
+        return float(values.get("electrical_energy", values["drive_energy"]))
 
 
 class _Loop:
@@ -97,7 +108,7 @@ class _Loop:
         self._order = count()
         self._sights: list[Sight] = []
         self._readings: list[Reading] = []
-        self._heard = 0.0
+        self._last_delivery = 0.0
 
     def push(self, time: float, kind: _Kind, content: Any = None) -> None:
         """Put an event into the queue."""
@@ -122,17 +133,16 @@ class _Loop:
         return self.run.moments[-1]
 
     def decide(self, time: float) -> bool:
-        """Ask the controller and send its command; whether it gave one."""
+        """Let the controller decide and send its command; whether it gave a valid one."""
         if self._sights:
-            self._heard = time
+            self._last_delivery = time
         truth = self.now() if self.controller.knowing else None
-        asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
+        duty = float(self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth)))
         self._sights, self._readings = [], []
-        duty = float(asked)
         if not 0.0 <= duty <= 1.0:
             self.run.ended = f"the controller asked for a duty of {duty:g}; allowed: 0 to 1"
             return False
-        if not self.controller.blind and time - self._heard > SILENCE + self.lab.camera.latency:
+        if not self.controller.blind and time - self._last_delivery > SILENCE + self.lab.camera.latency:
             duty = 0.0
             self.run.silent = time if self.run.silent is None else self.run.silent
         self.run.decisions.append(Decision(time, duty, dict(self.controller.estimate())))
@@ -179,7 +189,7 @@ class _Loop:
         self.push(len(self.run.frames) / self.lab.camera.fps, _Kind.FRAME)
 
     def switch_off(self) -> None:
-        """The drive off, whatever has happened, and the robot followed until it stands."""
+        """Switch the drive off, whatever has happened, and follow the robot until it stands."""
         ended, self.duty = self.run.ended, 0.0
         if self.plant.state.ended == INTERRUPTED:
             self.plant.reset(replace(self.plant.state, ended=""))
@@ -226,7 +236,7 @@ def run_loop(
     if flow is not None and flow.start < duration:
         loop.push(flow.start, _Kind.FLOW, flow.velocity)
         loop.push(flow.end, _Kind.FLOW, 0.0)
-    told = 0
+    reported = 0
     try:
         going = True
         while going:
@@ -234,10 +244,10 @@ def run_loop(
             if kind is _Kind.DECISION and pace is not None:
                 pace(time)
             going = loop.handle(time, kind, content)
-            done = int(_SIGNS * min(time / duration, 1.0))
-            if progress is not None and done > told:
-                told = done
-                progress("controlled run", done, _SIGNS)
+            done = int(_REPORTS * min(time / duration, 1.0))
+            if progress is not None and done > reported:
+                reported = done
+                progress("controlled run", done, _REPORTS)
     except KeyboardInterrupt:
         loop.run.ended = INTERRUPTED
     finally:

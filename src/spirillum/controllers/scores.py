@@ -91,30 +91,28 @@ def scored(task: Task, outcomes: Sequence[Outcome]) -> Scores:
     """Sum up runs.
 
     Args:
-        task: what was asked for.
+        task: by which the runs are judged.
         outcomes: runs of several controllers; the task's own among them.
     """
-    found = {
-        name: {one.seed: one for one in outcomes if one.controller == name}
-        for name in CONTROLLERS
-        if any(one.controller == name for one in outcomes)
-    }
-    own = found.get(FEEDBACK, {})
+    ordered = sorted(outcomes, key=lambda one: (list(CONTROLLERS).index(one.controller), one.seed))
+    by_controller: dict[str, dict[int, Outcome]] = {}
+    for outcome in ordered:
+        by_controller.setdefault(outcome.controller, {})[outcome.seed] = outcome
+    feedback = by_controller.get(FEEDBACK, {})
     scores = []
-    for name, runs in found.items():
-        errors = np.array([abs(one.score.error) for one in runs.values()])
-        paired = [abs(one.score.error) - abs(own[seed].score.error) for seed, one in runs.items() if seed in own]
+    for name, runs in by_controller.items():
+        errors = {seed: abs(one.score.error) for seed, one in runs.items()}
+        paired = [error - abs(feedback[seed].score.error) for seed, error in errors.items() if seed in feedback]
         scores.append(
             ControllerScore(
                 name=name,
                 runs=len(runs),
                 good=_share([one.score.good for one in runs.values()]),
-                error=_mean(errors),
+                error=_mean(np.array([*errors.values()])),
                 energy=_mean(np.array([one.score.energy for one in runs.values()])),
                 against=_mean(np.array(paired)),
             )
         )
-    ordered = sorted(outcomes, key=lambda one: (list(CONTROLLERS).index(one.controller), one.seed))
     return Scores(task, tuple(scores), tuple(ordered))
 
 

@@ -14,7 +14,7 @@ from spirillum.controllers.lab import Lab, Pulse, Unknown
 from spirillum.controllers.signals import Reading, Sight
 from spirillum.dynamics.plant import Moment
 
-__all__ = ["Drawn", "FlowPulse", "Senses", "drawn"]
+__all__ = ["Drawn", "FlowPulse", "Senses", "draw"]
 
 _STREAMS = ("unknown", "pulse", "camera", "meter", "remote")
 _SEEN = ("position", "heading", "body_angle", "tail_phase")
@@ -36,7 +36,7 @@ class FlowPulse:
     """Mean flow, m/s."""
 
     def passed_after(self, time: float) -> float:
-        """Way of the mean flow that is still to come, m."""
+        """Distance by which the mean flow still moves after a time, m."""
         return self.velocity * max(0.0, self.end - max(time, self.start))
 
 
@@ -56,7 +56,7 @@ class Drawn:
     """Factor of the viscosity."""
 
 
-def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
+def draw(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
     """Draw the robot and the flow of a run.
 
     Args:
@@ -67,18 +67,16 @@ def drawn(unknown: Unknown, pulse: Pulse, seed: int, duration: float) -> Drawn:
     """
     stream = _stream(seed, "unknown")
     factors = np.exp(np.log([unknown.friction_factor, unknown.gap_factor]) * stream.uniform(-1.0, 1.0, 2))
-    others = 1.0 + np.clip(stream.standard_normal(2), -_FARTHEST, _FARTHEST) * [
-        unknown.voltage_error,
-        unknown.viscosity_error,
-    ]
+    sizes = np.array([unknown.voltage_error, unknown.viscosity_error])
+    voltage, viscosity = 1.0 + np.clip(stream.standard_normal(2), -_FARTHEST, _FARTHEST) * sizes
     place, side = _stream(seed, "pulse").uniform(size=2)
-    found = None
+    flow = None
     if pulse.velocity and pulse.duration > 0.0:
         start, velocity = pulse.start, pulse.velocity
         if start is None:
             start, velocity = _LATEST * duration * place, velocity if side < 0.5 else -velocity
-        found = FlowPulse(float(start), float(start) + pulse.duration, float(velocity))
-    return Drawn(float(factors[0]), float(factors[1]), found, float(others[0]), float(others[1]))
+        flow = FlowPulse(float(start), float(start) + pulse.duration, float(velocity))
+    return Drawn(float(factors[0]), float(factors[1]), flow, float(voltage), float(viscosity))
 
 
 class Senses:

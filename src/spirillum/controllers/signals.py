@@ -29,7 +29,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class Reading:
-    """What the meter has told; SI."""
+    """What the meter has read; SI."""
 
     time: float
     """When it was read, s."""
@@ -48,7 +48,7 @@ class News:
     sights: tuple[Sight, ...] = ()
     """Those that have arrived since the last decision, in the order of their frames."""
     readings: tuple[Reading, ...] = ()
-    """The same of the meter."""
+    """Readings of the meter that have arrived since the last decision, in the order of their times."""
     truth: Moment | None = field(default=None, compare=False)
     """The robot itself, for a controller that knows everything; else None."""
 
@@ -56,13 +56,15 @@ class News:
 class Controller(Protocol):
     """Decides once in a period of the remote; new for each run."""
 
-    blind: bool
+    blind: bool = False
     """Whether it goes on without a camera; else the drive is switched off when the camera is silent."""
-    knowing: bool
+    knowing: bool = False
     """Whether it is told the truth."""
 
     def decide(self, news: News) -> float:
-        """Duty that is asked for from now on, 0 (off) to 1."""
+        """Duty from now on, 0 (off) to 1."""
+        ...
 
     def estimate(self) -> Mapping[str, float]:
-        """What it makes of the robot, by name, SI; the same names every time."""
+        """What it estimates of the robot, by name, SI; the same names every time."""
+        return {}

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from pydantic import AfterValidator
 
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
@@ -13,12 +12,12 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
 from spirillum.controllers.stopping import KnowingStop, StopAt, Timed
-from spirillum.controllers.task import FEEDBACK, Brief, Score, Task, carried_by_flow, energy, positive
+from spirillum.controllers.task import FEEDBACK, Brief, Task, carried_by_flow
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
 from spirillum.dynamics.start import reach_of
 from spirillum.errors import InputError
-from spirillum.robot.fields import LengthOrZero, SignedLength
+from spirillum.robot.fields import Length, SignedLength
 from spirillum.units import show
 
 __all__ = ["StopAtTask"]
@@ -40,7 +39,7 @@ class StopAtTask(Task):
 
     at: SignedLength | None = None
     """x of the body's mid-length at which to stop; it starts at 0. It has to be given."""
-    tolerance: Annotated[LengthOrZero, AfterValidator(lambda value: positive(value, "m"))] = 1e-3
+    tolerance: Length = 1e-3
     """How far beside it is good."""
 
     @property
@@ -58,14 +57,14 @@ class StopAtTask(Task):
         """Check that the place is ahead and in the tube, and time the way there."""
         speed = float(plant.steady.forward_velocity)
         self._check_place(plant, speed)
-        needed = self._time_there(plant, speed, progress)
-        own = plant.state.command
+        needed = self._time_to_goal(plant, speed, progress)
+        duty = plant.state.command
         return Brief(
             lab=lab,
             duration=_SPARE * needed + _SETTLING if self.duration is None else self.duration,
             speed=speed,
-            duty=own,
-            schedule=(needed, own),
+            duty=duty,
+            schedule=(needed, duty),
             carried=carried_by_flow(plant, lab.pulse.velocity, lab.pulse.duration),
         )
 
@@ -77,10 +76,11 @@ class StopAtTask(Task):
             return KnowingStop(brief.lab, brief.duty, self.goal, brief.way, flow, brief.carried)
         return Timed(brief.lab, brief.schedule[0] if name == "open-loop" else 0.0, brief.duty)
 
-    def score(self, run: LoopRun, brief: Brief) -> Score:  # noqa: ARG002 - one interface for all tasks
-        """Good within the tolerance, with the drive off, at the end of the time."""
-        error = float(run.moments[-1].pose.position[0]) - self.goal
-        return Score(error, abs(error) <= self.tolerance and not run.ended, energy(run))
+    def _error(self, run: LoopRun, brief: Brief) -> float:  # noqa: ARG002 - one interface for all tasks
+        return float(run.moments[-1].pose.position[0]) - self.goal
+
+    def _is_good(self, error: float) -> bool:
+        return abs(error) <= self.tolerance
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:  # noqa: ARG002 - one interface for all tasks
         """The place, throughout."""
@@ -106,7 +106,7 @@ class StopAtTask(Task):
                 f"{show(abs(self.goal - start), 'mm')} to the goal"
             )
 
-    def _time_there(self, plant: Plant, speed: float, progress: Progress | None) -> float:
+    def _time_to_goal(self, plant: Plant, speed: float, progress: Progress | None) -> float:
         """When the robot as its file says arrives with its drive on and without a pulse, s."""
         way, other = float(np.sign(speed)), plant.copy()
         most = _PATIENCE * self.goal / speed + 10.0

@@ -19,7 +19,7 @@ import numpy as np
 from spirillum.controllers.follower import Follower
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse
-from spirillum.controllers.signals import News
+from spirillum.controllers.signals import Controller, News
 
 __all__ = ["KnowingStop", "StopAt", "Timed"]
 
@@ -29,11 +29,8 @@ _HYSTERESIS = 0.1
 """h over the tolerance."""
 
 
-class StopAt:
+class StopAt(Controller):
     """From camera alone."""
-
-    blind = False
-    knowing = False
 
     def __init__(self, lab: Lab, speed: float, duty: float, goal: float, tolerance: float) -> None:
         """Begin.
@@ -74,11 +71,10 @@ class StopAt:
         return self._estimate
 
 
-class Timed:
+class Timed(Controller):
     """Open loop: on for a time that was computed beforehand; 0: does nothing."""
 
     blind = True
-    knowing = False
 
     def __init__(self, lab: Lab, on: float, duty: float) -> None:
         """Begin.
@@ -89,18 +85,13 @@ class Timed:
             duty: of the drive while it is on.
         """
         self._off_at, self._duty = on - 0.5 * lab.remote.period, duty
-        self._ever = on > 0.0
 
     def decide(self, news: News) -> float:
         """On for its time: the command that ends it is the one nearest to it."""
-        return self._duty if self._ever and news.time < self._off_at else 0.0
-
-    def estimate(self) -> Mapping[str, float]:
-        """Nothing."""
-        return {}
+        return self._duty if news.time < self._off_at else 0.0
 
 
-class KnowingStop:
+class KnowingStop(Controller):
     """Knows place, speed and all flow to come, without error: what no controller can beat by much.
 
     It stops as far before the goal as a coming pulse will carry it on at most, and swims on when the pulse is over.
@@ -131,7 +122,3 @@ class KnowingStop:
         if self._flow is not None:
             place += self._carried * self._way * max(0.0, self._way * self._flow.passed_after(acts))
         return self._duty if self._way * (self._goal - place) > 0.0 else 0.0
-
-    def estimate(self) -> Mapping[str, float]:
-        """Nothing: it knows."""
-        return {}

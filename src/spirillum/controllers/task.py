@@ -1,4 +1,4 @@
-"""What a task is: what it asks of a robot, which controllers it has, and how a run is judged."""
+"""What a task is: what a robot has to do, which controllers it has, and how a run is judged."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
-from pydantic import AfterValidator
 
 from spirillum.arrays import Samples
 from spirillum.controllers.lab import Lab
@@ -16,10 +15,10 @@ from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
-from spirillum.robot.arguments import Options, refusal
+from spirillum.robot.arguments import Options, within
 from spirillum.robot.fields import Time
 
-__all__ = ["CONTROLLERS", "FEEDBACK", "Brief", "Score", "Task", "carried_by_flow", "energy", "positive"]
+__all__ = ["CONTROLLERS", "FEEDBACK", "Brief", "Score", "Task", "carried_by_flow"]
 
 FEEDBACK = "feedback"
 CONTROLLERS = {
@@ -32,22 +31,9 @@ CONTROLLERS = {
 _LONGEST = 24.0 * 3600.0
 
 
-def _length(value: float) -> float:
-    if not 0.1 <= value <= _LONGEST:
-        raise refusal(f"= {value:g} s; allowed: 0.1 to {_LONGEST:g} s")
-    return value
-
-
-def positive(value: float, unit: str) -> float:
-    """A check of values above 0; `unit` is for the sentence of an error."""
-    if not value > 0.0:
-        raise refusal(f"= {value:g} {unit}; allowed: above 0 {unit}")
-    return value
-
-
 @dataclass(frozen=True)
 class Brief:
-    """What is worked out once for all runs of a task, from the robot as its file says; SI."""
+    """What is computed once for all runs of a task, from the robot as its file says; SI."""
 
     lab: Lab
     duration: float
@@ -72,7 +58,7 @@ class Score:
     """How a run did; SI."""
 
     error: float
-    """What the task judges by; NaN if the run has none."""
+    """What the task judges by."""
     good: bool
     """Whether it is good enough."""
     energy: float
@@ -80,7 +66,7 @@ class Score:
 
 
 class Task(Options):
-    """What is asked of a robot."""
+    """What a robot has to do."""
 
     argument: ClassVar[str] = "task"
     prefixed: ClassVar[bool] = True
@@ -90,34 +76,37 @@ class Task(Options):
     error_unit: ClassVar[str]
     """SI."""
 
-    duration: Annotated[Time | None, AfterValidator(lambda value: value if value is None else _length(value))] = None
+    duration: Annotated[Time, within(0.1, _LONGEST, "s")] | None = None
     """Of a run; None: from the speed that is predicted."""
 
     @abstractmethod
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:
-        """Check the task against a robot, and work out what its controllers have to know.
+        """Check the task against a robot, and compute what its controllers have to know.
 
         Raises:
-            InputError: if the robot cannot be asked that.
+            InputError: if the robot cannot do it.
         """
 
     @abstractmethod
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
         """A new controller by its name in `CONTROLLERS`; only `knowing` looks at the flow."""
 
-    @abstractmethod
     def score(self, run: LoopRun, brief: Brief) -> Score:
-        """Judge a run."""
+        """Judge a run; one that ended before its time is not good."""
+        error = self._error(run, brief)
+        return Score(error, self._is_good(error) and not run.ended, run.energy)
+
+    @abstractmethod
+    def _error(self, run: LoopRun, brief: Brief) -> float:
+        """Error of a run, in `error_unit`."""
+
+    @abstractmethod
+    def _is_good(self, error: float) -> bool:
+        """Whether an error is small enough."""
 
     @abstractmethod
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
         """For figures: the place that is aimed at, m, (n,), by a robot that swims along `way`, and what is good, m."""
-
-
-def energy(run: LoopRun) -> float:
-    """Energy that a run took, J."""
-    values = run.moments[-1].values
-    return float(values.get("electrical_energy", values["drive_energy"]))
 
 
 def carried_by_flow(plant: Plant, velocity: float, duration: float) -> float:

@@ -6,13 +6,14 @@ from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
+from pydantic import AfterValidator
 from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.problems import problems_in
 
-__all__ = ["Options", "in_range", "one_of", "refusal", "whole"]
+__all__ = ["Options", "in_range", "one_of", "refusal", "whole", "within"]
 
 
 class Options(Section):
@@ -82,6 +83,17 @@ def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
         return float(value)
 
     return check
+
+
+def within(low: float, high: float, unit: str) -> AfterValidator:
+    """A check of a quantity from `low` to `high`, SI; `unit` is for the sentence of an error."""
+
+    def check(value: float) -> float:
+        if not low <= value <= high:
+            raise refusal(f"= {value:g} {unit}; allowed: {low:g} to {high:g} {unit}")
+        return value
+
+    return AfterValidator(check)
 
 
 def whole(low: int, high: int) -> Callable[[Any], int]:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from spirillum.errors import InputError, did_you_mean
-from spirillum.robot.arguments import Options, in_range, whole
+from spirillum.robot.arguments import Options, in_range, whole, within
 from spirillum.robot.fields import Angle
 
 __all__ = ["Degradation"]
@@ -28,7 +28,7 @@ class Degradation(Options):
     """Constant rate factor of the compression (H.264), 0 (lossless) to 51."""
     dropped: Annotated[float, BeforeValidator(in_range(0.0, 0.9))] = 0.0
     """Share of frames that are lost; the time stamps of the others stay true."""
-    tilt: Annotated[Angle, AfterValidator(in_range(0.0, 0.2, " rad"))] = 0.0
+    tilt: Annotated[Angle, within(0.0, 0.2, "rad")] = 0.0
     """Angle between optical axis and vertical, in a random direction."""
     glare: Annotated[float, BeforeValidator(in_range(0.0, 1.0))] = 0.0
     """Share of the body's picture under a spot of glare."""

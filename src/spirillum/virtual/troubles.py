@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator
+from pydantic import BeforeValidator
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.extras import required
-from spirillum.robot.arguments import Options, in_range
+from spirillum.robot.arguments import Options, in_range, within
 from spirillum.robot.fields import Angle
 from spirillum.robot.robot import Robot
 
@@ -36,7 +36,7 @@ class Troubles(Options):
     """Share of frames that are lost while the film's times go on evenly, as simple recording scripts write them."""
     handheld: Annotated[float, BeforeValidator(in_range(0.0, 30.0, " pixels"))] = 0.0
     """Sway of a camera held by hand: standard deviation of its slow part, pixels; a third of it from frame to frame."""
-    rolled: Annotated[Angle, AfterValidator(in_range(-0.6, 0.6, " rad"))] = 0.0
+    rolled: Annotated[Angle, within(-0.6, 0.6, "rad")] = 0.0
     """Angle by which the camera is turned about its optical axis against the channel."""
     uneven_stripes: Annotated[float, BeforeValidator(in_range(0.0, 0.5))] = 0.0
     """Widths of hand-painted stripes: largest difference from an even one, over it."""
