@@ -4,7 +4,7 @@
 
 Each stands between `<!-- written: NAME ARGUMENTS -->` and `<!-- end of written -->`; NAME is an entry of `LISTINGS`. A
 test compares them with what the code says now. `--pictures` also draws the pictures of the paper's study and of the
-tutorial, in `docs/images/study/`.
+theory in Python, in `docs/images/study/`.
 """
 
 from __future__ import annotations
@@ -368,7 +368,7 @@ def renewed(text: str) -> str:
 
 
 def draw_pictures() -> None:
-    """Draw the figures of the paper's study, and run the tutorial, whose picture its page shows."""
+    """Draw the figures of the paper's study, and run the example whose picture a page shows."""
     import runpy
 
     from spirillum.papers.registry import figures_of
@@ -377,11 +377,11 @@ def draw_pictures() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in figures_of(_studied()).items():
         picture.figure().savefig(folder / f"{name}.png", dpi=110)
-    script = ROOT / "examples" / "tutorial.py"
+    script = ROOT / "examples" / "theory_in_python.py"
     with TemporaryDirectory() as where:
         sys.argv = [str(script), where]
         runpy.run_path(str(script), run_name="__main__")
-        shutil.copy(Path(where) / "advance-per-turn.png", folder / "tutorial.png")
+        shutil.copy(Path(where) / "advance-per-turn.png", folder / "advance-per-turn.png")
 
 
 def main(arguments: list[str]) -> None:

@@ -141,7 +141,7 @@ def misfit_warnings(
                 f"the {CALLED[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
                 "discrepancy holds both"
             )
-            if size.value > _BEYOND_TRIALS:
+            if size.value > _BEYOND_TRIALS and problem.ratio(name).trials.size > 1:
                 found.append(
                     f"the discrepancy of the {CALLED[name]}, {percent(size.value)}, is more than trials are off by: "
                     f"model '{problem.model.name}' misses the {CALLED[name]} from tail to tail, its fitted numbers "

@@ -21,6 +21,7 @@ from spirillum.robot.placement import Placement
 from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
+from spirillum.swimming.model_choice import TABLE_TAKES
 from spirillum.swimming.preparation import prepare_all
 
 __all__ = ["ROUGHNESS_BAND", "Ranges", "place_ranges", "tube_forward"]
@@ -107,8 +108,8 @@ def _tables(
         more = f" and {len(lacking) - _NAMED} more" if len(lacking) > _NAMED else ""
         raise InputError(
             f"{experiment.source}: model 'tube' asks a table of every robot, and {len(lacking)} of {len(found)} have "
-            f"none ({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, some minutes "
-            "each, or `spirillum prepare` of each with its tail"
+            f"none ({'; '.join(lacking[:_NAMED])}{more}); allowed: --prepare, which makes them first, each in "
+            f"{TABLE_TAKES}, or `spirillum prepare` of each with its tail"
         )
     made = [one.table for one in prepare_all(experiment.robots, progress=tell)] if lacking else found
     return TabledTube({table.key: table for table in made if table is not None})

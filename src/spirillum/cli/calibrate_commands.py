@@ -49,7 +49,10 @@ def calibrate(
         ),
     ] = None,
     prepare: Annotated[
-        bool, typer.Option("--prepare", help="With tube, make the tables that are not there, some minutes each.")
+        bool,
+        typer.Option(
+            "--prepare", help="With tube, make the tables that are not there, 15 to 20 minutes of one core each."
+        ),
     ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
@@ -124,7 +127,10 @@ def rank_models(
         ),
     ] = None,
     prepare: Annotated[
-        bool, typer.Option("--prepare", help="With tube, make the tables that are not there, some minutes each.")
+        bool,
+        typer.Option(
+            "--prepare", help="With tube, make the tables that are not there, 15 to 20 minutes of one core each."
+        ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,

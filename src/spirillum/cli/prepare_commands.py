@@ -25,7 +25,7 @@ def prepare(
     settings: Settings = None,
     json: Json = False,
 ) -> None:
-    """Make the tables of robots in their tubes: minutes, once; then `predict` and `simulate` take them.
+    """Make the tables of robots in their tubes, once; then `predict` and `simulate` take them.
 
     Robots that differ in their tails share most of the work. An interrupted preparation goes on where it was.
 

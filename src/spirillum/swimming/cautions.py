@@ -11,7 +11,7 @@ from spirillum.robot.limits import Limit
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.model_choice import TABLE_TAKES, has_table
 from spirillum.units import show
 
 __all__ = ["accuracy_limits", "calibration_warnings", "flow_limit", "no_band_warnings"]
@@ -97,5 +97,5 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[str]:
         return []
     more = "a band over them takes minutes (--band)"
     if not has_table(batch):
-        more = "`spirillum prepare` makes the robot's table, once, in minutes; with it a band over them takes a second"
+        more = f"`spirillum prepare` makes its table, once, in {TABLE_TAKES}; with it a band over them takes a second"
     return [f"{' and '.join(over)} are not known, and this is the answer at one place: {more}"]

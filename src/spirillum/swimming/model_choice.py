@@ -21,12 +21,14 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import requirements
 
-__all__ = ["AUTO", "UNBOUNDED", "WALLED", "ModelChoice", "choose_model", "fitted_models", "has_table"]
+__all__ = ["AUTO", "TABLE_TAKES", "UNBOUNDED", "WALLED", "ModelChoice", "choose_model", "fitted_models", "has_table"]
 
 AUTO = "auto"
 """Name that leaves the choice of the model to `choose_model`."""
 WALLED, UNBOUNDED = "tube", "slender"
 """What answers for a robot in a channel, and for one without."""
+TABLE_TAKES = "15 to 20 minutes of one core"
+"""What it takes to make the table of one robot, measured for the paper's (`tools/ship_tables.py`)."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +91,8 @@ def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool,
         return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
     if (tables_only or motion == "free") and not has_table(batch):
         return (
-            "the robot has no table for its tube yet: `spirillum prepare` makes one in minutes, and so does the first "
-            f"run with --model {WALLED}"
+            f"the robot has no table for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and so does the "
+            f"first run with --model {WALLED}"
         )
     return ""
 
