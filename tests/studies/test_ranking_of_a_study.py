@@ -8,7 +8,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.results.study_report import write_report
-from spirillum.studies.ranking import ranking_of
+from spirillum.studies.ranking import best_in_words, ranking_of
 
 GRID = {
     "models": ["rft", "sbt"],
@@ -51,6 +51,8 @@ def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
     assert (found.kind, fastest.places, fastest.of_places) == ("band", 2, 3)
     assert found.robots[0].low["forward_velocity"] == pytest.approx(0.5 * found.robots[0].values["forward_velocity"])
     assert "(" in found.message
+    assert best_in_words(fastest.to_dict()) == f"fastest: {fastest.robot.name}, at 2 of 3 places"
+    assert best_in_words(fastest.to_dict(), "1 mm/s") == f"fastest: {fastest.robot.name}, 1 mm/s, at 2 of 3 places"
 
 
 def test_report_starts_with_the_ranking(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from spirillum.citations import REFERENCES
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
 from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
-from spirillum.studies.ranking import Best, RankedRobot, StudyRanking
+from spirillum.studies.ranking import ENDS, RANKED, Best, RankedRobot, StudyRanking, best_in_words
 from spirillum.units import among, display_unit, in_unit
 
 if TYPE_CHECKING:
@@ -46,34 +46,19 @@ def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, A
         "message": ranking.message,
         "basis": f"model {ranking.model}, friction reading {ranking.friction}"
         + (", the channel's walls not computed" if ranking.walls else ""),
-        "kind": ranking.kind,
-        "best": [_best_words(best) for best in ranking.best],
-        "header": [
-            "robot",
-            *(f"{_RANKED[name]}, {units[name]}".removesuffix(", 1") for name in units),
-        ],
+        "ends": ENDS.get(ranking.kind, ""),
+        "best": [best_in_words(best.to_dict(), _size(best)) for best in ranking.best],
+        "header": ["robot", *(RANKED[name].heading(unit) for name, unit in units.items())],
         "rows": [[robot.name, *(_ranked_cell(robot, name, units[name]) for name in units)] for robot in first],
         "more": len(ranking.robots) - len(first),
     }
 
 
-_RANKED = {
-    "forward_velocity": "speed",
-    "hydrodynamic_efficiency": "efficiency",
-    "motor_current": "current",
-    "shaft_power": "power",
-}
-
-
-def _best_words(best: Best) -> str:
-    """Which robot is the best by a quantity, and how surely."""
-    if best.alike:
-        return f"{best.what}: no difference that counts (all within {100 * best.spread:.1g} %)"
-    sure = f", at {best.places} of {best.of_places} places" if best.of_places else ""
-    value = best.robot.values[best.quantity]
-    shown = display_unit(value, unit_of(best.quantity))
-    size = f"{in_unit(value, unit_of(best.quantity), shown)} {shown}".removesuffix(" 1")
-    return f"{best.what}: {best.robot.name} ({size}{sure})"
+def _size(best: Best) -> str:
+    """The value of the best robot, with its unit."""
+    value, unit = best.robot.values[best.quantity], unit_of(best.quantity)
+    shown = display_unit(value, unit)
+    return f"{in_unit(value, unit, shown)} {shown}".removesuffix(" 1")
 
 
 def _ranked_cell(robot: RankedRobot, name: str, unit: str) -> str:
@@ -98,7 +83,7 @@ def content(dataset: xr.Dataset) -> dict[str, Any]:
         "title": str(attributes.get("title", "Study")),
         "note": str(attributes.get("note", "")),
         "observations": str(attributes["observations"]) if "observed_forward_velocity" in dataset else None,
-        "size": _size(dataset),
+        "size": _question(dataset),
         "models": [(name, _known_errors(name, robots)) for name in models],
         "readings": [(name, FRICTION_MEANINGS.get(name, "")) for name in readings],
         "calibrations": calibrations[:MOST_CALIBRATIONS],
@@ -112,7 +97,7 @@ def content(dataset: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _size(dataset: xr.Dataset) -> str:
+def _question(dataset: xr.Dataset) -> str:
     """The question of the study in a line."""
     sizes = dataset.sizes
     if "channel" in sizes:

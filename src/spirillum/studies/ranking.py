@@ -24,11 +24,47 @@ from spirillum.units import display_unit, in_unit, show
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Best", "RankedRobot", "StudyRanking", "can_be_ranked", "ranking_of"]
+__all__ = [
+    "ENDS",
+    "RANKED",
+    "Best",
+    "Ranked",
+    "RankedRobot",
+    "StudyRanking",
+    "best_in_words",
+    "can_be_ranked",
+    "ranking_of",
+]
 
 _ALIKE = 0.01
 _MOST = 1000
 """Robots in an answer."""
+
+
+class Ranked(NamedTuple):
+    """How a quantity ranks robots."""
+
+    title: str
+    """Its name in tables and figures."""
+    superlative: str
+    """What the best robot is by it."""
+    sign: float
+    """1 where the largest value is the best, -1 where the least is."""
+
+    def heading(self, unit: str) -> str:
+        """Title and unit of a column or an axis."""
+        return f"{self.title}, {unit}".removesuffix(", 1")
+
+
+RANKED = {
+    "forward_velocity": Ranked("speed", "fastest", 1.0),
+    "hydrodynamic_efficiency": Ranked("efficiency", "most efficient", 1.0),
+    "motor_current": Ranked("current", "least current", -1.0),
+    "shaft_power": Ranked("power", "least power", -1.0),
+}
+"""Quantities that rank robots, in the order in which they are shown."""
+ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
+"""What low and high are, by the kind of a ranking."""
 
 
 class RankedRobot(NamedTuple):
@@ -101,12 +137,11 @@ class StudyRanking:
         """What the ranking says, in a sentence."""
         if not self.robots:
             return "no robot has an answer"
-        first = self.best[0]
-        speed, unit = first.robot.values["forward_velocity"], "forward_velocity"
-        low, high = first.robot.low[unit], first.robot.high[unit]
+        first = self.robots[0]
+        speed, low, high = (of["forward_velocity"] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
-        return f"fastest: {first.robot.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
+        return f"fastest: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -125,6 +160,19 @@ class StudyRanking:
         }
 
 
+def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
+    """Which robot is the best by a quantity, and how surely.
+
+    Args:
+        best: as `Best.to_dict` gives it.
+        size: its value with the unit; empty where that stands in a table beside.
+    """
+    if best["alike"]:
+        return f"{best['what']}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
+    sure = f"at {best['places']} of {best['of_places']} places" if "places" in best else ""
+    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, sure)))
+
+
 def can_be_ranked(dataset: xr.Dataset) -> bool:
     """Whether a dataset is a study with all its dimensions and the quantities that rank robots.
 
@@ -132,7 +180,7 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
         dataset: any dataset.
     """
     robots = {"robot"} if "robot" in dataset.dims else {"channel", "wavelength", "amplitude"}
-    return {"model", "friction", *robots} <= set(dataset.dims) and {*_WORDS} <= set(dataset.data_vars)
+    return {"model", "friction", *robots} <= set(dataset.dims) and {*RANKED} <= set(dataset.data_vars)
 
 
 def ranking_of(dataset: xr.Dataset) -> StudyRanking:
@@ -216,17 +264,8 @@ def _ends(chosen: xr.Dataset, known: list[str], names: list[str]) -> tuple[dict[
     return found[0], found[1], kind
 
 
-_WORDS = {
-    "forward_velocity": ("fastest", 1.0),
-    "hydrodynamic_efficiency": ("most efficient", 1.0),
-    "motor_current": ("least current", -1.0),
-    "shaft_power": ("least power", -1.0),
-}
-"""Quantity to its word and to the sign by which the largest is the best."""
-
-
 def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, RankedRobot]) -> Best:
-    word, sign = _WORDS[name]
+    _title, word, sign = RANKED[name]
     among = np.array(list(ranked))
     winner = int(among[np.nanargmax(sign * values[among])])
     spread = float(np.ptp(values[among][np.isfinite(values[among])]) / max(abs(values[winner]), 1e-300))

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, counted, grid
+from spirillum.studies.ranking import ENDS, RANKED, best_in_words
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -18,8 +19,8 @@ def table(answer: Answer, console: Console, *, rows: int = 10) -> None:
     sizes = answer["dimensions"]
     robots = sizes["robot"] if "robot" in sizes else sizes["channel"] * sizes["wavelength"] * sizes["amplitude"]
     sizes_in_words = ((robots, "robot"), (sizes["model"], "model"), (sizes["friction"], "reading"))
-    asked = ", ".join(counted(number, word) for number, word in sizes_in_words)
-    console.print(f"[bold]{escape(answer['title'])}[/bold]: {asked} of the friction", highlight=False)
+    extent = ", ".join(counted(number, word) for number, word in sizes_in_words)
+    console.print(f"[bold]{escape(answer['title'])}[/bold]: {extent} of the friction", highlight=False)
     show_ranking(answer["ranking"], console, rows)
     if answer["unanswered"]:
         console.print(f"{answer['unanswered']} results are empty: variable `outside` says why", highlight=False)
@@ -50,9 +51,9 @@ def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
     if len(robots) > rows:
         console.print(f"and {len(robots) - rows} more: --rows, ranking.csv", highlight=False)
     for best in ranking["best"]:
-        console.print(escape(_best(best)), highlight=False, soft_wrap=True)
-    if ranking["low_and_high"] in _KINDS:
-        console.print(f"low, high: {_KINDS[ranking['low_and_high']]}", highlight=False)
+        console.print(escape(best_in_words(best)), highlight=False, soft_wrap=True)
+    if ranking["low_and_high"] in ENDS:
+        console.print(f"low, high: {ENDS[ranking['low_and_high']]}", highlight=False)
 
 
 def _basis(ranking: Answer) -> str:
@@ -70,24 +71,8 @@ def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]
     ends = [end for end in ("low", "high") if name == "forward_velocity" and any(end in item[name] for item in robots)]
     return [
         (
-            f"{_TITLES[name]}, {shown}".removesuffix(", 1") if end == "value" else end,
+            RANKED[name].heading(shown) if end == "value" else end,
             [in_unit(item[name].get(end), own, shown) for item in robots],
         )
         for end in ("value", *ends)
     ]
-
-
-_KINDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
-_TITLES = {
-    "forward_velocity": "speed",
-    "hydrodynamic_efficiency": "efficiency",
-    "motor_current": "current",
-    "shaft_power": "power",
-}
-
-
-def _best(best: Answer) -> str:
-    if best["alike"]:
-        return f"{best['what']}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
-    sure = f", at {best['places']} of {best['of_places']} places" if "places" in best else ""
-    return f"{best['what']}: {best['robot']}{sure}"

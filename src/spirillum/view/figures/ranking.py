@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
 from spirillum.quantities import unit_of
-from spirillum.studies.ranking import RankedRobot, StudyRanking
+from spirillum.studies.ranking import ENDS, RANKED, RankedRobot, StudyRanking
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, told_apart
 
@@ -18,12 +18,6 @@ __all__ = ["ranking_picture"]
 MOST = 12
 """Robots in the figure."""
 _WIDTH, _ROW, _ENDS = 6.9, 0.24, 1.0  # inches
-_TITLES = {
-    "forward_velocity": "speed",
-    "hydrodynamic_efficiency": "efficiency",
-    "motor_current": "current",
-    "shaft_power": "power at the shaft",
-}
 
 
 def ranking_picture(ranking: StudyRanking) -> Picture:
@@ -34,11 +28,11 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
     """
     count = len(ranking.robots)
     which = f"The {min(MOST, count)} fastest of {count} robots" if count > MOST else f"All {count} robots"
-    lines = {"band": " Lines: the band over gap and pitch.", "interval": " Lines: 95 % intervals."}
+    lines = f" Lines: {ENDS[ranking.kind]}." if ranking.kind else ""
     walls = " The channel's walls are not computed." if ranking.walls else ""
     caption = (
         f"{which}, by model {ranking.model} with friction reading {ranking.friction}; filled: the best of its column."
-        f"{lines.get(ranking.kind, '')}{walls}"
+        f"{lines}{walls}"
     )
     title = ranking.message[:1].upper() + ranking.message[1:]
     return Picture.of(plain(title, 120), caption, f"{plain(title, 120)}. {which}.", lambda: _drawn(ranking))
@@ -70,7 +64,7 @@ def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[
     winner = np.array([robot.name == best.get(name) for robot in robots])
     for chosen, face in ((winner, colour), (~winner, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
-    panel.set_xlabel(f"{_TITLES[name]}, {scale.unit}".removesuffix(", 1"))
+    panel.set_xlabel(RANKED[name].heading(scale.unit))
     panel.xaxis.set_major_locator(MaxNLocator(4))
     panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))))
     panel.tick_params(axis="y", length=0)
