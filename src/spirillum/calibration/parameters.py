@@ -14,6 +14,8 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
+from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.robot.options import CALIBRATED
 
 __all__ = [
     "ASSUMABLE",
@@ -133,15 +135,14 @@ class Parameter:
     """Whether it acts on the motor's rate, so that the motor has to be predicted."""
 
 
-_ALL = ("sbt", "rft", "slender", "tube")
-_FACTORED = ("sbt", "rft", "slender")
+_ALL = tuple(SWIMMER_MODELS)
 _LISTED = (
     Parameter(
         "body_drag",
         "factor on the body's axial drag D_x, one for each channel (Table III)",
         "",
         "channel",
-        _FACTORED,
+        CALIBRATED,
         "a body in a tube drags as much as alone or several times more: from a third to fourteen times",
     ),
     Parameter(
@@ -149,7 +150,7 @@ _LISTED = (
         "factor on the body's rotational drag E_x, one for each channel (Table III)",
         "",
         "channel",
-        _FACTORED,
+        CALIBRATED,
         "walls raise it, and the paper found 0.6: from a seventh to seven times",
     ),
     Parameter(
@@ -190,7 +191,7 @@ _LISTED = (
         "diameter of the tail's wire",
         "m",
         "all",
-        ("sbt", "rft", "slender"),
+        CALIBRATED,
         "around the robot's own value, 95 % within 20 %: lacquer, winding and measurement",
     ),
     Parameter(
@@ -258,9 +259,8 @@ PARAMETERS: dict[str, Parameter] = {parameter.name: parameter for parameter in _
 """All parameters by name."""
 
 DEFAULT_FREE = {
-    "sbt": ("body_drag", "body_rotation", "friction"),
+    **dict.fromkeys(CALIBRATED, ("body_drag", "body_rotation", "friction")),
     "rft": ("body_drag", "friction"),
-    "slender": ("body_drag", "body_rotation", "friction"),
     "tube": ("gap", "friction"),
 }
 """What is free if nothing is said: what the paper fitted (Table III, Figs 5 and 6 i to l), or the gap."""

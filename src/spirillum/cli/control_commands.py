@@ -25,13 +25,13 @@ _PICTURES = "Pictures"
 def _complete_tasks(incomplete: str) -> list[str]:
     from spirillum.controllers.registry import TASKS
 
-    return starting(tuple(TASKS), incomplete)
+    return starting(TASKS, incomplete)
 
 
 def _complete_controllers(incomplete: str) -> list[str]:
     from spirillum.controllers.task import CONTROLLERS
 
-    return starting(tuple(CONTROLLERS), incomplete)
+    return starting(CONTROLLERS, incomplete)
 
 
 def control(

@@ -39,7 +39,9 @@ def _complete_accuracies(incomplete: str) -> list[str]:
 
 
 def _complete_models(incomplete: str) -> list[str]:
-    return starting(("auto", "slender", "tube"), incomplete)
+    from spirillum.fields.flow import FLOW_MODELS
+
+    return starting(("auto", *FLOW_MODELS), incomplete)
 
 
 def flow(

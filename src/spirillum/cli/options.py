@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -54,7 +55,7 @@ PLACE_PANEL = "Place in the channel (model tube)"
 """Panel of the help: where in its channel the robot lies."""
 
 
-def starting(words: tuple[str, ...], incomplete: str) -> list[str]:
+def starting(words: Iterable[str], incomplete: str) -> list[str]:
     """Words that begin with what is typed."""
     return [word for word in words if word.startswith(incomplete)]
 
@@ -62,7 +63,7 @@ def starting(words: tuple[str, ...], incomplete: str) -> list[str]:
 def complete_presets(incomplete: str) -> list[str]:
     """Names of presets."""
     folder = Path(__file__).parent.parent / "robot" / "presets"
-    return starting(tuple(sorted(path.stem for path in folder.glob("*.toml"))), incomplete)
+    return starting(sorted(path.stem for path in folder.glob("*.toml")), incomplete)
 
 
 def complete_robots(incomplete: str) -> list[str]:
@@ -74,17 +75,21 @@ def complete_robots(incomplete: str) -> list[str]:
 
 def complete_models(incomplete: str) -> list[str]:
     """Names of models that make a robot swim."""
-    return starting(("rft", "sbt", "slender", "tube"), incomplete)
+    from spirillum.fluid.registry import SWIMMER_MODELS
+
+    return starting(sorted(SWIMMER_MODELS), incomplete)
 
 
 def complete_auto_models(incomplete: str) -> list[str]:
     """Names of models that make a robot swim, and the word that leaves the choice open."""
-    return starting(("auto", "rft", "sbt", "slender", "tube"), incomplete)
+    return [*starting(("auto",), incomplete), *complete_models(incomplete)]
 
 
 def complete_resistance_models(incomplete: str) -> list[str]:
     """Names of models that give a resistance matrix."""
-    return starting(("perrin", "rft", "sbt", "slender", "tube"), incomplete)
+    from spirillum.fluid.registry import MODELS
+
+    return starting(sorted(MODELS), incomplete)
 
 
 def complete_parts(incomplete: str) -> list[str]:

@@ -21,7 +21,7 @@ from spirillum.designs.reading import condition_of, quantity_of, with_unit
 from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
 from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
-from spirillum.errors import InputError, did_you_mean
+from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
@@ -34,7 +34,6 @@ from spirillum.units import KINDS, parse_option
 
 __all__ = ["design"]
 
-_MODELS = ("sbt", "rft", "slender", "tube")
 _MORE_DRAWS = 4
 """Draws of what is stated over those of the search."""
 _SETS = 16
@@ -91,8 +90,6 @@ def design(
         InputError: for wrong input, or where no design can be wound and keeps all conditions.
     """
     given, options = load(robot), Judged.of(judged)
-    if model not in _MODELS:
-        raise InputError(f"model = {model!r}{did_you_mean(model, _MODELS)}; allowed: {', '.join(_MODELS)}")
     chosen = find_swimmer_model(model)
     unknowns = unknowns_of(given, unknown, posterior, model)
     space = space_of(unknowns.robot, vary)

@@ -9,7 +9,7 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.links import Link, links_of
@@ -17,7 +17,7 @@ from spirillum.robot.robot import STANDARD_GRAVITY, Robot
 
 __all__ = ["FULL_MODELS", "joint_friction", "sidecar_of"]
 
-FULL_MODELS = ("rft", "slender")
+FULL_MODELS = tuple(name for name, model in SWIMMER_MODELS.items() if not (model.axial_only or model.placed))
 """Models that give the whole 12x12 matrix in unbounded fluid, for any motion of the robot."""
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]

@@ -163,17 +163,20 @@ class Calibration(Section):
     """Geometry that they were fitted to."""
 
 
+CALIBRATED = ("sbt", "rft", "slender")
+"""Models whose drag of the body a calibration may multiply."""
+
+
 def known_model(name: str) -> str:
     """The name of a model that takes factors.
 
     Raises:
         ValueError: for any other name.
     """
-    if name not in _CALIBRATED:
-        raise ValueError(f"a model that swims: {', '.join(_CALIBRATED)}")
+    if name not in CALIBRATED:
+        raise ValueError(f"a model that swims: {', '.join(CALIBRATED)}")
     return name
 
 
-_CALIBRATED = ("sbt", "rft", "slender")
 Calibrations = dict[Annotated[str, AfterValidator(known_model)], Calibration]
 """Calibration factors by model."""
