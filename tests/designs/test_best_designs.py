@@ -120,6 +120,7 @@ def unsure() -> sp.Design:
         subject_to=["tail_rotation_rate >= 0.8 Hz"],
         unknown=FRICTION,
         judged={"draws": 64},
+        model="sbt",
     )
 
 
@@ -257,7 +258,7 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
         ({"subject_to": ["motor_current <= nan A"]}, "not finite"),
         ({"subject_to": ["__import__('os') <= 1 A"]}, "NAME <= VALUE UNIT"),
         ({"subject_to": ["forward_velocity >= 1 m/s"]}, "no design keeps all conditions"),
-        ({"model": "auto"}, "allowed: sbt, rft, slender"),
+        ({"model": "panels"}, "allowed: auto, "),
         ({"unknown": {"tail.wavelength": "5 mm:9 mm"}}, "varied and unknown"),
         ({"judged": {"draws": 1}}, "draws"),
         ({"bench": {"mandrel": -1.0}}, "bench.mandrel"),
@@ -265,6 +266,7 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
 )
 def test_what_is_wrong_is_said(change: dict, words: str) -> None:
     given = {"vary": {"tail.wavelength": "10 mm:30 mm"}, "maximise": "forward_velocity", "judged": {"draws": 8}}
+    given["model"] = "sbt"
     with pytest.raises(InputError, match=re.escape(words)):
         sp.design("biorob2012-wide", **(given | change))
 

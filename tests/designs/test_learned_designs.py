@@ -10,7 +10,7 @@ import spirillum as sp
 from spirillum.cli import main
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.learned import Points, corrected, points_of, solved_at
+from spirillum.designs.learned import Points, chosen_model, corrected, points_of, solved_at
 from spirillum.designs.learning import learned_best
 from spirillum.designs.reading import quantity_of
 from spirillum.designs.space import Variable, space_of
@@ -90,6 +90,32 @@ def test_what_cannot_be_learned_gets_a_sentence() -> None:
             sp.design("biorob2012-wide", vary, **speed, **more)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="channel"):
         sp.design("ecoli", {"tail.wavelength": "2 um:3 um"}, **speed)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("name", "vary", "unknown", "model", "why"),
+    [
+        ("biorob2012-wide", TAIL, {}, "tube", "the robot is in a channel"),
+        ("biorob2012-wide", TAIL, {"fluid.viscosity": "1 Pa s:2 Pa s"}, "tube", "the robot is in a channel"),
+        ("ecoli", {"tail.wavelength": "2 um:3 um"}, {}, "slender", "the robot has no channel"),
+        ("biorob2012-wide", {"body.diameter": "10 mm:20 mm"}, {}, "sbt", "body.diameter is no field of the tail"),
+        ("biorob2012-wide", TAIL, {"channel.diameter": "30 mm:40 mm"}, "sbt", "channel.diameter is no field"),
+        (
+            "biorob2012-wide",
+            {**TAIL, "tail.length": "30 mm:60 mm", "tail.wire_diameter": "0.5 mm:1 mm"},
+            {},
+            "sbt",
+            "4 fields of the tail are varied",
+        ),
+    ],
+)
+def test_auto_takes_the_model_that_knows_most_and_can_be_learned(
+    name: str, vary: dict[str, str], unknown: dict[str, str], model: str, why: str
+) -> None:
+    robot = load(name)
+    found = chosen_model("auto", robot, space_of(robot, vary), unknowns_of(robot, unknown, None, "auto"))
+    assert found.model == model
+    assert found.reason.startswith(why)
 
 
 def test_body_for_a_printer_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,13 @@ def design(
         typer.Option(metavar="FIELD=LOW:HIGH", help="A field that is not known, uniform over its range; repeatable."),
     ] = None,
     posterior: Posterior = None,
-    model: Annotated[str, typer.Option(help="Hydrodynamic model: sbt, rft, slender or tube.")] = "sbt",
+    model: Annotated[
+        str,
+        typer.Option(
+            help="Hydrodynamic model: sbt, rft, slender or tube; auto: tube for a robot in a channel, slender without "
+            "one, learned from some fifteen tails in about a minute; sbt where they cannot be learned."
+        ),
+    ] = "auto",
     tail_rate: TailRate = None,
     statistic: Annotated[
         str, typer.Option(metavar="mean|quantile", help="Of the objective over what is not known.")

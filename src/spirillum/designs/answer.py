@@ -120,6 +120,8 @@ class Design(Shown):
     warnings: tuple[str, ...]
     learned: Learned | None = None
     """How well a model that solves for the flow is known; None where it was asked for every design."""
+    model_reason: str = ""
+    """Why the model was taken, in half a sentence; empty where it was asked for."""
 
     @property
     def winding(self) -> dict[str, float]:
@@ -154,6 +156,7 @@ class Design(Shown):
         content: dict[str, Any] = {
             "robot": self.today.name,
             "model": self.model,
+            **({"model_reason": self.model_reason} if self.model_reason else {}),
             "objective": {"words": first.words, **quantity(self.objective, unit)},
             "conditions": list(self.conditions),
             "design": {path: quantity(value, self.units[path]) for path, value in self.values.items()},

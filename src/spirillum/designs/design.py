@@ -13,7 +13,7 @@ from spirillum.arrays import Flags, Samples
 from spirillum.designs.answer import Alternative, Design, Uncertainty
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
-from spirillum.designs.learned import is_learned
+from spirillum.designs.learned import chosen_model, is_learned
 from spirillum.designs.learning import learned_best
 from spirillum.designs.options import Judged
 from spirillum.designs.profiles import bound_by_of, profile_of
@@ -29,6 +29,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.text import with_numbers
 from spirillum.swimming.answer import LEVEL, STEADY, Swimming
 from spirillum.swimming.drive_warnings import drive_warnings
+from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.steady import friction_reading
 from spirillum.units import KINDS, parse_option
 
@@ -58,7 +59,7 @@ def design(
     posterior: str | Path | None = None,
     judged: Judged | Mapping[str, Any] | None = None,
     bench: Bench | Mapping[str, Any] | None = None,
-    model: str = "sbt",
+    model: str = AUTO,
     tail_rate: str | float | None = None,
     progress: Tell | None = None,
 ) -> Design:
@@ -82,7 +83,9 @@ def design(
         bench: `mandrel`, `clearance`.
         model: `sbt`, `rft`, `slender` or `tube`. `tube` and `slender` are learned: a fast model with a correction from
             some designs that are solved for, the best of them in the end. `slender` is asked itself where more than
-            three fields of the tail, or fields of the body, are varied and nothing is unknown.
+            three fields of the tail, or fields of the body, are varied and nothing is unknown. `auto` is that of the
+            posterior, else `tube` for a robot in a channel and `slender` without one, and `sbt` where the flow cannot
+            be learned.
         tail_rate: lab rotation rate of the tail; None: the robot's own drive.
         progress: told what is being done, how much of it, and of how much.
 
@@ -90,9 +93,10 @@ def design(
         InputError: for wrong input, or where no design can be wound and keeps all conditions.
     """
     given, options = load(robot), Judged.of(judged)
-    chosen = find_swimmer_model(model)
     unknowns = unknowns_of(given, unknown, posterior, model)
     space = space_of(unknowns.robot, vary)
+    choice = chosen_model(model, given, space, unknowns)
+    chosen = find_swimmer_model(choice.model)
     twice = {item.path for item in unknowns.ranges} & {item.path for item in space.variables}
     if twice:
         raise InputError(f"{twice.pop()} is varied and unknown; allowed: one of them")
@@ -112,7 +116,7 @@ def design(
     archive, tell = Archive(), progress or (lambda _what, _done, _total: None)
     learned = None
     if is_learned(chosen, space, unknowns):
-        searched, archive, best, learned = learned_best(searched, unknowns, model, options.seed, tell)
+        searched, archive, best, learned = learned_best(searched, unknowns, choice.model, options.seed, tell)
     else:
         best = best_design(searched, archive, seed=options.seed, tell=tell)
     if not best.possible:
@@ -122,7 +126,8 @@ def design(
         front = pareto_front(searched, archive, seed=options.seed, points=_FRONT_POINTS, tell=tell)
     drawn = unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED, _SETS)
     stated = replace(searched, drawn=drawn)
-    return replace(_answer(given, unknowns, searched, stated, best.shares, archive, front), learned=learned)
+    answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
+    return replace(answer, learned=learned, model_reason=choice.reason)
 
 
 def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], options: Judged) -> tuple[Objective, ...]:

@@ -27,9 +27,11 @@ from spirillum.fluid.tube.domain import seat_limits
 from spirillum.fluid.wire.slender import Slender
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit
+from spirillum.robot.robot import Robot
 from spirillum.swimming.balance import joined
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 
-__all__ = ["Corrected", "Points", "check_learnable", "corrected", "is_learned", "solved_at"]
+__all__ = ["Corrected", "Points", "check_learnable", "chosen_model", "corrected", "is_learned", "solved_at"]
 
 _COLUMNS = {
     "tail.wavelength": "wavelength",
@@ -236,10 +238,35 @@ def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
     return model.placed or not unknowns.known or (not strange and len(own) <= _MOST_FIELDS)
 
 
+def _changing_the_flow(space: Space, unknowns: Unknowns) -> tuple[tuple[Variable, ...], list[str]]:
+    """As `_own_fields`; fields that are unknown and change the flow are among those of which it cannot be learned."""
+    own, strange = _own_fields(space)
+    return own, strange + [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
+
+
 def _own_fields(space: Space) -> tuple[tuple[Variable, ...], list[str]]:
     """Fields that are varied and change the flow; names of those of which it cannot be learned."""
     own = tuple(item for item in space.variables if not item.path.startswith(_FREE))
     return own, [item.path for item in own if item.path not in (*_COLUMNS, TURNS)]
+
+
+def chosen_model(asked: str, robot: Robot, space: Space, unknowns: Unknowns) -> ModelChoice:
+    """The model that is asked for, or with `auto` the one that knows most about the robot and can be learned.
+
+    Args:
+        asked: name of a model, or `auto`.
+        robot: the robot as it is given.
+        space: the designs.
+        unknowns: what is not known; a posterior's model answers for it.
+    """
+    choice = choose_model(asked, robot, posterior=unknowns.posterior)
+    if asked != AUTO or unknowns.posterior is not None:
+        return choice
+    own, strange = _changing_the_flow(space, unknowns)
+    if not strange and len(own) <= _MOST_FIELDS:
+        return choice
+    what = f"{strange[0]} is no field of the tail" if strange else f"{len(own)} fields of the tail are varied"
+    return ModelChoice("sbt", f"{what}, and the flow is learned around tails alone, {_MOST_FIELDS} fields at most")
 
 
 def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variable, ...]:
@@ -250,8 +277,7 @@ def check_learnable(name: str, space: Space, unknowns: Unknowns) -> tuple[Variab
     """
     if unknowns.posterior is not None:
         raise InputError(f"model = '{name}' with a posterior; allowed: sbt or rft with it, or ranges (unknown)")
-    own, strange = _own_fields(space)
-    strange += [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
+    own, strange = _changing_the_flow(space, unknowns)
     if strange:
         raise InputError(
             f"{strange[0]} with model = '{name}', which learns the flow around tails; allowed: to vary "

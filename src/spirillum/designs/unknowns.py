@@ -16,6 +16,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO
 
 __all__ = ["Drawn", "Unknowns", "unknowns_of"]
 
@@ -97,7 +98,7 @@ def unknowns_of(
         robot: the robot.
         unknown: dotted field to its range.
         posterior: file of a calibration's posterior.
-        model: the model that will be asked.
+        model: the model that will be asked, or `auto`: that of the posterior.
 
     Raises:
         InputError: for both at once, a field that is no number of the robot, or a posterior of another model.
@@ -105,6 +106,6 @@ def unknowns_of(
     if posterior is not None:
         if unknown:
             raise InputError("unknown together with a posterior; allowed: one of them")
-        found = read_posterior(posterior, model)
+        found = read_posterior(posterior, *([] if model == AUTO else [model]))
         return Unknowns(found.central(robot), posterior=found)
     return Unknowns(robot, tuple(variable_of(robot, path, given, "unknown") for path, given in (unknown or {}).items()))

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid
+from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_reason
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -30,6 +30,7 @@ def table(answer: Answer, console: Console) -> None:
     best = _text(objective)
     title = f"{answer['robot']}, model {answer['model']}: {objective['words']} {best}"
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
+    show_reason(answer, console)
     fields = grid("", "field", "best", "within 1 %", "unit", "today")
     today = next(item for item in answer["alternatives"] if item["name"] == "today")
     for path, item in answer["design"].items():
