@@ -4,6 +4,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,14 @@ def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SPIRILLUM_CACHE", str(folder / "solved"))
         yield
+
+
+@pytest.fixture(scope="session")
+def flat_pictures() -> ModuleType:
+    """The module `flat_pictures`: `flat_pictures.flat(velocity=1e-3, ...)` is a film."""
+    import flat_pictures
+
+    return flat_pictures
 
 
 @pytest.fixture(scope="session")

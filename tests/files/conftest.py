@@ -1,15 +1,12 @@
 """Commands run in this process, with what they did to the files around them."""
 
 import contextlib
-import importlib.util
 import io
 import os
-import sys
 import threading
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import pytest
@@ -58,34 +55,6 @@ def refused(run: Callable[..., Outcome]) -> Callable[..., str]:
         return outcome.err
 
     return check
-
-
-def _beside(name: str) -> ModuleType:
-    if name not in sys.modules:
-        spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[name] = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(sys.modules[name])
-    return sys.modules[name]
-
-
-@pytest.fixture(scope="session")
-def posteriors() -> ModuleType:
-    """Posteriors written by hand."""
-    return _beside("posteriors")
-
-
-@pytest.fixture(scope="session")
-def faults() -> ModuleType:
-    """Kills, full disks and pairs of runs."""
-    return _beside("faults")
-
-
-@pytest.fixture(scope="session")
-def hostile(posteriors: ModuleType) -> ModuleType:
-    """The maker of hostile inputs."""
-    return _beside("hostile")
 
 
 @pytest.fixture

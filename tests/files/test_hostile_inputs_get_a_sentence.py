@@ -1,16 +1,16 @@
 """Hostile inputs of all kinds, from seeds: a sentence or an answer, nothing lost, nothing written on failure."""
 
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
+import hostile
+
 
 @pytest.fixture(scope="module")
-def whole(hostile: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     """The files that are bent."""
-    found: dict[str, bytes] = hostile.whole_files(tmp_path_factory.mktemp("whole"))
-    return found
+    return hostile.whole_files(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("plain")
 @pytest.mark.parametrize("seed", range(6))
-def test_no_promise_is_broken(hostile: ModuleType, whole: dict[str, bytes], tmp_path: Path, seed: int) -> None:
+def test_no_promise_is_broken(whole: dict[str, bytes], tmp_path: Path, seed: int) -> None:
     for number, case in enumerate(hostile.cases(seed, 50, whole)):
         folder = tmp_path / str(number)
         folder.mkdir()
@@ -31,9 +31,7 @@ def test_no_promise_is_broken(hostile: ModuleType, whole: dict[str, bytes], tmp_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100, 110))
-def test_no_promise_is_broken_by_thousands(
-    hostile: ModuleType, whole: dict[str, bytes], tmp_path: Path, seed: int
-) -> None:
+def test_no_promise_is_broken_by_thousands(whole: dict[str, bytes], tmp_path: Path, seed: int) -> None:
     for number, case in enumerate(hostile.cases(seed, 500, whole)):
         folder = tmp_path / str(number)
         folder.mkdir()

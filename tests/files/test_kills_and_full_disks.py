@@ -5,20 +5,21 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+
+import faults
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["kills", "disks", "pairs", "interrupts"])
 @pytest.mark.parametrize("seed", [1, 2])
-def test_no_promise_is_broken(faults: ModuleType, kind: str, seed: int) -> None:
+def test_no_promise_is_broken(kind: str, seed: int) -> None:
     assert faults.run(kind, seed, 12) == []
 
 
 @pytest.mark.slow
-def test_a_small_disk_is_said(faults: ModuleType) -> None:
+def test_a_small_disk_is_said() -> None:
     tried = subprocess.run(["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"], capture_output=True, check=False)
     if tried.returncode:
         pytest.skip("no file system may be mounted here")

@@ -5,13 +5,13 @@ import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 
+import posteriors
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf, opened, parse_toml, read_bytes, read_json
@@ -219,14 +219,12 @@ def test_a_pipe_in_the_cache_costs_time_only(tmp_path: Path, monkeypatch: pytest
         ("converged", "x"),
     ],
 )
-def test_forged_posteriors_are_refused(tmp_path: Path, posteriors: ModuleType, name: str, value: Any) -> None:
+def test_forged_posteriors_are_refused(tmp_path: Path, name: str, value: Any) -> None:
     path = posteriors.write(tmp_path / "p.nc", posteriors.attributes() | {name: value})
     assert "allowed: " in sentence(lambda: sp.predict(WIDE, tail_rate="1 Hz", posterior=path))
 
 
-def test_a_posterior_that_is_whole_is_read_and_one_that_was_changed_is_not(
-    tmp_path: Path, posteriors: ModuleType
-) -> None:
+def test_a_posterior_that_is_whole_is_read_and_one_that_was_changed_is_not(tmp_path: Path) -> None:
     path = posteriors.write(tmp_path / "p.nc")
     assert sp.predict(WIDE, tail_rate="1 Hz", posterior=path).to_dict()["forward_velocity"]["kind"] == "interval"
     for draws in (np.zeros((4, 100)), np.full((4, 100), np.nan), np.full((4, 100), 1e300), np.ones((1, 1))):

@@ -1,6 +1,5 @@
 """A flat drawn film of known motion, through tracking, statistics and files, against its truth."""
 
-import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import flat_pictures
 from spirillum.results.measurement import measure
 
 av = pytest.importorskip("av")
@@ -17,16 +17,7 @@ pytest.importorskip("cv2")
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path, Path]:
     """The film's truth, its file and its setup: 3 s at 10 frames a second, two of them dropped."""
-    import sys
-
-    place = Path(__file__).parents[1] / "vision" / "flat_pictures.py"
-    spec = importlib.util.spec_from_file_location("flat_pictures", place)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault("flat_pictures", module)
-    spec.loader.exec_module(module)
-    flat = module.flat(
+    flat = flat_pictures.flat(
         frames=30, fps=10.0, velocity=1.5e-3, body_rate=-1.1, fine=3, dropped=frozenset({11, 12}), direction="left"
     )
     path = tmp_path_factory.mktemp("film") / "flat.mp4"

@@ -1,6 +1,5 @@
 """A study with a calibration or its posterior: every robot is predicted as `predict` does it alone."""
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from spirillum import InputError
 from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
+from synthetic_experiments import synthetic
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 GRID = {
@@ -25,14 +25,8 @@ STUDY: dict[str, Any] = {"title": "calibrated", "models": ["sbt"], "friction": [
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A posterior of a synthetic experiment in both channels."""
-    place = Path(__file__).parent.parent / "calibration" / "conftest.py"
-    spec = importlib.util.spec_from_file_location("synthetic_experiments", place)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     folder = tmp_path_factory.mktemp("fitted")
-    path = module.synthetic(folder / "o.csv", wavelengths=(15.0, 20.0), amplitudes=(1.5, 2.5), discrepancy=0.02)
+    path = synthetic(folder / "o.csv", wavelengths=(15.0, 20.0), amplitudes=(1.5, 2.5), discrepancy=0.02)
     few = Sampling(ensembles=2, walkers=32, warm_up=250, steps=400, doublings=2)
     found = sp.calibrate(path, [WIDE, NARROW], sampling=few)
     assert found.converged

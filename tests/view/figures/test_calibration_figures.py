@@ -1,6 +1,5 @@
 """Figures of a calibration show what was observed and fitted, and say what is synthetic."""
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from matplotlib.text import Text
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
+from synthetic_experiments import synthetic
 
 WIDE = "biorob2012-wide"
 
@@ -18,14 +18,8 @@ WIDE = "biorob2012-wide"
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """A posterior of a small synthetic experiment."""
-    place = Path(__file__).parent.parent.parent / "calibration" / "conftest.py"
-    spec = importlib.util.spec_from_file_location("synthetic_experiments", place)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     folder = tmp_path_factory.mktemp("figures")
-    path = module.synthetic(folder / "o.csv", presets=(WIDE,), wavelengths=(15.0, 25.0), amplitudes=(1.5, 2.5))
+    path = synthetic(folder / "o.csv", presets=(WIDE,), wavelengths=(15.0, 25.0), amplitudes=(1.5, 2.5))
     few = Sampling(ensembles=2, walkers=24, warm_up=100, steps=100, doublings=0)
     return sp.calibrate(path, WIDE, sampling=few)
 

@@ -1,6 +1,6 @@
 """Hostile inputs from a seed: files of every kind that commands read, cut, bent and forged, each with a command.
 
-    python tests/files/hostile.py SEED COUNT
+    python tests/support/hostile.py SEED COUNT
 
 runs COUNT of them and prints what broke a promise.
 """
@@ -21,6 +21,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+import posteriors
 
 WIDE = "biorob2012-wide"
 STUDY = f'title = "t"\nmodels = ["sbt", "rft"]\nfriction = ["rotor"]\nrobots = ["{WIDE}"]\n'
@@ -218,7 +220,6 @@ def _posterior(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
 
 def _forged(rng: np.random.Generator, _whole: dict[str, bytes]) -> Case:
     """A posterior with a true checksum and a wrong content."""
-    posteriors = sys.modules["posteriors"]
     about = posteriors.attributes()
     name = str(rng.choice([key for key, value in about.items() if isinstance(value, str)]))
     try:
@@ -326,7 +327,6 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     import spirillum as sp
     from spirillum.cli import main
 
-    posteriors = sys.modules["posteriors"]
     with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
         main(["simulate", WIDE, "-o", str(folder / "run.nc"), "--duration", "0.2s"])
     posteriors.write(folder / "posterior.nc")
@@ -430,13 +430,6 @@ def _state(folder: Path) -> dict[str, str]:
 
 def main_of_this(seed: int, count: int) -> int:
     """Run cases and print what broke."""
-    import importlib.util
-
-    spec = importlib.util.spec_from_file_location("posteriors", Path(__file__).with_name("posteriors.py"))
-    assert spec is not None
-    assert spec.loader is not None
-    sys.modules["posteriors"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(sys.modules["posteriors"])
     broken = 0
     with tempfile.TemporaryDirectory() as home:
         (Path(home) / "whole").mkdir()

@@ -1,6 +1,6 @@
 """Kills, full disks, pairs of runs and interrupts, at random from a seed.
 
-    python tests/files/faults.py kills|disks|tmpfs|pairs|interrupts SEED COUNT
+    python tests/support/faults.py kills|disks|tmpfs|pairs|interrupts SEED COUNT
 
 runs COUNT of them and prints what broke a promise. A full disk is a limit on the size of files (`RLIMIT_FSIZE`), which
 needs no rights, or, with `tmpfs`, a small disk in memory in a name space of its own (`unshare`), where that is allowed.
