@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from spirillum.measurement.feasibility import Feasibility as Feasibility
     from spirillum.measurement.feasibility import feasibility as feasibility
     from spirillum.measurement.measure import Measurement as Measurement
+    from spirillum.measurement.proposal import Proposal as Proposal
+    from spirillum.measurement.proposal import propose_setup as propose_setup
     from spirillum.pages.launch import page as page
     from spirillum.results.calibration import calibrate as calibrate
     from spirillum.results.measurement import measure as measure
@@ -97,6 +99,7 @@ _HOME = {
     "Plot": "spirillum.view.figures.plot",
     "Prediction": "spirillum.swimming.prediction",
     "Prepared": "spirillum.swimming.preparation",
+    "Proposal": "spirillum.measurement.proposal",
     "Ranking": "spirillum.calibration.ranking",
     "Recording": "spirillum.exports.recording",
     "RemoteRun": "spirillum.interfaces.serial_remote",
@@ -131,6 +134,7 @@ _HOME = {
     "predict": "spirillum.dynamics.prediction",
     "prepare": "spirillum.swimming.preparation",
     "prepare_all": "spirillum.swimming.preparation",
+    "propose_setup": "spirillum.measurement.proposal",
     "rank_models": "spirillum.calibration.ranking",
     "remote": "spirillum.interfaces.serial_remote",
     "render": "spirillum.virtual.trial",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,52 +10,104 @@ from spirillum.answer import envelope, quantity
 from spirillum.files import new_file, output_target
 from spirillum.measurement.depth import depth_shares
 from spirillum.robot.fields import field_values
-from spirillum.vision.setup import load_setup
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.camera import opened, samples_of
+from spirillum.vision.flag import Flag
+from spirillum.vision.setup import Setup, load_setup
+from spirillum.vision.track.learning import learnt_from
+from spirillum.vision.track.size import checked_scale
+from spirillum.vision.track.steadiness import camera_flags
 
-__all__ = ["new_setup_file", "setup_answer"]
+__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_text"]
 
-_TEMPLATE = """\
+_HEAD = """\
 # A setup: what is known of camera, tank, ruler and robot. Heights count from the reference plane: the tank's floor
 # (view "side": its far wall). Every *_uncertainty is a standard uncertainty; 0 claims that the number is exact.
-# start = "2 s"                       # time in the video from which on to measure, as when the robot has started up
-# end = "20 s"
-
-[camera]
-view = "top"                          # "top": from above; "side": level, at right angles to the channel
-height = "210 mm"                     # of the lens above the reference plane
-height_uncertainty = "2 mm"
-# frames_per_second = 30.0            # for a folder of images, or instead of a video's own time stamps
-# [camera.checkerboard]               # pictures of a checkerboard in air: the lens's distortion
-# images = "checkerboard"             # folder beside this file
-# columns = 9                         # inner corners
-# rows = 6
-# square = "5 mm"
-
-[tank]
-surface = "60 mm"                     # height of the flat surface between air and oil; leave out if there is none
-surface_uncertainty = "1 mm"
-index = 1.40                          # refractive index of the oil
-index_uncertainty = 0.005
-
-[markers]
-spacing = "2 mm"                      # from each line of the ruler to the next
-height = "0 mm"                       # of the ruler
-height_uncertainty = "0.5 mm"
-# length_per_pixel = "0.25 mm"        # instead of a ruler: at the height of the robot's axis
-
-[robot]
-file = "biorob2012-wide"              # a preset, or a robot file beside this one
-axis_height = "13 mm"                 # of the robot's axis
-axis_height_uncertainty = "1 mm"
-direction = "right"                   # where in the picture the nose points: "right" or "left"
-# stripes = ["red", "yellow"]         # colours in their order, if not those of the robot file
-
-# [region]                            # part of the picture to look at, pixels
-# left = 0
-# top = 100
-# width = 640
-# height = 280
 """
+OPEN = "FILL IN"
+"""Stands for a number that only the experimenter knows: no file with it is valid."""
+_SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
+    "": (
+        ("# start", '"2 s"', "time in the video from which on to measure, as when the robot has started up"),
+        ("# end", '"20 s"', ""),
+    ),
+    "camera": (
+        ("view", '"top"', '"top": from above; "side": level, at right angles to the channel'),
+        ("height", '"210 mm"', "of the lens above the reference plane"),
+        ("height_uncertainty", '"2 mm"', ""),
+        ("# frames_per_second", "30.0", "for a folder of images, or instead of a video's own time stamps"),
+    ),
+    "# camera.checkerboard": (
+        ("# images", '"checkerboard"', "pictures of a checkerboard in air, a folder beside this file"),
+        ("# columns", "9", "inner corners"),
+        ("# rows", "6", ""),
+        ("# square", '"5 mm"', ""),
+    ),
+    "tank": (
+        ("surface", '"60 mm"', "height of the flat surface between air and oil; without one delete all of [tank]"),
+        ("surface_uncertainty", '"1 mm"', ""),
+        ("index", "1.40", "refractive index of the oil"),
+        ("index_uncertainty", "0.005", ""),
+    ),
+    "markers": (
+        ("spacing", '"2 mm"', "from each line of the ruler to the next"),
+        ("height", '"0 mm"', "of the ruler"),
+        ("height_uncertainty", '"0.5 mm"', ""),
+        ("# length_per_pixel", '"0.25 mm"', "instead of a ruler: at the height of the robot's axis"),
+        ("# length_per_pixel_uncertainty", '"0.002 mm"', ""),
+    ),
+    "robot": (
+        ("file", '"biorob2012-wide"', "a preset, or a robot file beside this one"),
+        ("axis_height", '"13 mm"', "of the robot's axis"),
+        ("axis_height_uncertainty", '"1 mm"', ""),
+        ("direction", '"right"', 'where in the picture the nose points: "right" or "left"'),
+        ("# stripes", '["red", "yellow"]', "colours in their order, if not those of the robot file"),
+    ),
+    "# region": (
+        ("# left", "0", "part of the picture to look at, pixels"),
+        ("# top", "100", ""),
+        ("# width", "640", ""),
+        ("# height", "280", ""),
+    ),
+}
+"""Sections of a setup file; each field with an example and a comment. What starts with # is left out until needed."""
+KNOWN = {
+    "camera.view": "from above, or level from the side",
+    "camera.height": "height of the lens above the reference plane",
+    "tank.surface": "height of the surface between air and oil; without one delete all of [tank]",
+    "tank.index": "refractive index of the oil",
+    "markers.spacing": "from each line of the ruler to the next",
+    "markers.height": "height of the ruler above the reference plane",
+    "robot.file": "the robot in front of the camera",
+    "robot.axis_height": "height of the robot's axis above the reference plane",
+}
+"""Fields that only the experimenter knows."""
+
+
+def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: Collection[str] = ()) -> str:
+    """Text of a setup file.
+
+    Args:
+        found: fields by their dotted names, each with its value as it stands in TOML and a comment; others are left
+            out. None: every field has an example.
+        open_fields: fields that are left to be filled in: the file is not valid until they are.
+    """
+    lines = [_HEAD.rstrip()]
+    for section, fields in _SECTIONS.items():
+        if section:
+            lines += ["", f"# [{section[2:]}]" if section.startswith("#") else f"[{section}]"]
+        for field, example, words in fields:
+            name, value, comment = field, example, words
+            dotted = f"{section.lstrip('# ')}.{field.lstrip('# ')}".lstrip(".")
+            if found is not None and not section.startswith("#"):
+                if dotted in found:
+                    name, (value, comment) = field.lstrip("# "), found[dotted]
+                elif dotted in open_fields:
+                    value, comment = f'"{OPEN}"', words
+                elif section and not field.startswith("#"):
+                    name = f"# {field}"
+            lines.append(f"{f'{name} = {value}':<38}{f'# {comment}' if comment else ''}".rstrip())
+    return "\n".join(lines) + "\n"
 
 
 def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
@@ -68,15 +121,19 @@ def new_setup_file(path: str | Path, *, overwrite: bool = False) -> None:
         InputError: if the file is there or cannot be written.
     """
     new_file(
-        output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), _TEMPLATE, overwrite=overwrite
+        output_target(path, {".toml": "a setup file"}, "setup.toml", replace="none"), setup_text(), overwrite=overwrite
     )
 
 
-def setup_answer(path: str | Path) -> dict[str, Any]:
-    """The answer of `spirillum setup check`: fields in SI, and what uncertain heights do to lengths.
+def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, Any]:
+    """The answer of `spirillum setup check`: fields in SI, what uncertain heights do to lengths, and what a film shows.
+
+    Args:
+        path: the setup file.
+        film: a film that was taken with it; None: none is looked at.
 
     Raises:
-        InputError: if the file or the robot that it names is wrong.
+        InputError: if the file or the robot that it names is wrong, or ruler or robot are not found in the film.
     """
     setup, robot = load_setup(path)
     fields = {
@@ -96,4 +153,29 @@ def setup_answer(path: str | Path) -> dict[str, Any]:
         "scale_uncertainty": total,
         "scale_sources": shares,
     }
+    if film is not None:
+        content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
+        warnings += [flag.sentence for flag in flags]
     return envelope("setup-check", content, warnings)
+
+
+def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
+    """What the tracker's first look at a film tells with a setup, and all that is odd about it."""
+    video = opened(film, setup)
+    frames = samples_of(video, setup)
+    learnt = learnt_from(video, frames, setup, robot, folder)
+    start, known = learnt.known.start, learnt.known
+    scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size)
+    moved = camera_flags(frames, start, ruled=setup.markers.spacing is not None)
+    seen = {
+        "name": video.name,
+        "frames": len(frames),
+        "frames_with_robot": len(start.path),
+        "length_per_pixel": quantity(scale.length_per_pixel, "m"),
+        "relative_uncertainty": scale.relative_uncertainty,
+        "markers": scale.markers,
+        "apparent_body_size": scale.apparent_size,
+        "stripes_fit": known.stripes.fits,
+        "tail_readable": known.wire.readable,
+    }
+    return seen, (*video.flags, *learnt.sight.flags, *size_flags, *learnt.flags, *moved)

@@ -21,3 +21,14 @@ def table(answer: Answer, console: Console) -> None:
         highlight=False,
         soft_wrap=True,
     )
+    if (film := answer.get("film")) is not None:
+        pixel, size = film["length_per_pixel"]["value"], film["apparent_body_size"]
+        ruler = f"{film['markers']} lines of the ruler" if film["markers"] else "no ruler"
+        stripes = "its stripes fit" if film["stripes_fit"] else "its stripes do not fit"
+        console.print(
+            f"{escape(film['name'])}: robot on {film['frames_with_robot']} of {film['frames']} frames looked at, "
+            f"{size:.3f} times as large as its file says; {stripes}, tail read on {100 * film['tail_readable']:.0f} %; "
+            f"{ruler}, {1e3 * pixel:.4g} mm a pixel",
+            highlight=False,
+            soft_wrap=True,
+        )

@@ -49,6 +49,19 @@ class Lines(NamedTuple):
         spans = [np.unique(np.round(self.number[self.strip == k])).size for k in np.unique(self.strip)]
         return int(max(spans))
 
+    @property
+    def roll(self) -> float:
+        """Angle of the channel, across the lines, to the rows of the picture: positive downwards to the right, rad."""
+        slopes, weights = [], []
+        for label in np.unique(self.strip):
+            inside = self.strip == label
+            apart = self.pixels[inside] - self.pixels[inside].mean(axis=0)
+            number = self.number[inside] - self.number[inside].mean()
+            slopes.append(np.linalg.lstsq(apart, number, rcond=None)[0])
+            weights.append(np.count_nonzero(inside))
+        along, across = np.average(slopes, axis=0, weights=weights)
+        return float(np.arctan2(across, along))
+
 
 def still_picture(images: list[np.ndarray]) -> Samples:
     """Static background of pictures: the interquartile mean of each pixel, 0 to 255, (h, w, 3)."""

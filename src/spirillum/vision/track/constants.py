@@ -20,6 +20,7 @@ __all__ = [
     "FOLLOWING",
     "IDENTITY",
     "OUTLINE",
+    "SCOUTING",
     "SEARCH",
     "SIZE",
     "STEADINESS",
@@ -36,6 +37,7 @@ __all__ = [
     "FollowingConstants",
     "IdentityConstants",
     "OutlineConstants",
+    "ScoutingConstants",
     "SearchConstants",
     "SizeConstants",
     "SteadinessConstants",
@@ -199,6 +201,40 @@ class IdentityConstants:
     """Share on which the tail has to be read then, and on which it says where the nose is.
 
     It was 0.83 and more on rendered films of a hundred robots, 0.52 on one at half the size."""
+
+
+@dataclass(frozen=True)
+class ScoutingConstants:
+    """The first look at a film without a setup (`scouting`)."""
+
+    distance: float = 1.15
+    """Distance of the provisional lens over the width of what it shows."""
+    spacing: float = 2e-3
+    """Spacing of a ruler's lines to begin with, m: the paper's."""
+    nearer: float = 0.93
+    """Length per pixel at the robot over that at a ruler behind it, to begin with."""
+    shares: tuple[float, ...] = (0.5, 0.125)
+    """Shares of the picture's longer side that the robot is tried to fill; each covers half to twice of it."""
+    rounds: int = 3
+    """Most looks from one guess, each at the size that the one before has found."""
+    most_colours: int = 5
+    """Most colours of stripes whose orders are tried."""
+    along: int = 160
+    """Places along the channel at which its walls are looked for."""
+    widest: float = 2.2
+    """Farthest wall from the robot, over the body's diameter."""
+    beside: float = 0.55
+    """Nearest wall, over the body's diameter."""
+    seen: float = 0.5
+    """Share of a line along the channel that has to be in the picture."""
+    paper: float = 0.15
+    """Width of a ruler's paper beside its lines, over the body's diameter."""
+    faintest: float = 0.3
+    """Least usual step of the brightness from row to row, of 255."""
+    clear: float = 4.0
+    """Step at a wall over the usual one."""
+    off_axis: float = 0.35
+    """Largest distance of the robot from the middle between two walls, twice, over the body's diameter."""
 
 
 @dataclass(frozen=True)
@@ -535,6 +571,7 @@ OUTLINE = OutlineConstants()
 FIRST_LOOK = FirstLookConstants()
 SIZE = SizeConstants()
 IDENTITY = IdentityConstants()
+SCOUTING = ScoutingConstants()
 STEADINESS = SteadinessConstants()
 COLOURS = ColourConstants()
 STRIPES = StripeConstants()

@@ -23,7 +23,7 @@ from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame
 
-__all__ = ["Identified", "identify"]
+__all__ = ["Identified", "identified_at", "identify"]
 
 
 class Identified(NamedTuple):
@@ -76,7 +76,7 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     """
     found: Identified | InputError
     try:
-        found = _identify_at(name, setup, stated, frames, still, 1.0)
+        found = identified_at(name, setup, stated, frames, still, 1.0)
         if found.robot:
             return found
     except InputError as error:
@@ -84,7 +84,7 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     size = best_other_size(stated, [frame.image for frame in frames], still)
     if size is not None:
         with suppress(InputError):
-            other = _identify_at(name, setup, resized(stated, size), frames, still, size)
+            other = identified_at(name, setup, resized(stated, size), frames, still, size)
             if other.robot:
                 return other
     if isinstance(found, InputError):
@@ -92,9 +92,22 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     return found
 
 
-def _identify_at(
+def identified_at(
     name: str, setup: Setup, body: BodyFinder, frames: list[Frame], still: Samples, size: float
 ) -> Identified:
+    """Find the robot at one size.
+
+    Args:
+        name: name of the video.
+        setup: the setup.
+        body: the robot's body, about as large as it looks.
+        frames: frames spread over the video.
+        still: static background of the frames, (h, w, 3).
+        size: of this body over that at the stated scale.
+
+    Raises:
+        InputError: if no object resembles the robot.
+    """
     start = first_look(name, body, frames, still)
     stripes, wire = Stripes(body.robot, setup, start.body.optics), TailWave(body.robot, setup, start.body.optics)
     with ThreadPoolExecutor(2) as pool:  # the compiled loops release the GIL

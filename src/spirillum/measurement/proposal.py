@@ -1,0 +1,344 @@
+"""From a film to a setup file: what the film tells is filled in, what only the experimenter knows is marked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from spirillum.answer import envelope
+from spirillum.errors import InputError
+from spirillum.files import new_file, output_target
+from spirillum.measurement.setup_template import KNOWN, setup_text
+from spirillum.robot.load import PAPER_ROBOTS, load
+from spirillum.robot.robot import Robot
+from spirillum.shown import Shown
+from spirillum.units import KINDS, parse_option
+from spirillum.vision.camera.optics import seen
+from spirillum.vision.track.constants import IDENTITY, SCOUTING, SIZE
+from spirillum.vision.track.scouting import Scouted, scouted
+from spirillum.vision.track.steadiness import camera_flags
+from spirillum.vision.video.frames import Video, open_video
+
+__all__ = ["Finding", "Proposal", "propose_setup"]
+
+Confidence = Literal["clear", "doubtful", "not found"]
+_OUTER = 1.1
+"""Outer over inner diameter of a glass tube, about; assumed."""
+_USUAL_RATE = 30.0
+"""Frames a second at which a folder of images is looked at until its rate is known."""
+_SPACING = (0.8, 1.4)
+"""A ruler's spacing over what the robot's size says of it at the robot's own depth, where nothing is wrong: the ruler
+may be farther away, or a little nearer. Assumed."""
+_AT_REST = 0.2
+"""Speed below which a robot is said to rest, pixels a second."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that a film tells."""
+
+    name: str
+    """`frame_rate`, `ruler`, `robot`, `direction`, `travel`, `stripes` or `walls`."""
+    value: Any
+    """What it is; None where it was not found."""
+    unit: str
+    """Its unit; `1` for what has none, empty for words."""
+    confidence: Confidence
+    """`clear`, `doubtful` or `not found`."""
+    sentence: str
+    """What was seen, and what that rests on."""
+    field: str = ""
+    """Field of the setup that it fills in; empty where there is none."""
+    pixels: tuple[tuple[tuple[float, float], ...], ...] = ()
+    """For drawing: lines through pixels (u, v)."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        lines = [[list(point) for point in line] for line in self.pixels]
+        return {
+            "name": self.name, "value": self.value, "unit": self.unit, "confidence": self.confidence,
+            "sentence": self.sentence, "field": self.field, "pixels": lines,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Proposal(Shown):
+    """A setup as far as a film tells it."""
+
+    film: str
+    """Name of the film."""
+    size: tuple[int, int]
+    """Width and height of its pictures, pixels."""
+    robot: str
+    """The robot that was looked for: a preset's name or a file."""
+    findings: tuple[Finding, ...]
+    """What was found."""
+    to_fill: tuple[tuple[str, str], ...]
+    """Fields that only the experimenter knows, each with what it means."""
+    text: str
+    """The setup file."""
+    file: str | None = None
+    """Where it was written; None: nowhere."""
+    warnings: tuple[str, ...] = ()
+
+    def found(self, name: str) -> Finding:
+        """A finding by its name."""
+        return next(finding for finding in self.findings if finding.name == name)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON."""
+        content = {
+            "film": self.film,
+            "width": self.size[0],
+            "height": self.size[1],
+            "robot": self.robot,
+            "file": self.file,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "to_fill": [{"field": field, "sentence": sentence} for field, sentence in self.to_fill],
+            "text": self.text,
+        }
+        return envelope("setup-proposal", content, self.warnings)
+
+
+def propose_setup(
+    film: str | Path,
+    robot: str | Path | None = None,
+    output: str | Path | None = None,
+    *,
+    spacing: str | float | None = None,
+    fps: float | None = None,
+    overwrite: bool = False,
+) -> Proposal:
+    """Look at a film and propose its setup.
+
+    Args:
+        film: the film, or a folder of images.
+        robot: a preset's name or a robot file; None: the paper's robot, in the channel that the walls look like.
+        output: setup file to write (`.toml`); None: none is written.
+        spacing: from each line of the ruler to the next, with its unit or a float in m; None: left to be filled in.
+        fps: frames a second of a folder of images, or in place of a film's own times.
+        overwrite: replace a file that is there.
+
+    Returns:
+        What was found and how sure it is, what is left to be filled in, and the text of the file.
+
+    Raises:
+        InputError: if the film or the robot cannot be read, or the file cannot be written.
+    """
+    target = None
+    if output is not None:
+        target = output_target(Path(output), {".toml": "a setup file"}, "setup.toml", replace="none")
+    apart = None if spacing is None else parse_option("spacing", spacing, KINDS["length"])
+    if fps is not None and not 0.01 <= fps <= 1e5:
+        raise InputError(f"fps = {fps:g}; allowed: 0.01 to 100000 frames a second")
+    name = PAPER_ROBOTS[0] if robot is None else str(robot)
+    loaded = load(name)
+    video = open_video(film, fps or (_USUAL_RATE if Path(film).is_dir() else None))
+    seen_there = scouted(video, loaded, apart)
+    if robot is None:
+        name = _by_walls(seen_there, loaded)
+    timed = not video.images or fps is not None
+    rests = Path(name).resolve() if target is not None and Path(name).is_file() else None
+    stated = name if rests is None or target is None else _beside(rests, target)
+    findings = tuple(_findings(video, seen_there, loaded, name, apart, timed=timed, given=robot is not None))
+    found = {finding.field: _toml(finding) for finding in findings if finding.field and finding.value is not None}
+    if seen_there.known is not None or robot is not None:
+        found["robot.file"] = f'"{stated}"', "as asked for" if robot is not None else _doubt(findings, "walls")
+    found |= _scale_lines(seen_there, loaded, apart)
+    ruled = "markers.length_per_pixel" not in found
+    open_fields = {
+        field: words for field, words in KNOWN.items() if field not in found and (ruled or "markers" not in field)
+    }
+    text = setup_text(found, open_fields)
+    if target is not None:
+        new_file(target, text, overwrite=overwrite)
+    warnings = tuple(_warnings(video, seen_there, findings, apart))
+    return Proposal(
+        video.name,
+        video.size,
+        name,
+        findings,
+        tuple(open_fields.items()),
+        text,
+        None if target is None else str(target),
+        warnings,
+    )
+
+
+def _beside(file: Path, target: Path) -> str:
+    """A robot file as the setup file names it: relative to its own folder, where it lies in there."""
+    folder = target.resolve().parent
+    return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else file.as_posix()
+
+
+def _by_walls(found: Scouted, robot: Robot) -> str:
+    """The paper's robot whose channel is nearest to the walls; the first one where no walls were found."""
+    if found.walls is None:
+        return PAPER_ROBOTS[0]
+    width = found.walls.distance * robot.body.diameter / _OUTER
+    channels = {name: channel.diameter for name in PAPER_ROBOTS if (channel := load(name).channel) is not None}
+    return min(channels, key=lambda name: abs(math.log(channels[name] / width)))
+
+
+def _findings(
+    video: Video, found: Scouted, robot: Robot, name: str, spacing: float | None, *, timed: bool, given: bool
+) -> Iterator[Finding]:
+    yield _frame_rate(video, timed=timed)
+    yield _ruler(found, spacing)
+    known = found.known
+    if known is None:
+        words = (
+            f"no robot like '{robot.name}' was found at any scale: give the right ROBOT, or a film in which all of it "
+            "is in view and moves"
+        )
+        yield Finding("robot", None, "", "not found", words)
+        return
+    sure = known.wire.readable > IDENTITY.sure_share
+    striped = bool(found.stripes)
+    optics = found.optics
+    half = 0.5 * robot.body.length
+    ends = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]])
+    pose = known.start.path[0][1]
+    rear, nose = seen(ends, pose, optics).tolist()
+    long = math.dist(rear, nose)
+    words = (
+        f"a body {long:.0f} pixels long on {len(known.start.path)} of {len(found.frames)} frames; its tail is seen on "
+        f"{100 * known.wire.readable:.0f} % of them"
+    )
+    yield Finding(
+        "robot", robot.name if given else name, "", "clear" if sure or striped else "doubtful", words,
+        pixels=((tuple(rear), tuple(nose)),),
+    )  # fmt: skip
+    yield Finding(
+        "direction", found.direction, "", "clear" if sure else "doubtful",
+        f"the nose points to the {found.direction}: its tail is seen behind it", "robot.direction",
+        ((tuple(rear), tuple(nose)),),
+    )  # fmt: skip
+    yield _travel(found)
+    yield _stripes(found)
+    yield _walls(found, robot)
+
+
+def _frame_rate(video: Video, *, timed: bool) -> Finding:
+    rate = video.rate
+    if not timed or rate is None:
+        words = "a folder of images does not say how many frames a second it has"
+        return Finding("frame_rate", None, "1/s", "not found", words)
+    own = "as it was given" if video.given_rate else "as the file states it; the times of its frames are used"
+    field = "camera.frames_per_second" if video.given_rate else ""
+    return Finding("frame_rate", rate, "1/s", "clear", f"{rate:.4g} frames a second, {own}", field)
+
+
+def _ruler(found: Scouted, spacing: float | None) -> Finding:
+    lines = found.lines
+    if lines is None:
+        words = "no equally spaced lines across the picture's rows"
+        return Finding("ruler", None, "pixel", "not found", words)
+    strips = []
+    for label in np.unique(lines.strip):
+        inside = lines.pixels[lines.strip == label]
+        order = np.argsort(inside[:, 0])
+        edge = max(1, len(order) // 20)
+        first, last = inside[order[:edge]].mean(axis=0), inside[order[-edge:]].mean(axis=0)
+        strips.append(((float(first[0]), float(first[1])), (float(last[0]), float(last[1]))))
+    roll = math.degrees(lines.roll)
+    words = f"{lines.lines} lines or more, {lines.distance:.2f} pixels apart"
+    words += f"; the channel runs at {abs(roll):.1f} deg to the rows" if abs(roll) > 0.5 else ""
+    words += "" if spacing is not None else "; how far apart they are in mm, you know"
+    return Finding("ruler", lines.distance, "pixel", "clear", words, pixels=tuple(strips))
+
+
+def _travel(found: Scouted) -> Finding:
+    speed = found.speed
+    if abs(speed) < _AT_REST:
+        return Finding("travel", speed, "pixel/s", "doubtful", "the robot hardly moves")
+    where = "nose first" if speed > 0 else "tail first, against its nose"
+    words = f"it moves {where}, at {abs(speed):.2g} pixels a second"
+    return Finding("travel", speed, "pixel/s", "clear" if speed > 0 else "doubtful", words)
+
+
+def _stripes(found: Scouted) -> Finding:
+    assert found.known is not None  # noqa: S101 - asked where it is known
+    stated = found.known.stripes.stripes
+    if not stated:
+        words = "the robot file names no stripes: without them the body's rotation cannot be seen"
+        return Finding("stripes", None, "", "not found", words)
+    if not found.stripes:
+        words = f"the seal does not show {', '.join(stated)} in any one order: name the colours as they are painted"
+        return Finding("stripes", None, "", "not found", words)
+    order = ", ".join(found.stripes)
+    if found.stripes == stated:
+        return Finding("stripes", list(stated), "", "clear", f"as the robot file names them: {order}")
+    words = f"another order than in the robot file is seen: {order}"
+    return Finding("stripes", list(found.stripes), "", "doubtful", words, "robot.stripes")
+
+
+def _walls(found: Scouted, robot: Robot) -> Finding:
+    walls = found.walls
+    if walls is None:
+        words = "no edges along the channel were found on both sides of the robot"
+        return Finding("walls", None, "m", "not found", words)
+    width = walls.distance * robot.body.diameter
+    words = f"edges along the channel {1e3 * width:.3g} mm apart at the robot's depth, by its own diameter"
+    ends = tuple(tuple((float(u), float(v)) for u, v in line) for line in walls.ends)
+    confidence: Confidence = "clear" if walls.contrast > 2.0 * SCOUTING.clear else "doubtful"
+    return Finding("walls", width, "m", confidence, words, pixels=ends)
+
+
+def _toml(finding: Finding) -> tuple[str, str]:
+    """A finding's value as it stands in the file, and the comment beside it."""
+    value = finding.value
+    if isinstance(value, list):
+        text = "[" + ", ".join(f'"{item}"' for item in value) + "]"
+    else:
+        text = f'"{value}"' if isinstance(value, str) else f"{value:.9g}"
+    return text, f"found in the film, {finding.confidence}"
+
+
+def _doubt(findings: tuple[Finding, ...], name: str) -> str:
+    """Comment on the preset that was taken."""
+    walls = next((finding for finding in findings if finding.name == name), None)
+    if walls is None or walls.value is None:
+        return "CHECK: the paper's robot was found; which channel it is in, the film does not tell"
+    return f"CHECK: the paper's robot was found; its channel by the walls, {walls.confidence}"
+
+
+def _scale_lines(found: Scouted, robot: Robot, spacing: float | None) -> dict[str, tuple[str, str]]:
+    """The spacing, where it is known; without a ruler the scale by the robot's own size."""
+    if spacing is not None and found.lines is not None:
+        return {"markers.spacing": (f'"{1e3 * spacing:.9g} mm"', "as given")}
+    if found.lines is not None or found.known is None:
+        return {}
+    pixel = found.optics.length_per_pixel
+    half = 0.5 * robot.body.length / pixel
+    share = math.hypot(SIZE.build_error, SIZE.edge_error / half)
+    return {
+        "markers.length_per_pixel": (f'"{1e3 * pixel:.6g} mm"', "CHECK: no ruler was found; by the body's length"),
+        "markers.length_per_pixel_uncertainty": (
+            f'"{1e3 * share * pixel:.3g} mm"',
+            "by how well it was built and seen",
+        ),
+    }
+
+
+def _warnings(video: Video, found: Scouted, findings: tuple[Finding, ...], spacing: float | None) -> Iterator[str]:
+    yield from (flag.sentence for flag in video.flags)
+    unsure = ("robot", "direction", "ruler")
+    yield from (one.sentence for one in findings if one.name in unsure and one.confidence != "clear")
+    if found.known is None:
+        return
+    lines = found.lines
+    if lines is not None and spacing is not None:
+        apart = lines.distance * found.optics.length_per_pixel
+        if not _SPACING[0] < spacing / apart < _SPACING[1]:
+            yield (
+                f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are {1e3 * apart:.2g} "
+                "mm apart, or a tenth more where the ruler lies below it; check the spacing, or the robot file"
+            )
+    flags = camera_flags(found.frames, found.known.start, ruled=lines is not None)
+    yield from (flag.sentence for flag in (*flags, *found.known.wire.flags))

@@ -1,0 +1,221 @@
+"""The first look at a film of which no setup is known: ruler, robot, direction and stripes, at any scale.
+
+A provisional camera stands in for the unknown one: its lens is as far away as a usual one, and its scale is a guess
+that the search for the robot corrects. Finding and learning are those of every film
+(`spirillum.vision.track.identity`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.errors import InputError
+from spirillum.robot.robot import Robot
+from spirillum.vision.camera.camera import bounds_of, samples_of
+from spirillum.vision.camera.optics import Optics
+from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
+from spirillum.vision.camera.scale import given_camera
+from spirillum.vision.setup import Setup, stripes_of
+from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.constants import IDENTITY, SCOUTING
+from spirillum.vision.track.identity import Identified, identified_at
+from spirillum.vision.track.size import best_other_size, resized
+from spirillum.vision.track.stripes import Stripes
+from spirillum.vision.video.frames import Frame, Video
+
+__all__ = ["Scouted", "Walls", "scouted"]
+
+_DIRECTIONS = ("right", "left")
+
+
+class Walls(NamedTuple):
+    """Two edges along the channel on either side of the robot."""
+
+    distance: float
+    """Distance between them over the body's diameter."""
+    contrast: float
+    """Step of the brightness at the fainter one over the usual step, from row to row."""
+    ends: Samples
+    """Pixels of both ends of both edges, (2, 2, 2)."""
+
+
+class Scouted(NamedTuple):
+    """What a film tells without a setup."""
+
+    lines: Lines | None
+    """Lines of the ruler; None where none was found."""
+    known: Identified | None
+    """The robot, in front of the provisional camera; None where none was found."""
+    direction: str
+    """Where in the picture its nose points."""
+    stripes: tuple[str, ...]
+    """Colours of its stripes in the order seen; empty where they could not be read."""
+    walls: Walls | None
+    """Walls of its channel; None where none were found."""
+    frames: list[Frame]
+    """Frames that were looked at."""
+
+    @property
+    def optics(self) -> Optics:
+        """The provisional camera, at the scale at which the robot was found."""
+        assert self.known is not None  # noqa: S101 - asked by those who know
+        return self.known.start.body.optics
+
+    @property
+    def speed(self) -> float:
+        """How fast the robot moves towards its nose, pixels a second."""
+        assert self.known is not None  # noqa: S101
+        path = self.known.start.path
+        if len(path) < 2:
+            return 0.0
+        time, x = np.array([at for at, _ in path]), np.array([pose.x for _, pose in path])
+        return float(np.polyfit(time - time.mean(), x, 1)[0]) / self.optics.length_per_pixel
+
+
+def scouted(video: Video, robot: Robot, spacing: float | None = None) -> Scouted:
+    """Look at a film without a setup.
+
+    Args:
+        video: the film.
+        robot: the robot in front of the camera.
+        spacing: of the ruler's lines, m, where it is known.
+
+    Raises:
+        InputError: if no frame can be read.
+    """
+    anywhere = _setup(robot, video.size, 1e-4, "right")
+    frames = samples_of(video, anywhere)
+    still = still_picture([frame.image for frame in frames])
+    lines = lines_in(still, bounds_of(anywhere, video))
+    for guess in _guesses(robot, video.size, lines, spacing):
+        for direction, known in _found_at(video, robot, guess, frames, still):
+            stripes = _stripes_seen(robot, known)
+            walls = _walls(still, known, lines)
+            return Scouted(lines, known, direction, stripes, walls, frames)
+    return Scouted(lines, None, "right", (), None, frames)
+
+
+def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
+    """A provisional setup whose pixel shows a length at the height of the robot's axis, m."""
+    far = SCOUTING.distance * size[0] * pixel
+    deep = min(0.6 * robot.body.diameter, 0.2 * far)
+    return Setup.model_validate(
+        {
+            "camera": {"height": f"{far + deep:.9g} m"},
+            "markers": {"length_per_pixel": f"{pixel:.9g} m"},
+            "robot": {"file": robot.name, "axis_height": f"{deep:.9g} m", "direction": direction},
+        }
+    )
+
+
+def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: float | None) -> list[float]:
+    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m."""
+    guesses = []
+    if lines is not None:
+        guesses.append(SCOUTING.nearer * (SCOUTING.spacing if spacing is None else spacing) / lines.distance)
+    length = robot.body.length + robot.coupling.length + robot.tail.length
+    wide = [length / (share * max(size)) for share in SCOUTING.shares]
+    return guesses + [guess for guess in wide if all(abs(np.log(guess / other)) > np.log(1.5) for other in guesses)]
+
+
+def _found_at(
+    video: Video, robot: Robot, guess: float, frames: list[Frame], still: Samples
+) -> Iterator[tuple[str, Identified]]:
+    """The robot near a guessed scale, with the direction of its nose; then at half to twice of it."""
+    finders = {}
+    for direction in _DIRECTIONS:
+        setup = _setup(robot, video.size, guess, direction)
+        finders[direction] = setup, BodyFinder(robot, given_camera(setup, video.size).optics, bounds_of(setup, video))
+    for sized in (False, True):
+        for direction, (setup, finder) in finders.items():
+            size = best_other_size(finder, [frame.image for frame in frames], still) if sized else 1.0
+            body = finder if size is None else resized(finder, size)
+            for _ in range(0 if size is None else SCOUTING.rounds):
+                try:
+                    known = identified_at(video.name, setup, body, frames, still, 1.0)  # no size is stated
+                except InputError:
+                    break
+                tail = known.wire.readable
+                if not known.start.flags and (tail > IDENTITY.sure_share or known.robot):
+                    yield direction, known
+                if known.start.flags or tail < IDENTITY.least_share:
+                    break
+                body = resized(known.start.body, 1.0)  # it looks otherwise large: once more from there
+
+
+def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:
+    """Colours of the stripes in the order seen: the file's own, else another one of the same colours."""
+    reader = known.stripes
+    own = reader.stripes
+    if reader.fits or not own:
+        return own if reader.fits else ()
+    names, fitting = list(dict.fromkeys(own)), []
+    repeats = len(own) // len(names)
+    if own != tuple(names) * repeats or len(names) > SCOUTING.most_colours:
+        return ()
+    optics = known.start.body.optics
+    for order in permutations(names[1:]):
+        setup = _setup(robot, optics.size, 1e-4, "right")
+        some = setup.model_copy(
+            update={"robot": setup.robot.model_copy(update={"stripes": (names[0], *order) * repeats})}
+        )
+        other = Stripes(robot, some, optics)
+        other.learn(known.start.seen)
+        read = [np.isfinite(other.read(image, pose)[0]) for image, pose in known.start.seen]
+        if other.fits and np.mean(read) > IDENTITY.least_share:
+            fitting.append(stripes_of(some, robot))
+    return fitting[0] if len(fitting) == 1 else ()
+
+
+def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | None:
+    """The outermost clear pair of edges along the robot's way, inside the ruler; None without one.
+
+    Brightness is taken at lines along the way, as the median along each, so that robot, ruler and dust drop out.
+    """
+    body = known.start.body
+    optics, diameter = body.optics, body.robot.body.diameter
+    poses = np.array([pose for _, pose in known.start.path])
+    angle = float(np.median(poses[:, 2])) if lines is None else -lines.roll
+    way, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    centre = np.median(poses[:, :2], axis=0)
+    centre = centre + way * ((optics.origin[:2] - centre) @ way)
+    step = optics.length_per_pixel
+    reach = SCOUTING.widest * diameter
+    across = np.arange(-reach, reach, step)
+    along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * step
+    grid = centre + along[:, None, None] * way + across[None, :, None] * side
+    points = np.concatenate([grid, np.full((*grid.shape[:2], 1), optics.axis_height)], axis=2)
+    pixels = np.nan_to_num(optics.pixels(points.reshape(-1, 3)), nan=-9.0).round().astype(int)
+    inside = np.all((pixels >= 0) & (pixels < np.array(optics.size)), axis=1)
+    brightness = np.full(len(pixels), np.nan)
+    brightness[inside] = still[pixels[inside, 1], pixels[inside, 0]].mean(axis=1)
+    table = brightness.reshape(grid.shape[:2])
+    seen = np.isfinite(table).mean(axis=0) > SCOUTING.seen
+    if not seen.any():
+        return None
+    profile = np.full(across.size, np.nan)
+    profile[seen] = np.nanmedian(table[:, seen], axis=0)
+    steps = np.abs(np.gradient(profile))
+    if lines is not None:
+        there = (optics.points(lines.pixels, optics.axis_height)[:, :2] - centre) @ side
+        for sign in (1.0, -1.0):
+            beyond = sign * there[sign * there > 0.5 * diameter]
+            if beyond.size:
+                steps[sign * across > float(beyond.min()) - SCOUTING.paper * diameter] = np.nan
+    usual = float(np.nanmedian(steps)) + SCOUTING.faintest
+    left, right = (np.flatnonzero((sign * across > SCOUTING.beside * diameter) & (steps > 0.0)) for sign in (-1.0, 1.0))
+    fainter = np.minimum(steps[left][:, None], steps[right]) / usual
+    width, off = across[right] - across[left][:, None], np.abs(across[right] + across[left][:, None])
+    fitting = (fainter > SCOUTING.clear) & (off < SCOUTING.off_axis * diameter)
+    if not fitting.any():
+        return None
+    one, other = np.unravel_index(np.argmax(np.where(fitting, width, 0.0)), width.shape)
+    i, j = left[one], right[other]
+    ends = [[centre + far * way + across[k] * side for far in (along[0], along[-1])] for k in (i, j)]
+    flat = np.concatenate([np.array(ends).reshape(4, 2), np.full((4, 1), optics.axis_height)], axis=1)
+    return Walls(float(width[one, other]) / diameter, float(fainter[one, other]), optics.pixels(flat).reshape(2, 2, 2))

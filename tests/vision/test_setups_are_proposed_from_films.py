@@ -1,0 +1,88 @@
+"""What a film tells of its setup is found at any scale, and what it cannot tell is left to be filled in."""
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.errors import InputError
+from spirillum.measurement.setup_template import setup_answer
+from spirillum.vision.setup import load_setup
+
+pytest.importorskip("av")
+pytest.importorskip("cv2")
+
+
+@pytest.fixture(scope="module")
+def film(flat_pictures, tmp_path_factory):
+    """A robot that swims to the left, in a flat drawing."""
+    path = tmp_path_factory.mktemp("proposal") / "a.mp4"
+    flat_pictures.Flat(frames=24, fps=8.0, velocity=2e-3, direction="left", tail_rate=9.0, body_rate=-2.0).write(path)
+    return path
+
+
+def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, tmp_path):
+    found = sp.propose_setup(film, "biorob2012-wide", tmp_path / "setup.toml", spacing="2 mm")
+    assert {name: found.found(name).value for name in ("direction", "robot")} == {
+        "direction": "left", "robot": "biorob2012-wide",
+    }  # fmt: skip
+    assert found.found("frame_rate").value == pytest.approx(8.0)
+    assert found.found("ruler").value == pytest.approx(350.0 * 0.002 / 0.2, rel=1e-2)
+    assert found.found("travel").value == pytest.approx(2e-3 * 350.0 / (0.2 - 0.015), rel=0.05)
+    assert found.found("stripes").value[:4] == ["red", "yellow", "green", "blue"]
+    ((rear, nose),) = found.found("robot").pixels
+    assert np.hypot(nose[0] - rear[0], nose[1] - rear[1]) == pytest.approx(35e-3 * 350.0 / (0.2 - 0.015), rel=0.03)
+    assert nose[0] < rear[0]
+    left = {field for field, _ in found.to_fill}
+    assert left == {"camera.view", "camera.height", "tank.surface", "tank.index", "markers.height", "robot.axis_height"}
+    text = (tmp_path / "setup.toml").read_text()
+    assert text == found.text
+    with pytest.raises(InputError, match=r"camera.view = 'FILL IN' is not allowed.*\(and 5 more\)"):
+        load_setup(tmp_path / "setup.toml")
+
+
+def test_a_filled_in_proposal_is_a_setup_that_fits_the_film(film, tmp_path):
+    text = sp.propose_setup(film, "biorob2012-wide", spacing="2 mm").text
+    known = {"view": '"top"', "height": '"200 mm"', "axis_height": '"15 mm"'}
+    lines, section = [], ""
+    for line in text.splitlines():
+        name = line.partition(" = ")[0]
+        section = line if line.startswith("[") else section
+        if section == "[tank]":
+            continue
+        value = '"0 mm"' if section == "[markers]" else known.get(name)
+        lines.append(f"{name} = {value}" if '"FILL IN"' in line else line)
+    (tmp_path / "setup.toml").write_text("\n".join(lines))
+    answer = setup_answer(tmp_path / "setup.toml", film)
+    assert answer["film"]["frames_with_robot"] > 20
+    assert answer["film"]["apparent_body_size"] == pytest.approx(1.0, abs=0.01)
+    assert answer["film"]["length_per_pixel"]["value"] == pytest.approx((0.2 - 0.015) / 350.0, rel=2e-3)
+    assert not any("does not" in warning for warning in answer["warnings"])
+
+
+@pytest.mark.slow
+def test_a_wrong_spacing_is_named(film):
+    warnings = sp.propose_setup(film, spacing="3 mm").warnings
+    assert any("spacing = 3 mm does not fit: by the robot's size the lines are 1.8" in one for one in warnings)
+
+
+@pytest.mark.slow
+def test_without_a_ruler_the_robot_gives_the_scale_and_another_order_of_stripes_is_read(flat_pictures, tmp_path):
+    order = ("red", "green", "yellow", "blue") * 2
+    film = flat_pictures.Flat(frames=20, fps=8.0, ruler=False, stripes=order, body_rate=-3.0)
+    film.write(tmp_path / "a.mp4")
+    found = sp.propose_setup(tmp_path / "a.mp4", "biorob2012-wide")
+    assert tuple(found.found("stripes").value) == order
+    assert 'stripes = ["red", "green", "yellow", "blue"' in found.text
+    assert found.found("ruler").confidence == "not found"
+    (line,) = [line for line in found.text.splitlines() if line.startswith("length_per_pixel =")]
+    assert float(line.split('"')[1].removesuffix(" mm")) == pytest.approx(1e3 * (0.2 - 0.015) / 350.0, rel=0.03)
+
+
+def test_an_empty_film_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
+    monkeypatch.setattr("spirillum.vision.track.scouting.best_other_size", lambda *given: None)  # it takes a while
+    flat_pictures.Flat(frames=4, start=(1.0, 0.0), noise=4.0, size=(160, 120), focal=175.0).write(tmp_path / "a.mp4")
+    found = sp.propose_setup(tmp_path / "a.mp4")
+    assert found.found("robot").confidence == "not found"
+    assert any("give the right ROBOT" in warning for warning in found.warnings)
+    with pytest.raises(InputError, match=r"spacing .* out of range"):
+        sp.propose_setup(tmp_path / "a.mp4", spacing=0.0)
