@@ -188,3 +188,11 @@ def test_wrong_input_leaves_nothing(run: xr.Dataset, tmp_path: Path, monkeypatch
     with pytest.raises(sp.InputError, match=r"pip install 'spirillum\[control\]'"):
         sp.export_run(run, tmp_path / "run.mcap")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("time", [float("nan"), -1.0, 1e30])
+def test_a_time_that_no_recording_holds_is_a_sentence(run: xr.Dataset, tmp_path: Path, time: float) -> None:
+    damaged = run.assign_attrs(events=json.dumps([{"time": time, "what": "touches the wall"}]))
+    with pytest.raises(sp.InputError, match=r"the run has something at .* s; allowed: times from 0"):
+        sp.export_run(damaged, tmp_path / "run.mcap")
+    assert not any(tmp_path.iterdir())

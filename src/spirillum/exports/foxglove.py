@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.errors import InputError
 
 __all__ = [
     "SCHEMAS",
@@ -26,6 +27,8 @@ __all__ = [
 ]
 
 Json = dict[str, Any]
+_LATEST = 1e9
+"""Latest time of a recording, s; seconds have 32 bits."""
 
 
 def _object(**fields: Json) -> Json:
@@ -83,7 +86,13 @@ def numbers_schema(meanings: Mapping[str, str]) -> Json:
 
 
 def nanoseconds(time: float) -> int:
-    """A time of a run, s, in whole nanoseconds."""
+    """A time of a run, s, in whole nanoseconds.
+
+    Raises:
+        InputError: for a time that a recording cannot hold.
+    """
+    if not 0.0 <= time <= _LATEST:
+        raise InputError(f"the run has something at {time:g} s; allowed: times from 0 to {_LATEST:g} s")
     return round(time * 1e9)
 
 

@@ -8,13 +8,13 @@ import io
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.answer import envelope, quantity
+from spirillum.argument_kinds import as_number
 from spirillum.dynamics.poses import Poses, poses_of, rolled
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError
@@ -89,8 +89,7 @@ def export_run(
     Raises:
         InputError: for wrong input, a run that holds no motion, or a missing library.
     """
-    given: Any = speed
-    if isinstance(given, bool) or not isinstance(given, Real) or not _SLOWEST <= float(given) <= _FASTEST:
+    if not _SLOWEST <= as_number(speed) <= _FASTEST:
         raise InputError(f"speed = {str(speed)[:40]}; allowed: {_SLOWEST:g} to {_FASTEST:g}")
     inputs = [run] if isinstance(run, (str, Path)) else []
     with protected(*inputs, film):
@@ -119,12 +118,10 @@ class _Writer:
         self._writer.start(library=f"{MARK} {own_version()}")
         self._schemas = {**foxglove.SCHEMAS, _NUMBERS: foxglove.numbers_schema(_meanings(dataset))}
         self._channels: dict[str, int] = {}
-        said = {
-            name: str(dataset.attrs[name])
-            for name in ("robot", "model", "settings", "versions", "title")
-            if name in dataset.attrs
-        }
-        self._writer.add_metadata("spirillum run", said)
+        names = ("robot", "model", "settings", "versions", "title")
+        self._writer.add_metadata(
+            "spirillum run", {name: str(dataset.attrs[name]) for name in names if name in dataset.attrs}
+        )
 
     def add(self, message: Message) -> None:
         """Write one message."""
