@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
@@ -59,12 +60,12 @@ def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, An
 _ENDS = ("value", "low", "high")
 
 
-class Shown:
+class Shown(ABC):
     """What every answer gives to `print` and to notebooks: its quantities with units, and its warnings."""
 
+    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """The answer as data, as the command of the same name prints it with `--json`."""
-        raise NotImplementedError
 
     def _shown(self) -> tuple[Mapping[str, Any], Iterable[str] | None]:
         """The answer as data, and the names of the quantities to show; None: all."""
@@ -109,7 +110,12 @@ def _with_ends(row: Row) -> str:
 
 
 def html_of(answer: Mapping[str, Any], only: Iterable[str] | None = None) -> str:
-    """An answer as a table in HTML; everything in it is escaped. Arguments as `text_of`."""
+    """An answer as a table in HTML; everything in it is escaped.
+
+    Args:
+        answer: an envelope, see `spirillum.answer.envelope`.
+        only: names of the quantities to show; None: all, and those of its parts.
+    """
     parts = [("", rows_of(answer, only)), *(_parts(answer) if only is None else ())]
     banded = any(row.low for _, rows in parts for row in rows)
     header = ("quantity", "value", *(("low", "high") if banded else ()), "unit")

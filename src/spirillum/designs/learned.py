@@ -10,6 +10,7 @@ not change C: what is not known of them costs no solve.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -113,8 +114,9 @@ class Corrected(SwimmerModel):
         few, place = batch.taken(first), np.ravel(inverse)
         return [_spread(item, place, batch.size) for item in (*self._own_domain(few), *Sbt().domain(few))]
 
+    @abstractmethod
     def _own_domain(self, batch: RobotBatch) -> list[Limit]:
-        raise NotImplementedError
+        """What the model itself asks for, without what needs a solution of the flow."""
 
     def axial(self, batch: RobotBatch) -> Axial:
         """See `SwimmerModel.axial`."""

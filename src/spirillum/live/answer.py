@@ -32,7 +32,7 @@ class Tracked(Shown):
     learnt: float
     """Time of the first frame after the robot was learnt, s; NaN if it never was."""
     latencies: tuple[float, ...] = field(repr=False)
-    """Time from each tracked picture's coming to what is said of it, s; empty with the pace `fast`."""
+    """Time from each tracked picture's arrival to its observation, s; empty with the pace `fast`."""
     trial: Trial | None = field(repr=False)
     """Speed and rates over all frames; None if the robot was never learnt."""
     notes: tuple[str, ...] = ()
@@ -60,7 +60,7 @@ class Tracked(Shown):
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON, SI with rates in rad/s."""
+        """The answer as data, SI with rates in rad/s."""
         content: dict[str, Any] = {
             "source": self.source,
             "pace": self.pace,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Generator, Iterator
-from threading import Condition, Thread
+from threading import Condition, Event, Thread
 
 from spirillum.live.sources import Arrived
 
@@ -17,10 +17,10 @@ _WAITING = 2
 
 def at_own_pace(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
     """A film's pictures, each when it is due."""
-    begun = None
+    start = None
     for frame in frames:
-        begun = time.perf_counter() - frame.time if begun is None else begun
-        due = begun + frame.time
+        start = time.perf_counter() - frame.time if start is None else start
+        due = start + frame.time
         if (wait := due - time.perf_counter()) > 0.0:
             time.sleep(wait)
         yield frame._replace(clock=due)
@@ -30,10 +30,10 @@ def newest(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
     """Pictures as they come, taken by a thread of their own; the oldest are dropped where they come too fast.
 
     Args:
-        frames: where they come from; what it raises is raised when all that had come before was handed over.
+        frames: where they come from; what it raises is raised here once all pictures before it are handed over.
     """
     waiting: deque[Arrived] = deque(maxlen=_WAITING)
-    ready, ended = Condition(), list[BaseException | None]()
+    ready, stopped, ended = Condition(), Event(), list[BaseException | None]()
 
     def take() -> None:
         error: BaseException | None = None
@@ -42,17 +42,15 @@ def newest(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
                 with ready:
                     waiting.append(frame)
                     ready.notify()
-                if left:
+                if stopped.is_set():
                     return
-        except BaseException as found:  # handed over to the thread that asked
-            error = found
+        except BaseException as raised:  # handed over to the thread that takes the pictures
+            error = raised
         with ready:
             ended.append(error)
             ready.notify()
 
-    left: list[bool] = []
-    thread = Thread(target=take, name="pictures", daemon=True)
-    thread.start()
+    Thread(target=take, name="pictures", daemon=True).start()
     try:
         while True:
             with ready:
@@ -64,4 +62,4 @@ def newest(frames: Iterator[Arrived]) -> Generator[Arrived, None, None]:
                 frame = waiting.popleft()
             yield frame
     finally:
-        left.append(True)
+        stopped.set()

@@ -1,4 +1,4 @@
-"""What the live tracker says of one frame."""
+"""What the live tracker has found on one frame."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Observation(Shown):
         return self.state == "tracking"
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON, SI with rates in rad/s."""
+        """The observation as data, SI with rates in rad/s."""
         content: dict[str, Any] = {
             "frame": self.frame,
             "time": quantity(self.time, "s"),

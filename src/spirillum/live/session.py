@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Generator, Mapping
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -75,33 +75,29 @@ def track(
     length = None if duration is None else seconds("duration", duration, most=1e7)
     chosen, _ = load_setup(setup)
     between = chosen.start, chosen.end
-    opened = source_of(str(source), size=size, fps=fps, rate=chosen.camera.frames_per_second, between=between)
-    if pace == "fast" and opened.kind != "film":
-        raise InputError(f"pace = 'fast' with {opened.name}; allowed: 'real', as a {opened.kind} has its own pace")
+    pictures = source_of(str(source), size=size, fps=fps, rate=chosen.camera.frames_per_second, between=between)
+    if pace == "fast" and pictures.kind != "film":
+        raise InputError(f"pace = 'fast' with {pictures.name}; allowed: 'real', as a {pictures.kind} has its own pace")
     tracker = LiveTracker(
         setup, _robot(setup, chosen.robot.file, overrides), learn=learn, window=window, learn_from=learn_from,
-        name=opened.name, words=opened.words,
+        name=pictures.name, words=pictures.words,
     )  # fmt: skip
-    log = _Log(opened, pace, tracker, length)
-    out = None if udp is None else Datagrams(udp)
+    log = _Log(pictures, pace, tracker, length)
+    with nullcontext() if udp is None else closing(Datagrams(udp)) as out:
 
-    def tell(said: Observation, latency: float | None) -> None:
-        if out is not None:
-            out.send(line_of(observation_line(said, latency)))
-        if on_observation is not None:
-            on_observation(said, latency)
+        def report(observation: Observation, latency: float | None) -> None:
+            if out is not None:
+                out.send(line_of(observation_line(observation, latency)))
+            if on_observation is not None:
+                on_observation(observation, latency)
 
-    try:
-        log.run(tell)
-    finally:
-        if out is not None:
-            out.close()
+        log.run(report)
     return log.answer()
 
 
-def observation_line(said: Observation, latency: float | None) -> dict[str, Any]:
+def observation_line(observation: Observation, latency: float | None) -> dict[str, Any]:
     """An observation as JSON, with its latency before its warnings."""
-    answer = said.to_dict()
+    answer = observation.to_dict()
     warnings = answer.pop("warnings")
     more = {} if latency is None else {"latency": quantity(latency, "s")}
     return {**answer, **more, "warnings": warnings}
@@ -123,7 +119,7 @@ def _paced(source: Source, pace: str) -> Generator[Arrived, None, None]:
 
 @dataclass
 class _Log:
-    """What has been looked at so far."""
+    """The frames of a run so far: counts, latencies, and why it ended."""
 
     source: Source
     pace: str
@@ -133,15 +129,15 @@ class _Log:
     tracked: int = 0
     dropped: int = 0
     learnt: float = math.nan
-    begun: float = 0.0
+    start: float = 0.0
     stopped: str = ""
     interrupted: bool = False
     latencies: list[float] = field(default_factory=list)
     _next: int = 0
     _first: tuple[float, float] | None = None
-    _notes: dict[str, str] = field(default_factory=dict)
+    _clocks: str = ""
 
-    def run(self, tell: OnObservation) -> None:
+    def run(self, report: OnObservation) -> None:
         """Look at all frames; what stops it on the way is noted, if anything was looked at.
 
         Raises:
@@ -151,8 +147,8 @@ class _Log:
         try:
             with closing(_paced(self.source, self.pace)) as frames:
                 for frame in frames:
-                    tell(*self.looked_at(frame))
-                    if self.length is not None and frame.time - self.begun >= self.length:
+                    report(*self.take(frame))
+                    if self.length is not None and frame.time - self.start >= self.length:
                         return
         except (InputError, KeyboardInterrupt) as error:
             if not self.frames:
@@ -160,7 +156,7 @@ class _Log:
             self.interrupted = isinstance(error, KeyboardInterrupt)
             self.stopped = "" if self.interrupted else str(error)
 
-    def looked_at(self, frame: Arrived) -> tuple[Observation, float | None]:
+    def take(self, frame: Arrived) -> tuple[Observation, float | None]:
         """What the tracker says of a frame, and after how long, s."""
         missed = frame.number - self._next
         self._next = frame.number + 1
@@ -168,36 +164,34 @@ class _Log:
         self.tracker.left_out(missed)
         known = self.tracker.learnt
         if self._first is None:
-            self._first, self.begun = (frame.time, frame.clock), frame.time
-        said = self.tracker.update(frame.image, frame.time)
+            self._first, self.start = (frame.time, frame.clock), frame.time
+        observation = self.tracker.update(frame.image, frame.time)
         latency = None if self.pace == "fast" else time.perf_counter() - frame.clock
         self.frames += 1
         if known and math.isnan(self.learnt):
             self.learnt = frame.time
         if known and latency is not None:
             self.latencies.append(latency)
-        self.tracked += said.seen
+        self.tracked += observation.seen
         self._compare_clocks(frame)
-        return said, latency
+        return observation, latency
 
     def _compare_clocks(self, frame: Arrived) -> None:
-        """Say it if the source's clock runs otherwise than this computer's, as it does where frames are lost."""
+        """Warn if the source's clock and this computer's differ, as they do where frames are lost."""
         assert self._first is not None  # noqa: S101 - the first frame has set it
         if self.source.kind == "film":
             return
-        own, ours = frame.time - self._first[0], frame.clock - self._first[1]
-        if abs(own - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
-            self._notes["clock"] = (
-                f"{self.source.name}: {own:.1f} s by the times of the frames were {ours:.1f} s by this computer's: "
+        theirs, ours = frame.time - self._first[0], frame.clock - self._first[1]
+        self._clocks = ""
+        if abs(theirs - ours) > _CLOCK_JITTER + _CLOCK_ERROR * ours and ours > 1.0:
+            self._clocks = (
+                f"{self.source.name}: {theirs:.1f} s by the times of the frames were {ours:.1f} s by this computer's: "
                 "frames are lost, or the rate is another than stated; all rates are wrong by that factor"
             )
-        else:
-            self._notes.pop("clock", None)
 
     def answer(self) -> Tracked:
         """The answer."""
         trial = None
-        notes = list(self._notes.values())
         try:
             trial = self.tracker.summary()
         except InputError as error:
@@ -211,7 +205,7 @@ class _Log:
             learnt=self.learnt,
             latencies=tuple(self.latencies),
             trial=trial,
-            notes=tuple(notes),
+            notes=(self._clocks,) if self._clocks else (),
             stopped=self.stopped,
             interrupted=self.interrupted,
         )

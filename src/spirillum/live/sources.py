@@ -107,18 +107,18 @@ def source_of(
         if fps is not None and not 0.0 < as_number(fps) <= _FASTEST:
             raise InputError(f"fps = {clipped(fps)}; allowed: above 0, at most {_FASTEST:g} frames a second")
         kind, place = _DEVICES.get(sys.platform, _DEVICES["linux"])
-        asked = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
-        asked |= {} if fps is None else {"framerate": f"{fps:g}"}
-        options = {"file": place.format(device[1]), "format": kind, "options": asked, "size": size}
+        wanted = {} if size is None else {"video_size": f"{size[0]}x{size[1]}"}
+        wanted |= {} if fps is None else {"framerate": f"{fps:g}"}
+        options = {"file": place.format(device[1]), "format": kind, "options": wanted, "size": size}
         return Source(word, "camera", options)
     if scheme:
         if scheme not in _PROTOCOLS:
             raise InputError(f"source = {word[:80]!r}; allowed: {_ALLOWED}")
         quick = {"flags": "low_delay", "analyzeduration": "1000000"}  # in microseconds
-        asked = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
+        wanted = {"protocol_whitelist": _PROTOCOLS[scheme], "format_whitelist": _FORMATS, **quick}
         address = scheme + word[len(scheme) :]
         return Source(
-            _without_secrets(word), "stream", {"file": address, "format": None, "options": asked, "size": None}
+            _without_secrets(word), "stream", {"file": address, "format": None, "options": wanted, "size": None}
         )
     video = open_video(word, rate)  # says what is wrong with a film
     return Source(video.name, "film", {"path": word, "rate": rate, "between": between}, video.words)
@@ -133,7 +133,7 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
     """Pictures of a camera or stream, with the least delay."""
     av = required("av", "tracking a camera", "video")
     count, last, origin, size = 0, -1.0, None, source.options["size"]
-    rgb, begun = converter(), 0.0
+    rgb, start = converter(), 0.0
     try:
         with av.open(
             source.options["file"],
@@ -147,8 +147,8 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
                 came = time.perf_counter()
                 for frame in packet.decode():
                     size = _checked_size(source.name, (frame.width, frame.height), size)
-                    begun = begun or came
-                    stamp = came - begun if frame.time is None else float(frame.time)
+                    start = start or came
+                    stamp = came - start if frame.time is None else float(frame.time)
                     origin = stamp if origin is None else origin
                     if stamp - origin > last:
                         last = stamp - origin
@@ -166,18 +166,23 @@ def _pictures(source: Source) -> Generator[Arrived, None, None]:
         raise InputError(f"{source.name} stopped after {count} frames: what was tracked is kept")
 
 
-def _checked_size(name: str, size: tuple[int, int], asked: tuple[int, int] | None) -> tuple[int, int]:
+def _checked_size(name: str, size: tuple[int, int], expected: tuple[int, int] | None) -> tuple[int, int]:
     """The size of the pictures.
 
+    Args:
+        name: of the source.
+        size: of a picture, width and height.
+        expected: size that was requested, or of the pictures before; None: any.
+
     Raises:
-        InputError: if it is absurd, or another one than was asked for, or than before.
+        InputError: for another size than the expected one, or one that no camera has.
     """
-    if size == asked:
+    if size == expected:
         return size
-    if asked is not None:
+    if expected is not None:
         raise InputError(
-            f"{name} gives pictures of {size[0]} x {size[1]} pixels in place of {asked[0]} x {asked[1]}: what was "
-            "tracked is kept"
+            f"{name} gives pictures of {size[0]} x {size[1]} pixels in place of {expected[0]} x {expected[1]}: what "
+            "was tracked is kept"
         )
     if min(size) < SMALLEST_SIDE or size[0] * size[1] > MOST_PIXELS:
         raise InputError(

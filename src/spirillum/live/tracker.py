@@ -65,12 +65,12 @@ class LiveTracker:
         """
         if isinstance(setup, Setup):
             self.setup, self._folder = setup, Path()
-            own = load(setup.robot.file) if robot is None else None
+            self.robot = load(setup.robot.file if robot is None else robot)
         else:
-            self.setup, own = load_setup(setup)
+            self.setup, self.robot = load_setup(setup)
             self._folder = Path(setup).parent
-        self.robot = load(robot) if robot is not None else own
-        assert self.robot is not None  # noqa: S101 - the setup names one
+            if robot is not None:
+                self.robot = load(robot)
         self.name, self._words = name, words
         self._learn, self._window = seconds("learn", learn), seconds("window", window)
         self._samples: list[Frame] = []
@@ -78,7 +78,7 @@ class LiveTracker:
         self._size: tuple[int, int] | None = None
         self._count, self._last = 0, -math.inf
         self._reason = f"the robot is learnt from the first {self._learn:g} s"
-        self._robot_is: Following | None = None
+        self._following: Following | None = None
         if learn_from is not None:
             film = opened(learn_from, self.setup)
             self._size = film.size
@@ -87,7 +87,7 @@ class LiveTracker:
     @property
     def learnt(self) -> bool:
         """Whether the robot is known."""
-        return self._robot_is is not None
+        return self._following is not None
 
     def update(self, frame: np.ndarray, time: float) -> Observation:
         """Look at the next frame.
@@ -104,8 +104,8 @@ class LiveTracker:
         self._check(frame, time)
         now = Frame(self._count, float(time), frame)
         self._count, self._last = self._count + 1, now.time
-        if self._robot_is is not None:
-            return self._robot_is.observed(now)
+        if self._following is not None:
+            return self._following.observed(now)
         self._collect(now)
         return Observation(now.index, now.time, "learning", self._reason)
 
@@ -119,11 +119,11 @@ class LiveTracker:
         Raises:
             InputError: if the robot was never found.
         """
-        if self._robot_is is None:
+        if self._following is None:
             raise InputError(
                 f"{self.name}: {self._reason}; allowed: a robot in view, for longer than {self._learn:g} s"
             )
-        return self._robot_is.trial(self.name)
+        return self._following.trial(self.name)
 
     def _check(self, frame: Any, time: Any) -> None:
         kind = getattr(frame, "dtype", None), getattr(frame, "ndim", 0)
@@ -159,12 +159,11 @@ class LiveTracker:
             self._reason = str(error)
 
     def _begin(self, video: Video, samples: list[Frame]) -> None:
-        assert self.robot is not None  # noqa: S101
         learnt = learnt_from(video, samples, self.setup, self.robot, self._folder)
         useless = [flag for flag in learnt.flags if set(EVERYTHING) <= set(flag.spoils)]
         if useless:
             raise InputError(useless[0].sentence)
-        self._robot_is = Following(video, self.setup, self.robot, learnt, self._window)
+        self._following = Following(video, self.setup, self.robot, learnt, self._window)
 
 
 def seconds(name: str, value: str | float, most: float = 600.0) -> float:
