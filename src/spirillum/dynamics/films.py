@@ -82,10 +82,9 @@ def _body_rings(robot: Robot, channel: float) -> list[list[float]]:
     body, viscosity = robot.body, robot.fluid.viscosity
     radius, half = 0.5 * body.diameter, 0.5 * body.length
     across = _across(radius, channel)
-    round_ = {"hemisphere": radius, "fillet": body.fillet or 0.0}
     if body.shape in ("sphere", "spheroid"):
         return [[0.0, radius, half, _point(half**2 / radius, across, viscosity), 1.0, radius]]
-    front, rear = half - round_.get(body.front_end or "", 0.0), -half + round_.get(body.rear_end or "", 0.0)
+    front, rear = half - body.rounding(body.front_end), -half + body.rounding(body.rear_end)
     length = front - rear
     if length < 1e-6 * radius:
         return [[front, radius, radius, _point(radius, across, viscosity), 1.0, radius]]

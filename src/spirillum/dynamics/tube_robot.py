@@ -145,9 +145,8 @@ def _sites(robot: Robot) -> tuple[list[str], Samples]:
     if body.shape in ("sphere", "spheroid"):
         names, rows = ["body"], [(0.0, a, half, 0.0, 0.0)]
     else:
-        balls = {"hemisphere": a, "fillet": body.fillet or 0.0}
         for name, end, sign in (("body front", body.front_end, 1.0), ("body rear", body.rear_end, -1.0)):
-            ball = balls.get(end or "", 0.0)
+            ball = body.rounding(end)
             names.append(name)
             rows.append((sign * (half - ball), a - ball, 0.0, ball, 0.0))
     solid = coupling.length - 2.0 * coupling.clearance

@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.robot.geometry import Centreline, centreline, shortest_body
+from spirillum.robot.geometry import Centreline, centreline
 from spirillum.robot.links import outlines_of
 from spirillum.robot.outline import Outline
 from spirillum.robot.parts import Seal, StripeColour
@@ -187,11 +187,7 @@ def _check_seal(robot: Robot, seal: Seal) -> None:
         InputError: if it does not.
     """
     body = robot.body
-    if body.shape in ("sphere", "spheroid"):
-        nose = 0.5 * body.length
-    else:
-        numbers = (np.array([body.diameter]), np.array([body.fillet or 0.0]))
-        nose = float(shortest_body(*numbers, body.front_end, "flat")[0])
+    nose = 0.5 * body.length if body.shape in ("sphere", "spheroid") else body.rounding(body.front_end)
     longest = body.length - nose
     if seal.length > longest * (1.0 + 1e-12):
         raise InputError(

@@ -77,6 +77,11 @@ class Outline:
     corners: tuple[bool, ...]
     """Whether there is a sharp edge between each piece and the next."""
 
+    def line(self, t: Samples) -> tuple[Samples, Samples]:
+        """(x, rho) of the pieces one after the other, each at t from 0 to 1."""
+        x, rho = zip(*(piece.points(t) for piece in self.pieces), strict=True)
+        return np.concatenate(x), np.concatenate(rho)
+
     def contains(self, x: Samples, rho: Samples) -> np.ndarray:
         """Whether points lie inside."""
         radius = np.fmax.reduce([piece.radius(x) for piece in self.pieces])
@@ -86,13 +91,11 @@ class Outline:
 
     def distance(self, x: Samples, rho: Samples) -> Samples:
         """Distance of points from the surface, to a thousandth of a piece's length, m."""
-        t = np.linspace(0.0, 1.0, 1001)
-        line_x, line_rho = (np.concatenate(part) for part in zip(*(p.points(t) for p in self.pieces), strict=True))
         from scipy.spatial import cKDTree
 
         shape = np.broadcast_shapes(np.shape(x), np.shape(rho))
         points = np.stack(np.broadcast_arrays(x, rho), axis=-1).reshape(-1, 2)
-        found, _ = cKDTree(np.stack([line_x, line_rho], axis=-1)).query(points)
+        found, _ = cKDTree(np.stack(self.line(np.linspace(0.0, 1.0, 1001)), axis=-1)).query(points)
         return np.asarray(found).reshape(shape)
 
 

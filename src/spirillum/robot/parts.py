@@ -107,6 +107,10 @@ class Body(Section):
         """Rear end in force; None for a sphere or spheroid, which have no ends of their own."""
         return self.rear or _DEFAULT_END.get(self.shape)
 
+    def rounding(self, end: End | None) -> float:
+        """Radius of the rounding of an end of this body, m: 0 where it is flat."""
+        return {"hemisphere": 0.5 * self.diameter, "fillet": self.fillet or 0.0}.get(end or "", 0.0)
+
 
 StripeColour = Literal["red", "yellow", "green", "blue", "white", "black", "orange", "magenta", "cyan"]
 

@@ -17,6 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.formats.h264 import h264_writer
+from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -159,23 +160,9 @@ class Annotator:
 
 def _outline_of(robot: Robot) -> Samples:
     """The body's outline in the plane of its axis across the line of sight, (k, 3)."""
-    half, radius = 0.5 * robot.body.length, 0.5 * robot.body.diameter
-    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 24)
-    if robot.body.shape in ("sphere", "spheroid"):
-        around = np.linspace(0.0, 2 * np.pi, 60)
-        edge = np.stack([half * np.cos(around), radius * np.sin(around)], axis=1)
-        return np.concatenate([edge, np.zeros((len(edge), 1))], axis=1)
-    depth = min(radius, half)
-
-    def end(kind: str | None, sign: float) -> Samples:
-        if kind == "hemisphere":
-            return np.stack([half - depth + depth * np.cos(angle), sign * radius * np.sin(angle)], axis=1)
-        return np.array([[half, -sign * radius], [half, sign * radius]])
-
-    front, rear = end(robot.body.front_end, 1.0), end(robot.body.rear_end, -1.0)
-    rear[:, 0] *= -1.0
-    edge = np.concatenate([front, rear])
-    return np.concatenate([edge, np.zeros((len(edge), 1))], axis=1)
+    x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 24))
+    edge = np.column_stack([x, radius, np.zeros_like(x)])
+    return np.concatenate([edge, edge[::-1] * [1.0, -1.0, 1.0]])
 
 
 def _turned(points: Samples, angle: float) -> Samples:

@@ -8,9 +8,11 @@ from matplotlib.collections import LineCollection
 
 import spirillum as sp
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.links import outlines_of
+from spirillum.view.annotate import Annotator
 from spirillum.view.figures.robot import robot_figure, robot_words
 from spirillum.view.figures.scene import PHASE
-from spirillum.view.figures.solids import body_profile, crests
+from spirillum.view.figures.solids import crests
 from spirillum.view.figures.style import save
 
 
@@ -21,11 +23,20 @@ def test_body_outline_encloses_the_bodys_volume() -> None:
         {"body.shape": "cylinder", "body.front": "fillet", "body.rear": "fillet", "body.fillet": "3 mm"},
     ):
         robot = sp.load("biorob2012-wide", **fields)
-        x, radius = body_profile(robot.body)
+        x, radius = outlines_of(robot)["body"].line(np.linspace(0.0, 1.0, 60))
         volume = -np.sum(np.diff(x) * np.pi / 3 * (radius[1:] ** 2 + radius[1:] * radius[:-1] + radius[:-1] ** 2))
         assert volume == pytest.approx(RobotBatch.of(robot).body_volume[0], rel=1e-3)
         assert x.max() - x.min() == pytest.approx(robot.body.length)
         assert 2 * radius.max() == pytest.approx(robot.body.diameter)
+
+
+def test_outline_over_a_film_has_the_bodys_fillets() -> None:
+    fields = {"body.shape": "cylinder", "body.front": "fillet", "body.rear": "fillet", "body.fillet": "3 mm"}
+    robot = sp.load("biorob2012-wide", **fields)
+    x, y, _ = Annotator(robot)._outline.T
+    area = 0.5 * abs(np.sum(x * np.roll(y, 1) - y * np.roll(x, 1)))
+    expected = robot.body.length * robot.body.diameter - (4.0 - np.pi) * 0.003**2
+    assert area == pytest.approx(expected, rel=1e-4)
 
 
 @pytest.mark.parametrize("hand", ["right", "left"])

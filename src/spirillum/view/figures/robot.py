@@ -9,10 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 
+from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.dimensions import draw_dimensions
 from spirillum.view.figures.scene import FAINT, INK, PHASE, WIDTH, Scene, label, length_words
-from spirillum.view.figures.solids import Metal, body_profile, draw_solid, draw_wire
+from spirillum.view.figures.solids import Metal, draw_solid, draw_wire
 from spirillum.view.figures.style import COLOURS, new_figure, plain, styled
 
 __all__ = ["robot_figure", "robot_words"]
@@ -108,13 +109,11 @@ def _draw_robot(axes: Axes, s: Scene) -> None:
         zorder=3,
     )
     draw_wire(axes, robot, _COPPER, phase=PHASE, unit=unit, points=s.points)
-    clearance = robot.coupling.clearance / unit
-    if robot.coupling.diameter > 0 and robot.coupling.length > 2 * robot.coupling.clearance:
-        radius = 0.5 * robot.coupling.diameter / unit
-        x = np.array([s.rear - clearance, s.rear - clearance, s.root + clearance, s.root + clearance])
-        draw_solid(axes, x, np.array([0.0, radius, radius, 0.0]), _COUPLING, order=7)
-    x, radii = body_profile(robot.body)
-    draw_solid(axes, x / unit, radii / unit, _BODY, order=8)
+    outlines = outlines_of(robot)
+    for name, colours, order in (("coupling", _COUPLING, 7), ("body", _BODY, 8)):
+        if name in outlines:
+            x, radius = outlines[name].line(np.linspace(0.0, 1.0, 60))
+            draw_solid(axes, x / unit, radius / unit, colours, order=order)
 
 
 def _turning(axes: Axes, s: Scene, x: float, reach: float, sense: float, text: str) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 
 from spirillum.arrays import Values
-from spirillum.robot.outline import Outline, body_outline, solid_outlines
+from spirillum.robot.links import outlines_of
+from spirillum.robot.outline import Outline
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
 from spirillum.view.figures.solids import wire_line
@@ -56,7 +55,7 @@ def draw_section(
         axes.plot(
             *line[:, along].T / unit, color="white", linewidth=width, alpha=0.35, solid_capstyle="round", zorder=4
         )
-    for outline in _outlines(robot):
+    for outline in outlines_of(robot).values():
         if (cut := _cut(outline, plane, 0.0)) is not None and offset != 0.0 and plane != "yz":
             axes.add_patch(
                 Polygon(cut / unit, closed=True, fill=False, edgecolor=_BEYOND, linewidth=0.7, linestyle="--", zorder=5)
@@ -106,12 +105,6 @@ def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
     return np.concatenate([upper, lower[::-1]])
 
 
-def _outlines(robot: Robot) -> Iterable[Outline]:
-    body, coupling = robot.body, robot.coupling
-    outline = body_outline(body.shape, body.diameter, body.length, body.fillet or 0.0, body.front_end, body.rear_end)
-    return solid_outlines(outline, body.length, coupling.diameter, coupling.length, coupling.clearance).values()
-
-
 def _cut(outline: Outline, plane: str, offset: float) -> Values | None:
     """Corners of a solid of revolution's section, m, (n, 2); None where the plane misses it."""
     if plane == "yz":
@@ -120,7 +113,7 @@ def _cut(outline: Outline, plane: str, offset: float) -> Values | None:
             return None
         angle = 2.0 * np.pi * _SAMPLES
         return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    x, rho = (np.concatenate(part) for part in zip(*(piece.points(_SAMPLES) for piece in outline.pieces), strict=True))
+    x, rho = outline.line(_SAMPLES)
     met = rho > abs(offset)
     if not met.any():
         return None

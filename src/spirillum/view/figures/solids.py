@@ -9,10 +9,9 @@ from matplotlib.colors import to_rgb
 
 from spirillum.arrays import Values
 from spirillum.robot.geometry import centreline
-from spirillum.robot.parts import Body, End
 from spirillum.robot.robot import Robot
 
-__all__ = ["Metal", "body_profile", "centreline_of", "crests", "draw_solid", "draw_wire", "wire_line"]
+__all__ = ["Metal", "centreline_of", "crests", "draw_solid", "draw_wire", "wire_line"]
 
 Metal = tuple[str, str, str]
 """Colours of a shaded surface: shadow, middle, highlight."""
@@ -20,30 +19,6 @@ Metal = tuple[str, str, str]
 _SHELLS = 48
 _LARGEST_WIRE = 4000
 _LIGHT_HEIGHT = 0.42
-
-
-def _end_profile(end: End | None, radius: float, fillet: float) -> tuple[Values, Values]:
-    """An end of a capsule or cylinder: distance from its tip and radius there, from the axis outwards."""
-    angle = np.linspace(0.0, 0.5 * np.pi, 40)
-    if end == "hemisphere":
-        return radius * (1.0 - np.cos(angle)), radius * np.sin(angle)
-    if end == "fillet":
-        height, out = fillet * (1.0 - np.cos(angle)), radius - fillet + fillet * np.sin(angle)
-        return np.concatenate([[0.0], height]), np.concatenate([[0.0], out])
-    return np.array([0.0, 0.0]), np.array([0.0, radius])
-
-
-def body_profile(body: Body) -> tuple[Values, Values]:
-    """Outline of the body, m: x from nose to rear about its mid-length, and the radius there."""
-    radius, half = 0.5 * body.diameter, 0.5 * body.length
-    if body.shape in ("sphere", "spheroid"):
-        angle = np.linspace(0.0, np.pi, 120)
-        return half * np.cos(angle), radius * np.sin(angle)
-    fillet = body.fillet or 0.0
-    front, front_radius = _end_profile(body.front_end, radius, fillet)
-    rear, rear_radius = _end_profile(body.rear_end, radius, fillet)
-    x = np.concatenate([half - front, (-half + rear)[::-1]])
-    return x, np.concatenate([front_radius, rear_radius[::-1]])
 
 
 def _shades(colours: Metal, amount: Values) -> Values:
