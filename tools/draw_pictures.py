@@ -37,10 +37,10 @@ if __name__ == "__main__":
         model="sbt",
     )
     pictures = {
-        "design": (design_figure(best), 110),
+        "design": (design_figure(best), 150),
         "overview": (robot_figure(sp.load("biorob2012-wide")), 150),
         "flow": (flow_figure(flow, flow.plane("xz")), 90),
-        "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 110),
+        "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 150),
         "frenet": (frenet_figure(sp.load("biorob2012-wide")), 120),
     }
     for name, (figure, dpi) in pictures.items():

@@ -55,7 +55,7 @@ def design(
         str,
         typer.Option(
             help="Hydrodynamic model: sbt, rft, slender or tube; auto: tube for a robot in a channel, slender without "
-            "one, learned from some fifteen tails in about a minute; sbt where they cannot be learned."
+            "one, learned from some fifteen tails in about a minute of one core; sbt where they cannot be learned."
         ),
     ] = "auto",
     tail_rate: TailRate = None,

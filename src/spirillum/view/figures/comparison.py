@@ -15,12 +15,12 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Sheet, add_letters, width_of
+from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
 from spirillum.view.figures.style import Scale, look_of_model, plain, styled
 
 __all__ = ["comparison_figure"]
 
-_LINE_HEIGHT = 0.42
+_LINE_HEIGHT = 0.34
 """Height of one model in a panel, inches."""
 _ROOM = 1.42
 """Width of a panel over its longest bar: room for the difference written beside it."""
@@ -66,18 +66,19 @@ def comparison_figure(comparison: ModelComparison) -> Figure:
         sheet = Sheet(
             f"{plain(comparison.robot.name, 60)}: models side by side",
             _conditions(comparison),
-            width=width_of(len(_PANELS), 1.9),
-            heights=[_LINE_HEIGHT * len(comparison.models) + 0.1],
-            columns=len(_PANELS),
+            width=PAGE,
+            heights=[_LINE_HEIGHT * len(comparison.models) + 0.1] * 2,
+            columns=2,
             notes=_notes(comparison),
         )
-        panels = sheet.panels[0]
+        panels = sheet.panels.ravel()
         add_letters(panels)
         for axes, panel in zip(panels, _PANELS, strict=True):
             _draw(axes, comparison, panel)
         names = comparison.models
-        panels[0].set_yticks(range(len(names)), [_label(comparison, name) for name in names])
-        panels[0].set_ylim(len(names) - 0.45, -0.55)
+        for axes in sheet.panels[:, 0]:
+            axes.set_yticks(range(len(names)), [_label(comparison, name) for name in names])
+            axes.set_ylim(len(names) - 0.45, -0.55)
         return sheet.finished()
 
 

@@ -2,45 +2,58 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.designs.answer import Design, Profile
 from spirillum.designs.evaluation import Objective
 from spirillum.units import display_unit, in_unit
-from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.sheet import COLUMN, PAGE, Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, PATCH, Scale, plain, styled
 
 __all__ = ["design_figure"]
 
 _REFUSED = "#dddddd"
+_SHADE = 0.2
+_STEPS = [1, 2, 5, 10]
+_MARKED: dict[str, Any] = {"linestyle": "none", "markeredgecolor": "black", "clip_on": False, "zorder": 5}
+_BEST = {**_MARKED, "marker": "*", "markersize": 11, "color": COLOURS["vermillion"], "markeredgewidth": 0.7}
+_TODAY = {**_MARKED, "marker": "o", "markersize": 5, "color": "white"}
 
 
 def design_figure(design: Design) -> Figure:
     """Panels: with two objectives their front; with two fields the landscape; the objective along every field.
 
+    One panel is as wide as a column of a journal (85 mm), several are as wide as its page (170 mm).
+
     Args:
         design: what `spirillum.design` returns.
     """
     count = len(design.profiles) + (design.front is not None) + (design.landscape is not None)
-    columns = 2 if count in (2, 4) else min(count, 3)
+    columns = min(count, 2)
     with styled():
         sheet = Sheet(
-            f"{plain(design.today.name)}: {plain(design.objectives[0].words)}",
+            f"{plain(design.today.name)}: {_in_words(design.objectives[0].words)}",
             _subtitle(design),
-            width=3.0 * columns,
-            heights=[2.5] * -(-count // columns),
+            width=COLUMN if columns == 1 else PAGE,
+            heights=[2.0] * -(-count // columns),
             columns=columns,
             sharey=False,
+            legend=_legend(design),
         )
         panels = [axes for row in sheet.panels for axes in row]
         for spare in panels[count:]:
             spare.set_visible(False)
         panels = panels[:count]
-        add_letters(panels)
+        if count > 1:
+            add_letters(panels)
         rest = list(panels)
         if design.front is not None:
             _front(rest.pop(0), design)
@@ -51,11 +64,30 @@ def design_figure(design: Design) -> Figure:
         return sheet.finished()
 
 
+def _in_words(text: str) -> str:
+    return plain(text.replace("_", " ").replace(">=", "≥").replace("<=", "≤"))
+
+
 def _subtitle(design: Design) -> str:
-    words = [f"model {design.model}", *(plain(item) for item in design.conditions)]
+    words = [f"model {design.model}", *(_in_words(item) for item in design.conditions)]
     if design.uncertainty is not None:
         words.append(f"{design.searched.drawn.number} draws of what is not known")
     return " · ".join([*words, "computed, nothing is measured"])
+
+
+def _legend(design: Design) -> list[Line2D]:
+    """What is drawn, in its colours; nothing that is not."""
+    found = [Line2D([], [], **_BEST, label="best")]
+    if design.landscape is not None:
+        if _today(design) is not None:
+            found.append(Line2D([], [], **_TODAY, label="today"))
+        if not np.all(np.isfinite(design.landscape[2])):
+            found.append(Line2D([], [], color=_REFUSED, **PATCH, label="refused, or breaks a condition"))
+    if any(profile.high > profile.low for profile in design.profiles):
+        found.append(Line2D([], [], color=COLOURS["blue"], alpha=_SHADE, **PATCH, label="within 1 % of the best"))
+    if design.front is not None:
+        found.append(Line2D([], [], color=COLOURS["blue"], marker="o", markersize=4, label="none is better in both"))
+    return found
 
 
 def _label(path: str, unit: str) -> str:
@@ -85,13 +117,27 @@ def _profile(axes: Axes, design: Design, profile: Profile) -> None:
     best, _ = _field(np.array([design.values[profile.path], profile.low, profile.high]), profile.unit)
     whole = profile.unit == "1" and len(values) < 30
     if best[2] > best[1]:
-        axes.axvspan(best[1], best[2], color=COLOURS["blue"], alpha=0.15, linewidth=0, label="within 1 % of the best")
+        axes.axvspan(best[1], best[2], color=COLOURS["blue"], alpha=_SHADE, linewidth=0)
     axes.plot(values, objective, color=COLOURS["blue"], marker="o" if whole else None, markersize=4)
-    axes.axvline(best[0], color=COLOURS["vermillion"], linestyle="--", linewidth=1.2, label="best")
-    axes.set_xlim(values[0], values[-1])
+    known = np.isfinite(objective)
+    axes.plot(best[0], np.interp(best[0], values[known], objective[known]), **_BEST)
+    room = 0.3 if whole else 0.0
+    axes.set_xlim(values[0] - room, values[-1] + room)
+    axes.xaxis.set_major_locator(MaxNLocator(6, integer=whole, steps=_STEPS))
+    axes.margins(y=0.1)
     axes.set_xlabel(_label(profile.path, unit))
     axes.set_ylabel(label)
-    axes.legend(fontsize=7)
+
+
+def _today(design: Design) -> list[float] | None:
+    """Where in the landscape the robot lies as it was given; None where it lies beyond the ranges."""
+    found = []
+    for profile in design.profiles:
+        value = design.alternatives[0].values[profile.path]
+        if not profile.values[0] <= value <= profile.values[-1]:
+            return None
+        found.append(float(_field(np.array([value]), profile.unit)[0][0]))
+    return found
 
 
 def _landscape(axes: Axes, design: Design) -> None:
@@ -102,21 +148,18 @@ def _landscape(axes: Axes, design: Design) -> None:
     y, y_unit = _field(second, two.unit)
     values, label = _objective(design.objectives[0], grid)
     axes.set_facecolor(_REFUSED)
+    axes.grid(visible=False)
     if any(item.is_whole for item in design.searched.space.variables):
         found: ScalarMappable = axes.pcolormesh(x, y, np.ma.masked_invalid(values), cmap="cividis", shading="nearest")
     else:
         found = axes.contourf(x, y, values, levels=12, cmap="cividis")
-    axes.figure.colorbar(found, ax=axes, label=label)
-    best = [_field(np.array([design.values[item.path]]), item.unit)[0][0] for item in (one, two)]
-    today = [_field(np.array([design.alternatives[0].values[item.path]]), item.unit)[0][0] for item in (one, two)]
-    axes.plot(*best, marker="*", markersize=13, color="white", markeredgecolor="black", linestyle="none", label="best")
-    if x[0] <= today[0] <= x[-1] and y[0] <= today[1] <= y[-1]:
-        axes.plot(*today, marker="o", color="white", markeredgecolor="black", linestyle="none", label="today")
-    if not np.all(np.isfinite(values)):
-        axes.plot([], [], color=_REFUSED, linewidth=7, label="refused, or breaks a condition")
+    axes.figure.colorbar(found, ax=axes, label=label, ticks=MaxNLocator(6, steps=_STEPS))
+    axes.plot(*(_field(np.array([design.values[item.path]]), item.unit)[0][0] for item in (one, two)), **_BEST)
+    today = _today(design)
+    if today is not None:
+        axes.plot(*today, **_TODAY)
     axes.set_xlabel(_label(one.path, x_unit))
     axes.set_ylabel(_label(two.path, y_unit))
-    axes.legend(fontsize=7, framealpha=0.9, facecolor="white", frameon=True)
 
 
 def _front(axes: Axes, design: Design) -> None:
@@ -124,7 +167,7 @@ def _front(axes: Axes, design: Design) -> None:
     first, second = design.objectives
     x, x_label = _objective(second, design.front[second.name])
     y, y_label = _objective(first, design.front[first.name])
-    axes.plot(x, y, color=COLOURS["blue"], marker="o", markersize=4, label="none is better in both")
+    axes.plot(x, y, color=COLOURS["blue"], marker="o", markersize=4)
+    axes.plot(x[0], y[0], **_BEST)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
-    axes.legend(fontsize=7)

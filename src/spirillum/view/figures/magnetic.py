@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from spirillum.arrays import Samples
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, PATCH, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["magnetic_figure"]
 
-_HELD = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
+_HELD: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "label": "held to the axis, closed form"}
+_STEP_OUT: dict[str, Any] = {"color": "#999999", "linewidth": 0.8}
+_POINTS: dict[str, Any] = {"marker": "o", "markersize": 3.5, "linewidth": 1.2}
 
 
 def magnetic_figure(dataset: xr.Dataset) -> Figure:
@@ -35,11 +38,17 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
             f"{plain(dataset.attrs['robot'])} in a rotating field",
             f"model {dataset.attrs['model']} · free in unbounded fluid, without weight · field sped up step by step · "
             "computed, nothing is measured",
-            width=9.0,
-            heights=[2.25, 2.25],
+            width=PAGE,
+            heights=[1.9, 1.9],
             columns=2,
             sharex=True,
             sharey=False,
+            legend=[
+                Line2D([], [], color=COLOURS["blue"], **_POINTS, label="free"),
+                Line2D([], [], color=COLOURS["green"], alpha=0.25, **PATCH, label="wobble, least to largest"),
+                Line2D([], [], **_HELD),
+                Line2D([], [], **_STEP_OUT, label="step-out of the held robot"),
+            ],
         )
         panels = sheet.panels.ravel()
         add_letters(panels)
@@ -48,18 +57,14 @@ def magnetic_figure(dataset: xr.Dataset) -> Figure:
         panels[0].plot(fine, speeds(advance * turning * Hz), **_HELD)
         _points(panels[0], rate, speeds(speed), "blue")
         panels[0].set_ylabel(f"forward velocity ({speeds.unit})")
-        panels[0].legend(loc="best")
         panels[1].plot(fine, turning, **_HELD)
         _points(panels[1], rate, dataset["tail_rotation_rate"].values / Hz, "vermillion")
         panels[1].set_ylabel("rate of the robot (Hz)")
         low, high = (np.rad2deg(dataset[f"{name}_wobble_angle"].values) for name in ("least", "largest"))
-        panels[2].fill_between(
-            rate, low, high, color=COLOURS["green"], alpha=0.25, linewidth=0, label="least to largest"
-        )
+        panels[2].fill_between(rate, low, high, color=COLOURS["green"], alpha=0.25, linewidth=0)
         _points(panels[2], rate, np.rad2deg(dataset["wobble_angle"].values), "green")
         panels[2].set_ylabel("wobble: robot's axis to field's (deg)")
         panels[2].set_ylim(0.0, max(1.0, 1.05 * float(high.max())))
-        panels[2].legend(loc="best")
         panels[3].plot(fine, np.rad2deg(lag), **_HELD)
         _points(panels[3], rate, np.rad2deg(dataset["phase_lag"].values), "purple")
         panels[3].set_ylabel("moment behind field (deg)")
@@ -82,20 +87,10 @@ def _held(dataset: xr.Dataset) -> tuple[Samples, Samples, Samples]:
 
 
 def _points(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
-    axes.plot(x, y, color=COLOURS[colour], marker="o", markersize=3.5, linewidth=1.2, label="free")
+    axes.plot(x, y, color=COLOURS[colour], **_POINTS)
 
 
 def _step_out(panels: Samples, rate: float) -> None:
     """A line where the held robot steps out."""
     for axes in panels:
-        axes.axvline(rate, color="#999999", linewidth=0.8)
-    panels[1].annotate(
-        "step-out, held",
-        (rate, 0.03),
-        xycoords=("data", "axes fraction"),
-        xytext=(-4, 0),
-        textcoords="offset points",
-        ha="right",
-        size=8.0,
-        color="#555555",
-    )
+        axes.axvline(rate, **_STEP_OUT)

@@ -1,4 +1,4 @@
-"""Figures of a measurement: the series of a trial with what is left of them, and the trials side by side."""
+"""Figures of a measurement: the series of a trial with their residuals, and the trials side by side."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
 
 
 def trial_figure(trial: Trial) -> Figure:
-    """Series of a trial with their lines, and what is left of them."""
+    """Series of a trial with their lines, and their residuals."""
     figure = new_figure(7.2, 5.4)
     figure.set_layout_engine("constrained")
     panels = figure.subplots(3, 2, sharex=True, gridspec_kw={"width_ratios": (1.25, 1.0)})
@@ -69,8 +69,8 @@ def trial_figure(trial: Trial) -> Figure:
             left.text(0.02, 0.96, "not given: see the flags", transform=left.transAxes, va="top", color="#9c3d00")
     for axes in panels[-1]:
         axes.set_xlabel("time, s")
-    panels[0][0].set_title("seen, and fitted line", loc="left")
-    panels[0][1].set_title("what is left", loc="left")
+    panels[0][0].set_title("measured, with the fitted line", loc="left")
+    panels[0][1].set_title("residuals", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
     return figure
@@ -104,7 +104,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     small = Scale.of(rate.residual, "m" if unit == "m" else "rad")
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
-    right.set_ylabel(small.unit)
+    right.set_ylabel(f"residual, {small.unit}")
 
 
 def trials_figure(measurement: Measurement) -> Figure:

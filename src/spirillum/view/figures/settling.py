@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from spirillum.dynamics.settling import Settling
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, Scale, plain, styled
 
 __all__ = ["settling_figure"]
+
+_TILTS = {"pitch": "green", "yaw": "purple"}
+"""Angles of the tilt, and their colours."""
 
 
 def settling_figure(settling: Settling) -> Figure:
@@ -25,12 +31,13 @@ def settling_figure(settling: Settling) -> Figure:
         sheet = Sheet(
             f"{plain(settling.robot.name)}: settling in the tube",
             f"tail at {motion.tail_rotation_rate / Hz:.3g} Hz · submerged weight {1e3 * settling.weight:.3g} mN · "
-            f"roughness {1e6 * settling.roughness:.3g} um · friction {settling.friction_coefficient:.3g} · "
+            f"roughness {1e6 * settling.roughness:.3g} µm · friction {settling.friction_coefficient:.3g} · "
             "computed, nothing is measured",
-            width=9.0,
-            heights=[2.2],
+            width=PAGE,
+            heights=[1.9],
             columns=3,
             sharey=False,
+            legend=_legend(settling),
         )
         panels = sheet.panels[0]
         add_letters(panels)
@@ -46,7 +53,6 @@ def _gap(axes: Axes, settling: Settling) -> None:
     axes.semilogy(settling.way("time"), lengths(gap), color=COLOURS["blue"])
     if settling.lying.state == "steady":
         _steady(axes, float(lengths(np.array(settling.lying.gap))))
-        axes.legend(loc="upper right")
     _over_time(axes, settling)
     axes.set_ylabel(f"gap under the body ({lengths.unit})")
 
@@ -60,16 +66,12 @@ def _azimuth(axes: Axes, settling: Settling) -> None:
 
 
 def _tilt(axes: Axes, settling: Settling) -> None:
-    for name, colour, rest in (
-        ("pitch", "green", settling.lying.pitch),
-        ("yaw", "purple", settling.lying.yaw),
-    ):
+    for (name, colour), rest in zip(_TILTS.items(), (settling.lying.pitch, settling.lying.yaw), strict=True):
         axes.plot(settling.way("time"), np.rad2deg(settling.way(name)), color=COLOURS[colour], label=name)
         if settling.lying.state == "steady":
-            _steady(axes, np.rad2deg(rest), label="")
+            _steady(axes, np.rad2deg(rest))
     _over_time(axes, settling)
     axes.set_ylabel("tilt against the wall (deg)")
-    axes.legend(loc="upper right")
 
 
 def _over_time(axes: Axes, settling: Settling) -> None:
@@ -77,6 +79,15 @@ def _over_time(axes: Axes, settling: Settling) -> None:
     axes.set_xlabel("time (s)")
 
 
-def _steady(axes: Axes, value: float, label: str = "steady") -> None:
+_STEADY: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 2)), "linewidth": 0.9}
+
+
+def _steady(axes: Axes, value: float) -> None:
     """Where the robot comes to lie."""
-    axes.axhline(value, color="#555555", linestyle=(0, (4, 2)), linewidth=0.9, label=label or None)
+    axes.axhline(value, **_STEADY)
+
+
+def _legend(settling: Settling) -> list[Line2D]:
+    """Of the panel with two lines, and of the place where the robot comes to lie, if there is one."""
+    lines = [Line2D([], [], color=COLOURS[name], label=words) for words, name in _TILTS.items()]
+    return [*lines, *([Line2D([], [], **_STEADY, label="steady")] if settling.lying.state == "steady" else [])]

@@ -14,7 +14,10 @@ from matplotlib.text import Text
 
 from spirillum.view.figures.style import DPI, lay_out, new_figure
 
-__all__ = ["Sheet", "add_letters", "width_of"]
+__all__ = ["COLUMN", "PAGE", "Sheet", "add_letters", "width_of"]
+
+COLUMN, PAGE = 3.35, 6.7
+"""Width of a column and of a page of a journal, inches: 85 and 170 mm."""
 
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14

@@ -25,6 +25,7 @@ from spirillum.units import for_people, shown_in
 __all__ = [
     "COLOURS",
     "DPI",
+    "PATCH",
     "Look",
     "Scale",
     "label_of_model",
@@ -79,6 +80,8 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
 }
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings that say where a session shows its own figures, not how ours look."""
+PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}
+"""A line that stands for an area in a legend."""
 DPI = 200
 """Of PNG files."""
 _NO_DATE: dict[str, dict[str, Any]] = {
