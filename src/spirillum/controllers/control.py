@@ -167,7 +167,7 @@ def control(
     pace = _Pace() if live else None
     run = run_job(job, actual, drawn, learner, pace=pace, progress=progress)
     scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
-    warnings = (*actual.steady.warnings, *cautions, *cut_short, *_warnings_of(run))
+    warnings = (*actual.warnings, *cautions, *cut_short, *_warnings_of(run))
     return Control(
         robot=robot,
         model=actual.model,

@@ -71,6 +71,5 @@ def record(run: LoopRun, plant: Plant) -> xr.Dataset:
         "motion": "free",
         "channel_middle": reach_of(plant.robot).middle,
         "events": json.dumps([{"time": moments[-1].time, "what": run.ended}] if run.ended else []),
-        "warnings": "\n".join(plant.steady.warnings),
     }
     return xr.Dataset(data, coords=coords, attrs=attrs)

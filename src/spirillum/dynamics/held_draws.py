@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from spirillum.dynamics.held_model import PARAMETERS, HeldModel, responses
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.robot.batch import batches
+from spirillum.robot.fields import kind_of
+from spirillum.robot.robot import Robot, motor_current_problem
+from spirillum.units import parse_option
 
 __all__ = ["FACTORS", "checked_ranges", "drawn_numbers", "posterior_numbers"]
 
@@ -23,13 +27,19 @@ _NAMES = tuple(item.name for item in PARAMETERS)
 _FIRST_RESPONSE = _NAMES.index("forward_velocity_per_torque")
 _FIXED = ("polarity", *_NAMES[_FIRST_RESPONSE:])
 """Numbers that follow from others and cannot be drawn alone."""
+_LARGEST_FACTOR = 1e3
+"""Of friction and viscosity."""
 
 
-def checked_ranges(ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
+def checked_ranges(robot: Robot, ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, float]]:
     """Ranges by name, each low and high: `friction` and `viscosity` as factors, others of `PARAMETERS` in SI.
 
+    Args:
+        robot: the robot that is drawn around.
+        ranges: by name.
+
     Raises:
-        InputError: for an unknown name, or what is no range.
+        InputError: for an unknown name, what is no range, or values that a robot file would not take.
     """
     allowed = [*FACTORS, *(name for name in _NAMES if name not in _FIXED)]
     found = {}
@@ -41,10 +51,50 @@ def checked_ranges(ranges: Mapping[str, Any] | None) -> dict[str, tuple[float, f
             )
         pair = list(given) if isinstance(given, (tuple, list)) else []
         numbers = len(pair) == 2 and all(np.isfinite(as_number(item)) for item in pair)
-        if not numbers or pair[0] > pair[1] or (name in FACTORS and pair[0] <= 0):
-            raise InputError(f"ranges.{name} = {str(given)[:60]}; allowed: low and high, numbers, for factors above 0")
+        if not numbers or pair[0] > pair[1]:
+            raise InputError(f"ranges.{name} = {str(given)[:60]}; allowed: low and high, numbers, low first")
         found[name] = (float(pair[0]), float(pair[1]))
+        for value in found[name]:
+            _check_value(robot, name, value)
+    _check_corners(robot, found)
     return found
+
+
+def _check_value(robot: Robot, name: str, value: float) -> None:
+    """Refuse an end of a range that a robot file would not take.
+
+    Raises:
+        InputError: for such a value.
+    """
+    if name in FACTORS:
+        if not 1.0 / _LARGEST_FACTOR <= value <= _LARGEST_FACTOR:
+            raise InputError(
+                f"ranges.{name} = {value:g}; allowed: factors above 0, from {1.0 / _LARGEST_FACTOR:g} to "
+                f"{_LARGEST_FACTOR:g}"
+            )
+    elif (kind := kind_of(robot, name)) is not None:
+        parse_option(f"ranges.{name}", value, kind)
+
+
+def _check_corners(robot: Robot, ranges: Mapping[str, tuple[float, float]]) -> None:
+    """Refuse ranges between which there are motors without a steady current.
+
+    Raises:
+        InputError: for such ranges.
+    """
+    motor, battery = robot.motor, robot.battery
+    names = [name for name in ranges if name.startswith(("motor.resistance.", "battery."))]
+    if motor is None or battery is None or not names:
+        return
+    for corner in product(*(ranges[name] for name in names)):
+        ends = {name.rpartition("."): value for name, value in zip(names, corner, strict=True)}
+        resistance = {entry: value for (table, _, entry), value in ends.items() if table == "motor.resistance"}
+        of_battery = {entry: value for (table, _, entry), value in ends.items() if table == "battery"}
+        changed = motor.model_copy(update={"resistance": motor.resistance.model_copy(update=resistance)})
+        problem = motor_current_problem(changed, battery.model_copy(update=of_battery))
+        if problem:
+            said = ", ".join(f"{name} = {value:g}" for name, value in zip(names, corner, strict=True))
+            raise InputError(f"ranges with {said}: {problem}")
 
 
 def drawn_numbers(

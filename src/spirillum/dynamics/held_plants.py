@@ -71,7 +71,7 @@ class HeldPlants:
             robot, model=model, friction=friction, calibration=calibration, placement=placement
         )
         """The robot that they are drawn around."""
-        self._ranges: dict[str, tuple[float, float]] = checked_ranges(ranges)
+        self._ranges: dict[str, tuple[float, float]] = checked_ranges(self.held.robot, ranges)
         self._pool: Samples | None = None if posterior is None else posterior_numbers(self.held, posterior, _POOL)
         self._rng = np.random.default_rng(seed)
         self.time: Samples = np.zeros(count)

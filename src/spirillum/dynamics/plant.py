@@ -164,6 +164,8 @@ class Plant:
             band=False,
         )
         """The steady state of the robot held where it starts, by the same model."""
+        self.warnings: tuple[str, ...] = (*self.steady.warnings, *([chosen.caution] if chosen.caution else []))
+        """What to be careful about, a sentence each."""
         self._placed, self._asked, self._height, self._weight = placed, asked, height, weight
         self._table = table_for(RobotBatch.of(own, placed), workers=1, progress=progress) if walled else None
         self._reach = reach_of(own)

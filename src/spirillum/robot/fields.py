@@ -58,6 +58,7 @@ __all__ = [
     "Voltage",
     "Yaw",
     "field_values",
+    "kind_of",
     "quantity_schema",
 ]
 
@@ -144,6 +145,20 @@ def field_values(section: Section, path: str = "") -> Iterator[FieldValue]:
                 yield from field_values(item, f"{path}{name}.{key}.")
         else:
             yield FieldValue(f"{path}{name}", value, kinds[0].unit if kinds else None)
+
+
+def kind_of(section: Section, path: str) -> Kind | None:
+    """What kind of quantity a field is; None for anything else.
+
+    Args:
+        section: the section.
+        path: dotted name of a field in it, whose tables are all given.
+    """
+    *tables, name = path.split(".")
+    for table in tables:
+        section = getattr(section, table)
+    kinds = [item for item in _all_metadata(type(section).model_fields[name]) if isinstance(item, Kind)]
+    return kinds[0] if kinds else None
 
 
 def _all_metadata(info: FieldInfo) -> list[Any]:

@@ -8,12 +8,13 @@ import numpy as np
 from pydantic import model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.robot.actuation import Battery, Motor
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import assembly_limits, broken
 from spirillum.robot.links import links_of, robot_solids
 from spirillum.robot.tables import RobotTables
 
-__all__ = ["STANDARD_GRAVITY", "Derived", "Robot"]
+__all__ = ["STANDARD_GRAVITY", "Derived", "Robot", "motor_current_problem"]
 
 STANDARD_GRAVITY = 9.80665
 """Standard acceleration of gravity, m/s^2 (3rd CGPM, 1901)."""
@@ -25,6 +26,35 @@ class Derived(NamedTuple):
     value: float
     unit: str
     meaning: str
+
+
+def motor_current_problem(motor: Motor, battery: Battery) -> str:
+    """A sentence where (17) has no single steady current; empty where it has one.
+
+    It has one if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current.
+
+    Args:
+        motor: the motor.
+        battery: its battery.
+    """
+    r = motor.resistance
+    current = np.linspace(0.0, 1.1 * battery.voltage / max(battery.internal_resistance, 1e-3 * battery.voltage), 4001)
+    with np.errstate(over="ignore"):
+        resistance = (
+            r.constant
+            + r.decay * np.exp(-r.decay_rate * current)
+            + r.growth * np.exp(np.minimum(r.growth_rate * current, 600.0))
+            + r.slope * current
+        )
+        drop = resistance * current + battery.internal_resistance * current
+    stall = int(np.searchsorted(np.maximum.accumulate(drop), battery.voltage))
+    upto = slice(0, min(stall + 2, current.size))
+    if np.all(resistance[upto] > 0) and np.all(np.diff(drop[upto]) > 0):
+        return ""
+    return (
+        "motor.resistance: R(I) falls so steeply with current that (17) has no single steady current; "
+        "allowed: R(I) > 0 and R(I) I - V(I) rising up to the stall current"
+    )
 
 
 class Robot(RobotTables):
@@ -42,27 +72,12 @@ class Robot(RobotTables):
 
     @model_validator(mode="after")
     def _one_motor_current(self) -> Self:
-        """(17) has one steady root if R(I) I - V(I) rises with I and R(I) is positive, up to the stall current."""
+        """(17) has one steady current."""
         if self.motor is None or self.battery is None:
             return self
-        r, b = self.motor.resistance, self.battery
-        current = np.linspace(0.0, 1.1 * b.voltage / max(b.internal_resistance, 1e-3 * b.voltage), 4001)
-        with np.errstate(over="ignore"):
-            resistance = (
-                r.constant
-                + r.decay * np.exp(-r.decay_rate * current)
-                + r.growth * np.exp(np.minimum(r.growth_rate * current, 600.0))
-                + r.slope * current
-            )
-            drop = resistance * current + b.internal_resistance * current
-        stall = int(np.searchsorted(np.maximum.accumulate(drop), b.voltage))
-        upto = slice(0, min(stall + 2, current.size))
-        if np.any(resistance[upto] <= 0) or np.any(np.diff(drop[upto]) <= 0):
-            sentence = (
-                "motor.resistance: R(I) falls so steeply with current that (17) has no single steady current; "
-                "allowed: R(I) > 0 and R(I) I - V(I) rising up to the stall current"
-            )
-            raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
+        problem = motor_current_problem(self.motor, self.battery)
+        if problem:
+            raise PydanticCustomError("assembly", "{sentences}", {"sentences": problem})
         return self
 
     def derived(self) -> dict[str, Derived]:
