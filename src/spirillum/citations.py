@@ -58,10 +58,6 @@ REFERENCES: dict[str, str] = {
         "IEEE Transactions on Automatic Control 10:434-439, 1965."
     ),
     "astrom2006": "K. J. Astrom and T. Hagglund. Advanced PID Control. ISA, 2006.",
-    "skogestad2003": (
-        "S. Skogestad. Simple analytic rules for model reduction and PID controller tuning. "
-        "Journal of Process Control 13:291-309, 2003."
-    ),
     "tsypkin1984": "Y. Z. Tsypkin. Relay Control Systems. Cambridge University Press, 1984.",
     "honda1996": (
         "T. Honda, K. I. Arai and K. Ishiyama. Micro swimming mechanisms propelled by external magnetic fields. "

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spirillum.controllers.course import HoldSpeed, KeepCourse, SaveBattery, Steady
+from spirillum.controllers.course import LEASH, KeepCourse, SaveBattery, Steady
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun, run_loop
 from spirillum.controllers.sensors import FlowPulse
@@ -23,16 +23,29 @@ def places(run: LoopRun, times: Any) -> Any:
 @pytest.mark.parametrize(("lab", "within"), [(Lab.exact(), 0.005), (Lab.of(None), 0.05)])
 def test_speed_is_held_whatever_the_robots_own_is(toy: Any, share: float, lab: Lab, within: float) -> None:
     """It expects SPEED, the robot has a share of it: no rest with exact sensors, 5 % with those that err as usual."""
-    run = run_loop(toy(share * SPEED), HoldSpeed(lab, SPEED, 1.0, ASKED), lab, 60.0, seed=4)
+    run = run_loop(toy(share * SPEED), KeepCourse(lab, SPEED, 1.0, ASKED, leash=LEASH), lab, 60.0, seed=4)
     assert np.diff(places(run, [30.0, 60.0]))[0] / 30.0 == pytest.approx(ASKED, rel=within)
 
 
-def test_the_integral_does_not_wind_up_while_the_duty_is_held_at_its_end(toy: Any) -> None:
-    """Ten seconds against a flow that it cannot swim against; then it is back within seconds, without racing on."""
+def test_a_robot_that_slows_down_evenly_is_followed_without_a_rest(toy: Any) -> None:
+    """Its speed at full duty falls by half; an integral of the speed's error alone would stay behind by its ramp."""
+
+    class Slowing(toy):  # type: ignore[misc]
+        def step(self, dt: float, *, duty: float) -> Any:
+            self.speed = SPEED * (1.0 - 0.5 * self.state.time / 60.0)
+            return super().step(dt, duty=duty)
+
+    lab = Lab.exact()
+    run = run_loop(Slowing(), KeepCourse(lab, SPEED, 1.0, ASKED, leash=LEASH), lab, 60.0)
+    assert np.diff(places(run, [20.0, 60.0]))[0] / 40.0 == pytest.approx(ASKED, rel=0.003)
+
+
+def test_no_more_than_the_leash_is_made_up_for_after_a_flow_that_it_cannot_swim_against(toy: Any) -> None:
+    """Ten seconds of it; then it is back within seconds, faster than asked by the leash's share at most."""
     lab, flow = Lab.exact(), FlowPulse(10.0, 20.0, -2e-3)
-    run = run_loop(toy(SPEED), HoldSpeed(lab, SPEED, 1.0, ASKED), lab, 45.0, flow=flow)
-    after = np.diff(places(run, np.arange(21.0, 45.0)))
-    assert after.max() < SPEED * 1.001
+    run = run_loop(toy(SPEED), KeepCourse(lab, SPEED, 1.0, ASKED, leash=LEASH), lab, 45.0, flow=flow)
+    after = np.diff(places(run, np.arange(23.0, 45.0)))
+    assert after.max() < ASKED * (1.0 + LEASH) * 1.05
     assert after[12:] == pytest.approx(np.full(after.size - 12, ASKED), rel=0.15)
 
 
@@ -49,7 +62,7 @@ def test_backwards_alike(toy: Any) -> None:
     lab = Lab.exact()
     run = run_loop(toy(-SPEED), KeepCourse(lab, -SPEED, 1.0, ASKED), lab, 20.0)
     assert places(run, [20.0])[0] == pytest.approx(-ASKED * 20.0, abs=5e-5)
-    run = run_loop(toy(-SPEED), HoldSpeed(lab, -SPEED, 1.0, ASKED), lab, 30.0)
+    run = run_loop(toy(-SPEED), KeepCourse(lab, -SPEED, 1.0, ASKED, leash=LEASH), lab, 30.0)
     assert np.diff(places(run, [20.0, 30.0]))[0] == pytest.approx(-ASKED * 10.0, rel=0.02)
 
 

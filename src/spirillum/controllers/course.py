@@ -3,24 +3,19 @@
 The follower (`spirillum.controllers.follower`) gives place x, speed s at full duty and drift w of the fluid; v is the
 set speed, t the time, d = 1 or -1 the robot's way.
 
-`HoldSpeed`, proportional and integral with back-calculation against windup (Astrom and Hagglund 2006):
+`KeepCourse`, place by a cascade whose inner loop inverts the robot as it is estimated, drift included, for a course r:
 
-    e = d v - y,   u = sat(d v / s + K e + I),   dI/dt = K_i e + (sat(u) - u) / T_t,
+    u = sat((d v + (r - x) / T - w) / s),   dr/dt = d v,   T = 3 s.
 
-with the followed way y over the last W = 2 s, per time. A robot without inertia answers at once, after a dead time:
-K_i = 1 / (s (T_c + theta)) is Skogestad's (2003) for such a process, K = 0.2 / s, and the dead time theta counts half
-of W. The speed s that is followed takes the robot's slow changes away from the integral.
-
-`KeepCourse`, place by a cascade whose inner loop inverts the robot as it is estimated, drift included:
-
-    u = sat((d v + (d v t - x) / T - w) / s),   T = 3 s.
+On a leash it holds the speed, not the course: r is held within l of x (conditional integration, Astrom and Hagglund
+2006), so that a way that a pulse of flow took is not made up for beyond a share l / (T v) of the speed. The residual
+r - x is the integral of the speed's error: a robot that slows down evenly is followed without one.
 
 `SaveBattery`, a relay around the course, for a remote that knows on and off: on below d v t - h, off above d v t + h.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
@@ -31,18 +26,15 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller, News, Sight
 
-__all__ = ["HoldSpeed", "KeepCourse", "SaveBattery", "Steady"]
+__all__ = ["LEASH", "KeepCourse", "SaveBattery", "Steady"]
 
-_CLOSED = 1.5
-"""T_c, s."""
-_PROPORTIONAL = 0.2
-"""K s."""
-_WINDOW = 2.0
-"""W, s."""
-_BACK = 3.0
-"""T_t, s."""
 _CATCH_UP = 3.0
 """T, s."""
+LEASH = 0.3
+"""l / (T v) of a controller that holds a speed."""
+_WALK, _DRIFT = 0.05, 3e-5
+"""Of the follower. Where the duty changes little, s and w show in the same way: a w that may be large would take what
+belongs to s, and forget it."""
 _SLOWEST = 0.05
 """The estimated speed at full duty counts as at least this share of the predicted one."""
 _EXACT = {"camera": {"position_noise": 1e-6, "position_wander": 0.0}}
@@ -62,7 +54,7 @@ class _Watching(Controller):
         """
         self.knowing = self.blind = knowing
         seen = lab if not knowing else Lab.of(_EXACT).model_copy(update={"remote": lab.remote})
-        self._follower = Follower(seen, speed / duty)
+        self._follower = Follower(seen, speed / duty, walk=_WALK, drift=_DRIFT)
         self._full, self._delay = speed / duty, lab.remote.delay
         self._way = float(np.sign(speed))
         self._duty = duty
@@ -96,42 +88,8 @@ class _Watching(Controller):
         }
 
 
-class HoldSpeed(_Watching):
-    """A set speed by PWM."""
-
-    def __init__(self, lab: Lab, speed: float, duty: float, set_speed: float) -> None:
-        """Begin.
-
-        Args:
-            lab: sensors and remote.
-            speed: predicted while the drive is on, m/s, with its sign.
-            duty: of the drive while it is on.
-            set_speed: speed that is to be held, m/s, without sign.
-        """
-        super().__init__(lab, speed, duty)
-        self._set_speed = self._way * set_speed
-        self._closed = _CLOSED + lab.camera.latency + lab.remote.delay + 0.5 * (lab.remote.period + _WINDOW)
-        self._integral, self._decided_at = 0.0, 0.0
-        self._places: deque[tuple[float, float]] = deque()
-
-    def decide(self, news: News) -> float:
-        """Proportional and integral, held within 0 and 1."""
-        full = self._follow(news)[1]
-        self._places.append((news.time, float(self._now[0])))
-        while len(self._places) > 1 and self._places[1][0] <= news.time - _WINDOW:
-            self._places.popleft()
-        (start, first), (end, last) = self._places[0], self._places[-1]
-        error = self._set_speed - (last - first) / (end - start) if end - start > 0.5 * _WINDOW else 0.0
-        unlimited = (self._set_speed + _PROPORTIONAL * error) / full + self._integral
-        duty = float(np.clip(unlimited, 0.0, 1.0))
-        dt = news.time - self._decided_at
-        self._integral += dt * (error / (full * self._closed) + (duty - unlimited) / _BACK)
-        self._decided_at = news.time
-        return self._sent(news, duty)
-
-
 class KeepCourse(_Watching):
-    """A course at a set speed, by PWM, through pulses of flow."""
+    """A course at a set speed, by PWM; on a leash it holds the speed and lets go of a way that a pulse of flow took."""
 
     def __init__(
         self,
@@ -140,6 +98,7 @@ class KeepCourse(_Watching):
         duty: float,
         set_speed: float,
         *,
+        leash: float = np.inf,
         knowing: bool = False,
         flow: FlowPulse | None = None,
         carried: float = 0.0,
@@ -151,20 +110,24 @@ class KeepCourse(_Watching):
             speed: predicted while the drive is on, m/s, with its sign.
             duty: of the drive while it is on.
             set_speed: speed of the course, m/s, without sign.
+            leash: l / (T v): so near to the robot the course is held; infinite: it is not.
             knowing: whether it is told the truth.
             flow: for one that knows: the pulse.
             carried: way of the robot over the way of the mean flow.
         """
         super().__init__(lab, speed, duty, knowing=knowing)
         self._set_speed, self._flow, self._carried = self._way * set_speed, flow, carried
+        self._leash, self._course, self._until = leash * _CATCH_UP * set_speed, 0.0, 0.0
 
     def decide(self, news: News) -> float:
         """The duty that leads back to the course in T, by the robot as it is estimated."""
         ahead, acts = self._follow(news), news.time + self._delay
+        self._course += self._set_speed * (acts - self._until)
+        self._course, self._until = float(np.clip(self._course, ahead[0] - self._leash, ahead[0] + self._leash)), acts
         drift = ahead[2]
         if self._flow is not None and self._flow.start <= acts <= self._flow.end:
             drift = self._carried * self._flow.velocity
-        unlimited = (self._set_speed + (self._set_speed * acts - ahead[0]) / _CATCH_UP - drift) / ahead[1]
+        unlimited = (self._set_speed + (self._course - ahead[0]) / _CATCH_UP - drift) / ahead[1]
         return self._sent(news, float(np.clip(unlimited, 0.0, 1.0)))
 
 

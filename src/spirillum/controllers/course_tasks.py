@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import AfterValidator
 
 from spirillum.arrays import Samples
-from spirillum.controllers.course import HoldSpeed, KeepCourse, SaveBattery, Steady
+from spirillum.controllers.course import LEASH, KeepCourse, SaveBattery, Steady
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.sensors import FlowPulse
@@ -46,6 +45,9 @@ def _check_forward(speed: float) -> float:
 
 class _CourseTask(Task):
     """What the tasks of speed share."""
+
+    leash: ClassVar[float] = np.inf
+    """See `KeepCourse`: whether the way that a pulse of flow took is made up for."""
 
     speed: Annotated[Velocity, AfterValidator(_check_forward)] | None = None
     """Speed along the robot's way. It has to be given."""
@@ -86,17 +88,22 @@ class _CourseTask(Task):
 
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
         """A new controller; doing nothing leaves the drive on."""
-        if name == FEEDBACK:
-            return self._feedback(brief)
-        if name == "knowing":
-            return KeepCourse(
-                brief.lab, brief.speed, brief.duty, self.set_speed, knowing=True, flow=flow, carried=brief.carried
-            )
+        if name in (FEEDBACK, "knowing"):
+            return self._closed(brief, flow, knowing=name == "knowing")
         return Steady(brief.schedule[1] if name == "open-loop" else brief.duty)
 
-    @abstractmethod
-    def _feedback(self, brief: Brief) -> Controller:
-        """The task's own controller."""
+    def _closed(self, brief: Brief, flow: FlowPulse | None, *, knowing: bool) -> Controller:
+        """The task's own controller, or the one that knows the robot and the flow."""
+        return KeepCourse(
+            brief.lab,
+            brief.speed,
+            brief.duty,
+            self.set_speed,
+            leash=self.leash,
+            knowing=knowing,
+            flow=flow if knowing else None,
+            carried=brief.carried,
+        )
 
     def target(self, time: Samples, way: float) -> tuple[Samples, float]:
         """The course."""
@@ -109,9 +116,7 @@ class HoldSpeedTask(_CourseTask):
     kind: ClassVar[str] = "hold-speed"
     error_name: ClassVar[str] = "median speed of the second half less that asked for"
     error_unit: ClassVar[str] = "m/s"
-
-    def _feedback(self, brief: Brief) -> Controller:
-        return HoldSpeed(brief.lab, brief.speed, brief.duty, self.set_speed)
+    leash: ClassVar[float] = LEASH
 
     def _error(self, run: LoopRun, brief: Brief) -> float:
         time, place = _path(run)
@@ -137,9 +142,6 @@ class RideOutTask(_CourseTask):
         """The course, and the tolerance around it."""
         return super().target(time, way)[0], self.tolerance
 
-    def _feedback(self, brief: Brief) -> Controller:
-        return KeepCourse(brief.lab, brief.speed, brief.duty, self.set_speed)
-
     def _error(self, run: LoopRun, brief: Brief) -> float:
         time, place = _path(run)
         travelled = float(np.interp(brief.duration, time, place) - place[0])
@@ -159,16 +161,11 @@ class SaveBatteryTask(RideOutTask):
 
     def controller(self, name: str, brief: Brief, flow: FlowPulse | None) -> Controller:
         """A new controller; doing nothing leaves the drive on."""
-        if name == "knowing":
-            return self._relay(brief, knowing=True)
         if name == "open-loop":
             return Steady(brief.duty, share=brief.schedule[0])
         return super().controller(name, brief, flow)
 
-    def _feedback(self, brief: Brief) -> Controller:
-        return self._relay(brief, knowing=False)
-
-    def _relay(self, brief: Brief, *, knowing: bool) -> Controller:
+    def _closed(self, brief: Brief, flow: FlowPulse | None, *, knowing: bool) -> Controller:  # noqa: ARG002
         band = _RELAY * self.tolerance
         return SaveBattery(brief.lab, brief.speed, brief.duty, self.set_speed, band, knowing=knowing)
 

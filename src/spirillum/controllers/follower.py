@@ -37,22 +37,26 @@ _STRAYS = 5
 class Follower:
     """The filter of one run."""
 
-    def __init__(self, lab: Lab, speed: float, *, start: float = 0.0) -> None:
+    def __init__(
+        self, lab: Lab, speed: float, *, start: float = 0.0, walk: float = _SPEED_WALK, drift: float = _DRIFT
+    ) -> None:
         """Begin.
 
         Args:
             lab: sensors and remote.
             speed: predicted at full duty, m/s; its own uncertainty is as large.
             start: place at time 0, m.
+            walk: sigma_s over the predicted speed, 1/sqrt(s).
+            drift: sigma_w, m/s.
         """
         self._noise = max(lab.camera.position_noise, 1e-6) ** 2
         self._wander, self._memory = lab.camera.position_wander, lab.camera.memory
         self._delay = lab.remote.delay
-        self._walk = (_SPEED_WALK * abs(speed)) ** 2
+        self._walk = (walk * abs(speed)) ** 2
         self._sent: deque[tuple[float, float]] = deque([(0.0, 0.0)])
-        self._time, self._strays = 0.0, 0
+        self._time, self._strays, self._drift = 0.0, 0, drift
         self._mean: Samples = np.array([start, speed, 0.0, 0.0])
-        self._spread: Samples = np.diag([1e-3, abs(speed), _DRIFT, self._wander]) ** 2
+        self._spread: Samples = np.diag([1e-3, abs(speed), drift, self._wander]) ** 2
 
     def send(self, time: float, duty: float) -> None:
         """Note a command that is sent now."""
@@ -97,6 +101,6 @@ class Follower:
         moves[0, 1], moves[0, 2] = duty * dt, _DRIFT_MEMORY * (1.0 - left)
         spread = moves @ spread @ moves.T
         spread[1, 1] += self._walk * dt
-        spread[2, 2] += _DRIFT**2 * (1.0 - left**2)
+        spread[2, 2] += self._drift**2 * (1.0 - left**2)
         spread[3, 3] += self._wander**2 * (1.0 - kept**2)
         return moves @ mean, spread
