@@ -18,7 +18,7 @@ MOMENT, FIELD = 1.0, 2.0
 
 def rod(angle: float, along: float = 1.0, across: float = 3.0) -> TwoLinks:
     """A made-up body of revolution that feels nothing but its own rotation; SI."""
-    drive = np.zeros(20)
+    drive = np.zeros(rigid_links.DRIVE)
     drive[[rigid_links.KIND, rigid_links.FIXED, rigid_links.DUTY]] = rigid_links.MAGNETIC, 1.0, 1.0
     drive[rigid_links.MOMENT : rigid_links.FIELD] = MOMENT * np.cos(angle), 0.0, MOMENT * np.sin(angle)
     drive[rigid_links.FIELD] = FIELD

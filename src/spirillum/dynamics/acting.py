@@ -52,7 +52,7 @@ class Acting:
     weight: Samples
     """Submerged weight of body and rotor, N, and first moments about the origin at phase 0, N m (8,)."""
     drive: Samples
-    """Drive and motor (20,)."""
+    """Drive and motor (23,)."""
 
     def at_duty(self: _A, duty: float) -> _A:
         """The robot while the remote asks for a duty; a field or a prescribed rate is on at any duty but 0."""
@@ -85,7 +85,7 @@ def weight_of(robot: Robot) -> Samples:
 
 
 def drive_of(batch: RobotBatch) -> Samples:
-    """Drive and motor of a batch of one at full duty (20,)."""
+    """Drive and motor of a batch of one at full duty (23,)."""
     drive = np.zeros(rigid_links.DRIVE)
     drive[rigid_links.KIND], drive[rigid_links.FIXED] = _KINDS[str(batch.drive)], float(batch.joint == "fixed")
     drive[rigid_links.DUTY] = 1.0
@@ -111,7 +111,7 @@ def torque_scale(drag: Samples, weight: Samples, drive: Samples) -> float:
     Args:
         drag: resistance against the seven rates (7, 7).
         weight: submerged weight and moments (8,).
-        drive: drive and motor (20,).
+        drive: drive and motor (23,).
     """
     kind = drive[rigid_links.KIND]
     field = float(np.linalg.norm(drive[rigid_links.MOMENT : rigid_links.FIELD])) * drive[rigid_links.FIELD]
@@ -128,7 +128,7 @@ def state_sizes(drive: Samples, length: float, torque: float, states: int) -> Sa
     """Sizes of a state's components below which nothing matters, (states,).
 
     Args:
-        drive: drive and motor (20,).
+        drive: drive and motor (23,).
         length: of the robot's order, m.
         torque: of the order of those that act, N m.
         states: number of components; those behind the ones of `rigid_links` are works, J.

@@ -28,6 +28,7 @@ from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_run import series_in_tube
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
+from spirillum.dynamics.turning_field import Field, TurningField
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError, clipped
 from spirillum.fluid.registry import find_swimmer_model
@@ -82,6 +83,8 @@ class PlantState:
     """Duty that the next step asks for if none is given."""
     flow: float | None
     """Mean flow that is imposed, m/s; None: none is."""
+    field: TurningField | None
+    """Field that turns the robot; None for another drive."""
     spent: bool
     """Whether the battery is empty."""
     ended: str
@@ -186,6 +189,7 @@ class Plant:
             duty=on,
             command=on,
             flow=placed.flow,
+            field=TurningField.of(self._links),
             spent=False,
             ended="",
             azimuth=0.0,
@@ -231,6 +235,8 @@ class Plant:
             raise InputError("state is none of this plant; allowed: its own, or that of the same robot and model")
         if state.flow != self._now.flow:
             self._impose(state.flow)
+        if state.field is not None:
+            self._links = state.field.on(self._links)
         self._now = state
         return self.observe()
 
@@ -245,6 +251,7 @@ class Plant:
         remote: bool | None = None,
         duty: float | None = None,
         flow: str | float | None = None,
+        field: Field | Mapping[str, Any] | None = None,
     ) -> Moment:
         """Go on for a time; what is not given stays as it was, and at first the drive is on.
 
@@ -253,6 +260,8 @@ class Plant:
             remote: switch the drive on (at the robot's own duty) or off.
             duty: of the drive instead, 0 (off) to 1.
             flow: with `tube`, the mean flow that is imposed from now on, with its unit or a float in m/s.
+            field: for a magnetic robot, what changes of the field that turns it: `rotation_rate`, `yaw` and `pitch` of
+                its axis, `strength`, see `Field`.
 
         Returns:
             The moment at the end of the step; `ended` says why if it came early.
@@ -264,8 +273,13 @@ class Plant:
         if self._now.ended:
             raise InputError(f"the run has ended: {self._now.ended}; allowed: reset")
         command = self._commanded(remote=remote, duty=duty)
+        asked_field = None if field is None else Field.of(field)
+        if asked_field is not None and self._now.field is None:
+            raise InputError(f"field is given to {self.robot.name}; allowed: a robot with drive.kind 'magnetic'")
         if flow is not None:
             self.impose_flow(parse_option("flow", flow, KINDS["velocity"]))
+        if asked_field is not None:
+            self.impose_field(asked_field)
         asked = 0.0 if self._now.spent else command
         run, checkpoint = self._moved(float(dt), asked)
         spent = self._now.spent or any(event.what == BATTERY_EMPTY for event in run.events)
@@ -278,6 +292,7 @@ class Plant:
             asked,
             command,
             self._now.flow,
+            self._now.field,
             spent,
             ended,
             self._azimuth(run),
@@ -310,18 +325,33 @@ class Plant:
         if velocity == self._now.flow:
             return
         self._impose(velocity)
-        now = self._now
-        kept = now.checkpoint
-        if kept is not None:  # the last step was taken with the old flow
-            kept = Checkpoint(now.time, kept.step, now.state)
-        self._now = replace(now, flow=velocity, checkpoint=kept)
+        self._now = replace(self._now, flow=velocity, checkpoint=self._begun_anew())
+
+    def impose_field(self, asked: Field) -> None:
+        """From now on the field of a magnetic robot is another one; its angle does not jump.
+
+        Args:
+            asked: what changes of it.
+        """
+        old = self._now.field
+        assert old is not None  # noqa: S101 - the robot is magnetic
+        field = old.changed(asked, self._now.time)
+        if field != old:
+            self._links = field.on(self._links)
+            self._now = replace(self._now, field=field, checkpoint=self._begun_anew())
+
+    def _begun_anew(self) -> Checkpoint | None:
+        """Beginning of the next step of the integrator: here, for the last one was taken under other conditions."""
+        kept = self._now.checkpoint
+        return None if kept is None else Checkpoint(self._now.time, kept.step, self._now.state)
 
     def _impose(self, velocity: float | None) -> None:
         if self._table is None:
             if velocity is not None:
                 raise InputError("flow is known only to model 'tube'; allowed: another model, or no flow")
             return
-        self._links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
+        links, _ = self._in(self._table, self._placed.model_copy(update={"flow": velocity}))
+        self._links = links if self._now.field is None else self._now.field.on(links)
 
     def _in(self, table: TubeTable, placed: Placement) -> tuple[TubeRobot, StartPlace]:
         return links_in_tube(self.steady, table, placed, self._asked, self._height, weight=self._weight)

@@ -28,6 +28,7 @@ _MOMENT = slice(rigid_links.MOMENT, rigid_links.FIELD)
 
 
 _SOURCE = "two rigid links, (15) with all rows"
+_X = np.array([1.0, 0.0, 0.0])
 _MEANINGS = {"wobble_angle": "angle between the motor axis and the axis about which the field turns"}
 """Meanings of quantities that a run in time defines otherwise than steady motion does."""
 
@@ -178,11 +179,24 @@ def _powers(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samp
 
 def _field_torque(links: Acting, run: Trajectory, rotation: Samples) -> Samples:
     """Torque of the field about its own axis, N m; zero without one."""
-    moment, angle = rotation @ links.drive[_MOMENT], links.drive[rigid_links.FIELD_RATE] * run.time
+    moment, angle = _in_field(links, rotation @ links.drive[_MOMENT]), _field_angle(links, run)
     if links.drive[rigid_links.KIND] != rigid_links.MAGNETIC:
         return np.zeros_like(angle)
     field = links.drive[rigid_links.FIELD] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     return np.asarray((run.duty > 0) * (moment[:, 1] * field[:, 1] - moment[:, 2] * field[:, 0]))
+
+
+def _field_angle(links: Acting, run: Trajectory) -> Samples:
+    """Angle by which the field has turned since it pointed up, rad."""
+    return np.asarray(links.drive[rigid_links.FIELD_RATE] * run.time + links.drive[rigid_links.FIELD_PHASE])
+
+
+def _in_field(links: Acting, vectors: Samples) -> Samples:
+    """Vectors of the lab along the axis about which the field turns, and across it as y and z are to x, (n, 3)."""
+    side, up = links.drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE]
+    axis = np.array([np.sqrt(1.0 - side**2 - up**2), side, up])
+    across = [e - axis @ e * (axis + _X) / (1.0 + axis[0]) for e in np.eye(3)[1:]]
+    return np.asarray(vectors @ np.array([axis, *across]).T)
 
 
 def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
@@ -208,14 +222,14 @@ def _electrics(prediction: Prediction, run: Trajectory) -> dict[str, Samples]:
 
 def _magnetics(links: Acting, run: Trajectory, rotation: Samples) -> dict[str, Samples]:
     """Where the moment and the robot's axis point against the field."""
-    moment, rate = rotation @ links.drive[_MOMENT], links.drive[rigid_links.FIELD_RATE]
-    field = 0.5 * np.pi + rate * run.time
+    moment, rate = _in_field(links, rotation @ links.drive[_MOMENT]), links.drive[rigid_links.FIELD_RATE]
+    field = 0.5 * np.pi + _field_angle(links, run)
     behind = np.unwrap(field - np.arctan2(moment[:, 2], moment[:, 1])) * np.sign(rate)
     behind -= 2.0 * np.pi * np.round(behind[0] / (2.0 * np.pi))
     behind = np.where(run.duty > 0, behind, np.nan)
     return {
         "phase_lag": behind,
-        "wobble_angle": np.arccos(np.clip(np.abs(rotation[:, 0, 0]), 0.0, 1.0)),
+        "wobble_angle": np.arccos(np.clip(np.abs(_in_field(links, rotation[:, :, 0])[:, 0]), 0.0, 1.0)),
     }
 
 

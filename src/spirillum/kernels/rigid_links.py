@@ -16,6 +16,7 @@ __all__ = [
     "axes",
     "derivative",
     "drive_torque",
+    "field_at",
     "field_torque",
     "powers",
     "solved",
@@ -47,7 +48,8 @@ MOMENT, FIELD, FIELD_RATE = 3, 6, 7  # magnetic moment (3), A m^2; field, T; its
 POLARITY, TORQUE_CONSTANT, BACK_EMF, INDUCTANCE = 8, 9, 10, 11  # sign; K_m, N m/A; K_b, V s/rad; L, H
 CONSTANT, DECAY, DECAY_RATE, GROWTH, GROWTH_RATE, SLOPE = 12, 13, 14, 15, 16, 17  # of R(I), Table II
 VOLTAGE, INTERNAL_RESISTANCE = 18, 19  # of the battery, V and ohm
-DRIVE = 20
+AXIS_Y, AXIS_Z, FIELD_PHASE = 20, 21, 22  # of the field's axis, a unit vector, across the lab's x; at time 0, rad
+DRIVE = 23
 MOTOR, TORQUE, RATE, MAGNETIC = 0.0, 1.0, 2.0, 3.0  # kinds
 
 
@@ -87,13 +89,27 @@ def weight_loads(phase: float, rotation: Samples, weight: Samples, force: Sample
 
 
 @compiled
-def field_torque(time: float, rotation: Samples, drive: Samples, force: Samples) -> None:
-    """Add the torque m x B of a field B that turns about the lab's +x, up at time 0; m is fixed in the body."""
-    angle = drive[FIELD_RATE] * time
+def field_at(time: float, drive: Samples) -> tuple[float, float, float]:
+    """The field in the lab at a time, T: it turns about its axis n, at right angles to it.
+
+    About x it is b = B (0, -sin a, cos a), a = rate t + phase, up at a = 0. The least rotation that takes x to n takes
+    it to b - n.b (x + n)/(1 + n_x).
+    """
+    angle = drive[FIELD_RATE] * time + drive[FIELD_PHASE]
     along, up = -drive[FIELD] * math.sin(angle), drive[FIELD] * math.cos(angle)
-    b_x = rotation[1, 0] * along + rotation[2, 0] * up
-    b_y = rotation[1, 1] * along + rotation[2, 1] * up
-    b_z = rotation[1, 2] * along + rotation[2, 2] * up
+    n_y, n_z = drive[AXIS_Y], drive[AXIS_Z]
+    n_x = math.sqrt(1.0 - n_y * n_y - n_z * n_z)
+    share = (n_y * along + n_z * up) / (1.0 + n_x)
+    return -share * (1.0 + n_x), along - share * n_y, up - share * n_z
+
+
+@compiled
+def field_torque(time: float, rotation: Samples, drive: Samples, force: Samples) -> None:
+    """Add the torque m x B of a field B that turns about its axis; m is fixed in the body."""
+    ahead, along, up = field_at(time, drive)
+    b_x = rotation[0, 0] * ahead + rotation[1, 0] * along + rotation[2, 0] * up
+    b_y = rotation[0, 1] * ahead + rotation[1, 1] * along + rotation[2, 1] * up
+    b_z = rotation[0, 2] * ahead + rotation[1, 2] * along + rotation[2, 2] * up
     m_x, m_y, m_z = drive[MOMENT], drive[MOMENT + 1], drive[MOMENT + 2]
     force[3] += m_y * b_z - m_z * b_y
     force[4] += m_z * b_x - m_x * b_z

@@ -132,7 +132,7 @@ def packed(
     Args:
         friction: friction of joint and wall, 7x7, between Omega_x and omega_m only (`paper`: not symmetric).
         weight: submerged weight of body and rotor, and its first moments, (8,).
-        drive: drive and motor, (20,).
+        drive: drive and motor, (23,).
         tube: the tube, (8,) up to the numbers of sites and stations.
         wire: the wire, see `contacts`, (6,).
         sites: sites of body and coupling, see `contacts`, (n, 5).

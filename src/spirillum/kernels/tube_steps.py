@@ -1,8 +1,8 @@
 """Steps in time of a robot in its tube by the linearly implicit method of `rosenbrock`, compiled.
 
 Only place across the tube, attitude, tail phase and current act back on the rates: their columns of the Jacobian, by
-finite differences, are all it has. A step needs no iteration and no memory but its length, so that a run is continued
-exactly from the beginning of its last step.
+finite differences, are all it has; flow and field change with time besides. A step needs no iteration and no memory but
+its length, so that a run is continued exactly from the beginning of its last step.
 """
 
 from __future__ import annotations
