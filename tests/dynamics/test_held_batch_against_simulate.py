@@ -1,6 +1,5 @@
 """Batches of held robots: runs of `simulate`, convergence of order 4, and draws that are robots of their own."""
 
-import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import posteriors
 import spirillum as sp
 from spirillum.kernels import held_motor as kernel
 
@@ -140,29 +140,17 @@ def test_wrong_ranges_are_a_sentence(ranges: dict[str, Any], sentence: str) -> N
         sp.HeldPlants(WIDE, 2, model="rft", seed=-1)
 
 
-def posteriors() -> Any:
-    spec = importlib.util.spec_from_file_location(
-        "posteriors", Path(__file__).parent.parent / "files" / "posteriors.py"
-    )
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_robots_of_a_posterior_are_those_of_predict(tmp_path: Path) -> None:
     """A posterior without width gives one robot, which `predict` gives too; one with width spreads around it."""
-    maker = posteriors()
-    about = maker.attributes()
+    about = posteriors.attributes()
     (friction,) = json.loads(about["friction"])
     sure = {**about, "friction": json.dumps([{**friction, "low": friction["value"], "high": friction["value"]}])}
-    maker.write(tmp_path / "sure.nc", sure, np.full((4, 100), 2.0))
+    posteriors.write(tmp_path / "sure.nc", sure, np.full((4, 100), 2.0))
     robots = sp.HeldPlants(WIDE, 5, model="sbt", posterior=tmp_path / "sure.nc")
     robots.step(1.0)
     steady = sp.predict(WIDE, model="sbt", posterior=tmp_path / "sure.nc")
     np.testing.assert_allclose(robots.observe()["forward_velocity"], steady.forward_velocity, rtol=1e-6)
-    maker.write(tmp_path / "wide.nc")
+    posteriors.write(tmp_path / "wide.nc")
     ranges = {"battery.voltage": (3.7, 3.7)}
     many = sp.HeldPlants(WIDE, 300, model="sbt", posterior=tmp_path / "wide.nc", ranges=ranges, seed=1)
     many.step(1.0)
