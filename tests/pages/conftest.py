@@ -54,6 +54,17 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
+@pytest.fixture(scope="session")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """A short film of the virtual camera, with its setup and its truth."""
+    pytest.importorskip("av")
+    pytest.importorskip("cv2")
+    import spirillum as sp
+
+    film = tmp_path_factory.mktemp("trial") / "film.mp4"
+    return sp.render("biorob2012-wide", film, trial={"duration": "2 s"}, camera={"size": "320x240", "fps": 12.0})
+
+
 class Tab:
     """A tab that notes what goes wrong in it, and who it asks."""
 

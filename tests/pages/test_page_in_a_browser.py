@@ -89,6 +89,74 @@ def test_run_replays_alone_and_equals_its_file(tab: Any, browser: Any, tmp_path:
     context.close()
 
 
+def _pointed(tab: Any, what: str, points: list[tuple[float, float]]) -> str:
+    """Point at pixels of the film, and wait for what is said of it."""
+    canvas = tab.page.locator(".pointing")
+    box, (width, height) = canvas.bounding_box(), tab.value("spirillum.measure.state.films[0].size")
+    scale = min(box["width"] / width, box["height"] / height)
+    corner = [0.5 * (box["width"] - scale * width), 0.5 * (box["height"] - scale * height)]
+    tab.page.click(f"#point-{what}")
+    for u, v in points:
+        canvas.click(position={"x": corner[0] + (u + 0.5) * scale, "y": corner[1] + (v + 0.5) * scale})
+    if what == "stripes":
+        tab.page.click("#take-stripes")
+    tab.until(f"spirillum.measure.said['{what}']?.text")
+    return str(tab.value(f"spirillum.measure.said['{what}'].text"))
+
+
+def _columns_of_marks(picture: np.ndarray, strip: list[float]) -> np.ndarray:
+    """Columns of the ruler's dark lines, as an eye sees them: local minima of brightness."""
+    left, top, right, bottom = (round(x) for x in strip)
+    bright = picture[top:bottom, left:right].mean(axis=(0, 2))
+    dark = (bright[1:-1] < bright[:-2]) & (bright[1:-1] <= bright[2:])
+    return left + 1 + np.flatnonzero(dark)
+
+
+def test_dropped_film_is_measured_as_on_the_command_line(tab: Any, trial: Any, tmp_path: Path) -> None:
+    """The setup is made by clicks and typed heights alone; its file gives the same numbers without the page."""
+    tab.page.click("#tab-measure")
+    tab.until("spirillum.measure?.state")
+    tab.page.set_input_files("#film-files", trial.path)
+    tab.until("spirillum.measure.pointer.image && spirillum.measure.strips.length")
+    content = tab.page.context.request.get(tab.page.url + "bench/picture?film=trial-1&time=0").body()
+    picture = np.asarray(Image.open(BytesIO(content)).convert("RGB"), dtype=float)
+    strip = tab.value("spirillum.measure.strips[0]")
+    marks, row = _columns_of_marks(picture, strip), 0.5 * (strip[1] + strip[3])
+    tab.page.fill("#ruler-length", "40 mm")
+    assert "20 spacings of 2 mm" in _pointed(tab, "ruler", [(marks[3], row), (marks[23], row)])
+
+    colourful = (picture.max(axis=2) - picture.min(axis=2)) > 90.0
+    rows, columns = np.nonzero(colourful & (np.arange(picture.shape[1]) > 0.3 * picture.shape[1]))
+    rear, middle = (columns.min(), 0.5 * (rows.min() + rows.max())), round(float(np.median(columns)))
+    assert "right" in _pointed(tab, "body", [(rear[0] + 60.0, rear[1]), rear])
+    seen = np.quantile(rows, [0.15, 0.5, 0.85])
+    assert "as in the robot file" in _pointed(tab, "stripes", [(middle, v) for v in seen])
+
+    typed = {
+        "camera-height": "210 mm",
+        "tank-surface": "60 mm",
+        "markers-height": "0 mm",
+        "robot-axis_height": "1.15cm",
+    }
+    for name, value in typed.items():
+        tab.page.fill(f"#{name}", value)
+    tab.page.keyboard.press("Tab")
+    tab.until("spirillum.measure.whole && spirillum.measure.said.look.text.includes('a pixel')")
+    tab.page.click("#measure-go")
+    tab.until("spirillum.measure.state.results.measure", 180.0)
+
+    setup = tmp_path / "setup.toml"
+    setup.write_bytes(tab.page.context.request.get(tab.page.url + "bench/file?name=setup.toml").body())
+    found = sp.measure(trial.path, setup, annotated=False, figures=False).trials[0].quantities
+    for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate"):
+        shown = tab.page.locator(f"[data-measured={name}]").first
+        assert float(shown.get_attribute("data-si")) == found[name].value
+    assert found["forward_velocity"].value == pytest.approx(trial.rates["forward_velocity"], rel=5e-3)
+    tab.until("document.getElementById('annotated').readyState >= 2")  # the browser shows the annotated film
+    assert tab.value("document.getElementById('annotated').videoWidth") == 320
+    tab.page.click("#tab-swim")
+
+
 def test_two_robots_start_together(tab: Any) -> None:
     tab.page.click("#tab-compare")
     tab.until("spirillum.lanes.length == 2 && spirillum.frame.lanes.length == 2")

@@ -82,7 +82,7 @@ class LiveTracker:
         if learn_from is not None:
             film = opened(learn_from, self.setup)
             self._size = film.size
-            self._begin(film, samples_of(film, self.setup))
+            self._begin(film, samples_of(film, self.setup.start, self.setup.end))
 
     @property
     def learnt(self) -> bool:

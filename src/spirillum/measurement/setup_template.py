@@ -162,7 +162,7 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
 def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
     """What the tracker's first look at a film tells with a setup, and all that is odd about it."""
     video = opened(film, setup)
-    frames = samples_of(video, setup)
+    frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)
     start, known = learnt.known.start, learnt.known
     scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size)

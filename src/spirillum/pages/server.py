@@ -17,6 +17,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from spirillum.errors import InputError
+from spirillum.pages.bench import Bench
+from spirillum.pages.bench_routes import bench_routes
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
@@ -28,7 +30,17 @@ _MOST_CLIENTS = 32
 _MOST_REFUSALS = 20
 _EACH_SECOND, _AT_ONCE = 80.0, 160.0
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript", "svg": "image/svg+xml"}
-_OWN = ("index.html", "page.css", "main.js", "knobs.js", "numbers.js", "icon.svg", *MODULES)
+_OWN = (
+    "index.html",
+    "page.css",
+    "main.js",
+    "knobs.js",
+    "numbers.js",
+    "measure.js",
+    "pointing.js",
+    "icon.svg",
+    *MODULES,
+)
 """The page's files; nothing else is served."""
 
 
@@ -94,6 +106,7 @@ class _House:
 
     def __init__(self, source: Any, guard: Guard) -> None:
         self.theatre = Theatre(source, self._publish)
+        self.bench = Bench()
         self._guard = guard
         self._clients: set[_Client] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -103,8 +116,11 @@ class _House:
         """From the first request to the last."""
         self._loop = asyncio.get_running_loop()
         self.theatre.start()
-        yield
-        self.theatre.stop()
+        try:
+            yield
+        finally:
+            self.theatre.stop()
+            self.bench.close()
 
     def _publish(self) -> None:
         """There is something new; called from the thread of the simulation."""
@@ -173,6 +189,7 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
         Route("/", house.home),
         *[Route(f"/{name}", _file(name)) for name in _OWN if name != "index.html"],
         *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
+        *bench_routes(house.bench, house.theatre),
         Route("/first-run", _first(first_run)),
         Route("/replay", _replayed, methods=["POST"]),
         WebSocketRoute("/live", house.connect),

@@ -321,7 +321,7 @@ class Theatre:
         lane.preparing = said
         if not preparing.running:
             self._preparing = None
-            if said is not None and said.get("done"):
+            if said.get("done"):
                 lane.preparing = None
                 lane.start_anew()
                 self._want(self._lanes.index(lane))

@@ -1,6 +1,7 @@
 // The page: hears the newest state over one websocket, shows it, and sends what is turned and pressed.
 
 import { clock, element, inUnit, unitText } from "./format.js";
+import { Measure } from "./measure.js";
 import { Knobs } from "./knobs.js";
 import { Numbers } from "./numbers.js";
 import { Plot } from "./plots.js";
@@ -10,6 +11,7 @@ import { Stage } from "./stage.js";
 
 const PLOTS = ["forward_velocity", "tail_rotation_rate", "motor_current"];
 const PLOTS_OTHERWISE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate"];
+const TABS = ["swim", "compare", "replay", "measure"];
 const HEADLINE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"];
 const EACH = 110; // ms between two drawings of numbers and plots: faster is not read
 const BEHIND = 0.12; // s; beyond it the page says that it is slower than asked
@@ -37,7 +39,7 @@ function send(command) {
 }
 
 function look() {
-  send({ do: "look", value: !document.hidden });
+  send({ do: "look", value: !document.hidden && !$("live").hidden }); // the robots wait while nobody sees them
 }
 
 function hear(message) {
@@ -208,16 +210,20 @@ function setFrame(frame) {
 // Tabs, time, keys
 
 function select(tab) {
+  const changed = tab !== state.tab;
   state.tab = tab;
-  for (const name of ["swim", "compare", "replay"]) $(`tab-${name}`).setAttribute("aria-selected", String(name === tab));
-  $("live").hidden = tab === "replay";
+  for (const name of TABS) $(`tab-${name}`).setAttribute("aria-selected", String(name === tab));
+  $("live").hidden = tab === "replay" || tab === "measure";
   $("replay").hidden = tab !== "replay";
+  $("measure").hidden = tab !== "measure";
+  if (changed) look();
 }
 
 function open(tab) {
   if (tab === "compare" && state.lanes.length < 2) send({ do: "compare", value: true });
   if (tab === "swim" && state.lanes.length > 1) send({ do: "compare", value: false });
   if (tab === "replay" && !state.replay) askForRun();
+  if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen);
   if (tab !== "compare" || state.lanes.length > 1) select(tab);
 }
 
@@ -225,7 +231,7 @@ function setPace(factor) {
   send({ do: "pace", value: Math.min(64, Math.max(1 / 64, (state.scene?.pace ?? 1) * factor)) });
 }
 
-for (const tab of ["swim", "compare", "replay"]) $(`tab-${tab}`).addEventListener("click", () => open(tab));
+for (const tab of TABS) $(`tab-${tab}`).addEventListener("click", () => open(tab));
 $("play").addEventListener("click", () => send({ do: "play", value: !state.scene?.playing }));
 $("step").addEventListener("click", () => send({ do: "step" }));
 $("restart").addEventListener("click", () => send({ do: "restart" }));
@@ -246,7 +252,7 @@ document.addEventListener("keydown", (event) => {
   const keys = {
     " ": () => (event.target.matches("button") ? null : state.tab === "replay" ? state.replay?.toggle() : $("play").click()),
     ".": () => $("step").click(), r: () => $("restart").click(), "[": () => setPace(0.5), "]": () => setPace(2),
-    1: () => open("swim"), 2: () => open("compare"), 3: () => open("replay"),
+    1: () => open("swim"), 2: () => open("compare"), 3: () => open("replay"), 4: () => open("measure"),
   };
   if (!keys[event.key] || (event.key === " " && event.target.matches("button"))) return;
   event.preventDefault();
@@ -266,6 +272,7 @@ function setTheme(name) {
     lane.dirty = true;
   }
   state.replay?.setTheme(theme());
+  state.measure?.pointer.draw();
 }
 
 $("theme").addEventListener("click", () => setTheme(theme() === "dark" ? "light" : "dark"));
@@ -311,14 +318,23 @@ function begin(run) {
   select("replay");
 }
 
+// Runs are replayed; films, setups and robots are measured.
+function take(files) {
+  const run = files.find((file) => file.name.endsWith(".nc"));
+  if (!run) {
+    open("measure");
+    state.measure.add(files);
+    return;
+  }
+  if (!state.replay) askForRun();
+  select("replay");
+  replay(run);
+}
+
 for (const name of ["dragover", "drop"]) {
   document.addEventListener(name, (event) => {
     event.preventDefault();
-    if (name === "drop" && event.dataTransfer?.files[0]) {
-      if (!state.replay) askForRun();
-      select("replay");
-      replay(event.dataTransfer.files[0]);
-    }
+    if (name === "drop" && event.dataTransfer?.files.length) take([...event.dataTransfer.files]);
   });
 }
 
@@ -351,7 +367,7 @@ async function keep() {
 function tick(at) {
   requestAnimationFrame(tick);
   for (const lane of state.lanes) {
-    if (state.tab !== "replay") lane.tick(at);
+    if (!$("live").hidden) lane.tick(at);
   }
 }
 

@@ -36,7 +36,7 @@ def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = N
         InputError: if the video cannot be read, or no ruler is found in it.
     """
     video = opened(video, setup)
-    frames = samples_of(video, setup)
+    frames = samples_of(video, setup.start, setup.end)
     return sight_of(video, setup, still_picture([frame.image for frame in frames]), folder), video
 
 
@@ -45,25 +45,28 @@ def opened(video: str | Path | Video, setup: Setup) -> Video:
     return video if isinstance(video, Video) else open_video(video, setup.camera.frames_per_second)
 
 
-def samples_of(video: Video, setup: Setup) -> list[Frame]:
+def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
     """Frames at uneven intervals over the measured part, so that they do not alias with the rotation.
 
+    Args:
+        video: the film, or a folder of images.
+        start: beginning of that part, s.
+        end: its end, s; None: that of the video.
+
     Raises:
-        InputError: if `setup.start` is after the end of the video, or no frame can be decoded.
+        InputError: if the start is after the end of the video, or no frame can be decoded.
     """
-    end = setup.end
     if video.duration:
-        if setup.start >= video.duration:
+        if start >= video.duration:
             raise InputError(
-                f"start = {setup.start:g} s, but {video.name} ends at {video.duration:.4g} s; allowed: a start before "
-                "its end"
+                f"start = {start:g} s, but {video.name} ends at {video.duration:.4g} s; allowed: a start before its end"
             )
         end = video.duration if end is None else min(end, video.duration)
     elif end is None:
-        end = setup.start + _UNKNOWN
+        end = start + _UNKNOWN
     count = np.arange(_SAMPLES)
     shares = (count + (_GOLDEN * count) % 1.0) / _SAMPLES
-    return video.samples((setup.start + (end - setup.start) * shares).tolist())
+    return video.samples((start + (end - start) * shares).tolist())
 
 
 def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:

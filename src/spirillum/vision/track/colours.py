@@ -13,6 +13,7 @@ from spirillum.vision.track.constants import COLOURS
 
 __all__ = [
     "colour_classes",
+    "colours_named",
     "named_colours",
     "named_rightly",
     "order_seen",
@@ -29,6 +30,21 @@ _MANY = 6
 def named_colours(names: Sequence[str]) -> Samples:
     """RGB of colours by name, 0 to 255, (n, 3)."""
     return 255.0 * np.array([STRIPE_COLOURS[name] for name in names])  # type: ignore[index]
+
+
+def colours_named(samples: Samples, names: Sequence[str]) -> list[str]:
+    """Nearest of some named colours to each sample, under the lamp that suits all of them best.
+
+    Args:
+        samples: colours, 0 to 255, (n, 3).
+        names: names to choose from.
+    """
+    named, lamp = named_colours(names), np.ones(3)
+    for _ in range(6):
+        nearest = _nearest(samples, named * lamp)
+        brightness = samples.sum() / named[nearest].sum()
+        lamp = np.clip(np.full(3, brightness), 0.2, 5.0)
+    return [names[k] for k in nearest]
 
 
 def pattern_period(stripes: Sequence[str]) -> float:

@@ -48,7 +48,7 @@ def follow(
         InputError: if the video cannot be read, or neither ruler nor robot is found in it.
     """
     video = opened(video, setup)
-    frames = samples_of(video, setup)
+    frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)
     follower = Follower(learnt.known, learnt.still)
     aside = ThreadPoolExecutor(1)  # runs while the frames are followed

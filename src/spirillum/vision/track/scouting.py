@@ -89,7 +89,7 @@ def scouted(video: Video, robot: Robot, spacing: float | None = None) -> Scouted
         InputError: if no frame can be read.
     """
     anywhere = _setup(robot, video.size, 1e-4, "right")
-    frames = samples_of(video, anywhere)
+    frames = samples_of(video, anywhere.start, anywhere.end)
     still = still_picture([frame.image for frame in frames])
     lines = lines_in(still, bounds_of(anywhere, video))
     for guess in _guesses(robot, video.size, lines, spacing):

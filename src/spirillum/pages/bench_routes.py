@@ -1,0 +1,203 @@
+"""Addresses of the bench: films and texts come in, pictures, state and results go out; no name becomes a path."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Route
+
+from spirillum.errors import InputError
+from spirillum.files.limits import LARGEST_TEXT
+from spirillum.pages.bench import Bench
+from spirillum.pages.films import LARGEST_ALL, LARGEST_FILM
+from spirillum.pages.theatre import Theatre
+
+__all__ = ["bench_routes"]
+
+_MOST_POINTS = 40
+_SHOWN = {"mp4": "video/mp4", "png": "image/png"}
+"""Kinds of results that the page shows; the others are taken away."""
+_Handler = Callable[[Request], Awaitable[Response]]
+
+
+class _Doors:
+    """What the addresses do."""
+
+    def __init__(self, bench: Bench, theatre: Theatre) -> None:
+        self._bench, self._theatre = bench, theatre
+        self.acts: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+            "state": lambda _message: None,
+            "text": lambda message: bench.desk.add_text(_text(message, "text")),
+            "robot": self._robot_of_swim,
+            "remove": lambda message: bench.films.remove(_text(message, "film")),
+            "fields": self._fields,
+            "click": self._clicked,
+            "look": lambda message: bench.desk.look(_text(message, "film")),
+            "propose": lambda message: bench.desk.propose(_text(message, "film")),
+            "measure": lambda _message: bench.measure(),
+            "calibrate": lambda message: bench.calibrate(_text(message, "model"), _text(message, "method")),
+            "stop": lambda _message: bench.stop(),
+        }
+
+    def answering(self, act: Callable[[Mapping[str, Any]], Any]) -> _Handler:
+        """A handler of a message in JSON, which answers with what came of it and with the whole state."""
+
+        async def handle(request: Request) -> Response:
+            message = _message(await _body(request, LARGEST_TEXT))
+            return await self._told(await asyncio.to_thread(act, message))
+
+        return _guarded(handle)
+
+    async def _told(self, said: Any) -> Response:
+        return JSONResponse({"said": said, **await asyncio.to_thread(self._bench.state)})
+
+    def _robot_of_swim(self, message: Mapping[str, Any]) -> None:
+        found = self._theatre.recording(message["lane"]) if message.get("lane") in (0, 1) else None
+        if found is None:
+            raise InputError(f"lane = {str(message.get('lane'))[:20]}; allowed: a robot that is there")
+        self._bench.desk.take_robot(found[0].predicted())
+
+    def _fields(self, message: Mapping[str, Any]) -> None:
+        given = message.get("fields")
+        self._bench.desk.set_fields(given if isinstance(given, dict) else {})
+
+    def _clicked(self, message: Mapping[str, Any]) -> str:
+        points = message.get("points")
+        pairs = points if isinstance(points, list) and len(points) <= _MOST_POINTS else []
+        return self._bench.desk.click(
+            _text(message, "what"),
+            _text(message, "film"),
+            _number(message.get("time")),
+            [(_number(pair[0]), _number(pair[1])) for pair in pairs if isinstance(pair, list) and len(pair) == 2],
+            _text(message, "length"),
+        )
+
+    async def film(self, request: Request) -> Response:
+        """A film is sent."""
+        return await self._told(await _received(request, self._bench))
+
+    async def picture(self, request: Request) -> Response:
+        """A frame of a film."""
+        name, time = request.query_params.get("film", ""), _number(request.query_params.get("time"))
+        content = await asyncio.to_thread(self._bench.films.picture, name, time)
+        return Response(content, media_type="image/jpeg")
+
+    async def file(self, request: Request) -> Response:
+        """A file of the bench, by its name among those that there are."""
+        name = request.query_params.get("name", "")
+        texts = {"setup.toml": self._bench.desk.setup_text, "robot.toml": self._bench.desk.robot_text}
+        if name in texts:
+            text = await asyncio.to_thread(texts[name])
+            return Response(text, media_type="text/plain", headers=_attached(name))
+        path = self._bench.kept(name)
+        if path is None:
+            raise InputError(f"file {name[:60]!r}; allowed: one of the results")
+        kind = _SHOWN.get(path.suffix[1:])
+        if kind is not None and "take" not in request.query_params:
+            return FileResponse(path, media_type=kind)
+        return FileResponse(path, media_type="application/octet-stream", headers=_attached(path.name))
+
+
+def bench_routes(bench: Bench, theatre: Theatre) -> list[Route]:
+    """The routes of the bench.
+
+    Args:
+        bench: what they lead to.
+        theatre: whose robot may be measured.
+    """
+    doors = _Doors(bench, theatre)
+    return [
+        *[Route(f"/bench/{name}", doors.answering(act), methods=["POST"]) for name, act in doors.acts.items()],
+        Route("/bench/film", _guarded(doors.film), methods=["POST"]),
+        Route("/bench/picture", _guarded(doors.picture)),
+        Route("/bench/file", _guarded(doors.file)),
+    ]
+
+
+async def _received(request: Request, bench: Bench) -> str:
+    """A film is written to the place that the bench gives it, piece by piece; its name.
+
+    Raises:
+        InputError: if there is no room for it, or it is none.
+    """
+    path: Path = await asyncio.to_thread(bench.films.room_for, request.query_params.get("kind", ""))
+    left = await asyncio.to_thread(bench.films.room_left)
+    try:
+        with path.open("xb") as stream:
+            async for piece in _limited(request, left):
+                await asyncio.to_thread(stream.write, piece)
+        return await asyncio.to_thread(bench.films.add, path)
+    except (InputError, ClientDisconnect, OSError):
+        path.unlink(missing_ok=True)
+        raise
+
+
+async def _limited(request: Request, most: int) -> AsyncIterator[bytes]:
+    """What is sent, in pieces.
+
+    Raises:
+        InputError: once it is more than so many bytes.
+    """
+    async for piece in request.stream():
+        most -= len(piece)
+        if most < 0:
+            limits = f"{LARGEST_FILM >> 30} GB a film, {LARGEST_ALL >> 30} GB in all, and room on the disk"
+            raise InputError(f"the film is too large; allowed: {limits}")
+        yield piece
+
+
+def _guarded(handle: _Handler) -> _Handler:
+    """Wrong input gets its sentence."""
+
+    async def guarded(request: Request) -> Response:
+        try:
+            return await handle(request)
+        except InputError as error:
+            return PlainTextResponse(str(error), status_code=400)
+        except OSError as error:
+            return PlainTextResponse(f"a file could not be written: {error.strerror}", status_code=507)
+
+    return guarded
+
+
+async def _body(request: Request, largest: int) -> bytes:
+    content = bytearray()
+    async for piece in request.stream():
+        content += piece
+        if len(content) > largest:
+            raise InputError(f"the message is too large; allowed: {largest >> 10} kB")
+    return bytes(content)
+
+
+def _message(content: bytes) -> Mapping[str, Any]:
+    try:
+        found = json.loads(content or b"{}")
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict):
+        raise InputError("the message is no JSON object; allowed: one")
+    return found
+
+
+def _text(message: Mapping[str, Any], name: str) -> str:
+    value = message.get(name, "")
+    if not isinstance(value, str):
+        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
+    return value
+
+
+def _number(value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{str(value)[:40]!r} is no number; allowed: one") from error
+
+
+def _attached(name: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{name}"'}

@@ -1,0 +1,156 @@
+"""Films that were sent to the page, in its temporary folder under names that are given here."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from spirillum.errors import InputError
+from spirillum.extras import required
+from spirillum.pages.plain_names import plain_names
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from spirillum.vision.video.frames import Video
+
+__all__ = ["LARGEST_ALL", "LARGEST_FILM", "Films"]
+
+LARGEST_FILM = 4 << 30
+"""Bytes of one film."""
+LARGEST_ALL = 16 << 30
+"""Bytes of all films."""
+_MOST_FILMS = 50
+_SPARE = 512 << 20
+"""Bytes that stay free on the disk."""
+_QUALITY = 92
+
+
+@dataclass(frozen=True)
+class _Film:
+    path: Path
+    video: Video
+
+
+class Films:
+    """Films by the names of their trials; its methods may be called from any thread."""
+
+    def __init__(self, folder: Path) -> None:
+        """No film yet.
+
+        Args:
+            folder: where they are kept.
+        """
+        self._folder = folder
+        self._lock = threading.RLock()
+        self._films: dict[str, _Film] = {}
+        self._count = 0
+
+    def room_for(self, kind: str) -> Path:
+        """A place for a film that is sent.
+
+        Args:
+            kind: ending of its name, without the dot.
+
+        Raises:
+            InputError: for another kind of file, too many films, or a full disk.
+        """
+        from spirillum.vision.video.frames import FILMS
+
+        required("av", "measuring a video", "video")
+        required("cv2", "measuring a video", "video")
+        if f".{kind}" not in FILMS:
+            raise InputError(f"a file of kind {kind[:20]!r}; allowed: {', '.join(FILMS)}")
+        with self._lock:
+            if len(self._films) >= _MOST_FILMS:
+                raise InputError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+            self._count += 1
+            return self._folder / f"trial-{self._count}.{kind}"
+
+    def room_left(self) -> int:
+        """Bytes that a film may have now."""
+        free = shutil.disk_usage(self._folder).free - _SPARE
+        used = sum(path.stat().st_size for path in self._folder.glob("trial-*"))
+        return max(0, min(LARGEST_FILM, LARGEST_ALL - used, free))
+
+    def add(self, path: Path) -> str:
+        """Take a film that was sent; its name.
+
+        Raises:
+            InputError: if it is none, which removes it.
+        """
+        from spirillum.vision.video.frames import open_video
+
+        try:
+            with plain_names(self._folder):
+                video = open_video(path)
+        except InputError:
+            path.unlink(missing_ok=True)
+            raise
+        with self._lock:
+            self._films[path.stem] = _Film(path, video)
+        return path.stem
+
+    def remove(self, name: str) -> None:
+        """Take a film away."""
+        with self._lock:
+            film = self._films.pop(name, None)
+        if film is not None:
+            film.path.unlink(missing_ok=True)
+
+    def video(self, name: str) -> Video:
+        """A film, opened.
+
+        Raises:
+            InputError: if there is none of that name.
+        """
+        with self._lock:
+            film = self._films.get(name)
+        if film is None:
+            raise InputError(f"film {name[:40]!r}; allowed: one of those that are here")
+        return film.video
+
+    def paths(self) -> list[Path]:
+        """The films' files, in the order in which they came."""
+        with self._lock:
+            return [film.path for film in self._films.values()]
+
+    def told(self) -> list[dict[str, Any]]:
+        """The films as the page lists them."""
+        with self._lock:
+            return [
+                {
+                    "name": name,
+                    "size": list(film.video.size),
+                    "duration": film.video.duration,
+                    "rate": film.video.rate,
+                    "synthetic": "synthetic" in film.video.words.lower(),
+                }
+                for name, film in self._films.items()
+            ]
+
+    def picture(self, name: str, time: float) -> bytes:
+        """A frame of a film as JPEG.
+
+        Raises:
+            InputError: if there is no such film, or no frame at that time.
+        """
+        cv2 = required("cv2", "measuring a video", "video")
+        frame = self.frame(name, time)
+        return bytes(cv2.imencode(".jpg", frame[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1])
+
+    def frame(self, name: str, time: float) -> np.ndarray:
+        """A frame of a film, 8-bit RGB, (h, w, 3).
+
+        Raises:
+            InputError: if there is no such film, or no frame at that time.
+        """
+        if not (math.isfinite(time) and time >= 0.0):
+            raise InputError(f"time = {time:g} s; allowed: 0 s or later")
+        video = self.video(name)
+        with plain_names(self._folder):
+            return video.samples([0.0, min(time, max(0.0, (video.duration or time) - 0.1))])[-1].image

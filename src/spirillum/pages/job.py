@@ -1,0 +1,85 @@
+"""Work of minutes beside the page: a module run in a process of its own, which tells its progress in lines of JSON."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from spirillum.errors import InputError
+
+__all__ = ["Job", "worker"]
+
+Tell = Callable[..., None]
+"""Called with what is told, by name."""
+
+
+class Job:
+    """A module at work: what it told last, and whether it goes on."""
+
+    def __init__(self, module: str, request: Mapping[str, Any], tell: Callable[[], None] = lambda: None) -> None:
+        """Begin.
+
+        Args:
+            module: name of the module that is run; its `__main__` part calls `worker`.
+            request: what it is asked for, as JSON on its standard input.
+            tell: called from a thread when there is progress.
+        """
+        self._tell = tell
+        self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
+        self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments
+            [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        self._thread = threading.Thread(target=self._follow, args=(json.dumps(request),), name="page: job", daemon=True)
+        self._thread.start()
+
+    @property
+    def running(self) -> bool:
+        """Whether it still goes on."""
+        return self._thread.is_alive()
+
+    def progress(self) -> dict[str, Any]:
+        """What is being done, `done_places` of `places`; `done`, or `failed` with a sentence, at the end."""
+        return dict(self._said)
+
+    def stop(self) -> None:
+        """Leave off."""
+        self._process.terminate()
+
+    def _follow(self, request: str) -> None:
+        assert self._process.stdin is not None and self._process.stdout is not None  # noqa: S101, PT018
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(request)
+            self._process.stdin.close()
+        for line in self._process.stdout:
+            self._said = json.loads(line)
+            self._tell()
+        if self._process.wait() != 0 and "failed" not in self._said:
+            self._said = {"failed": "it was left off"}
+        self._tell()
+
+
+def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Mapping[str, Any]]) -> None:
+    """Do what standard input asks for, and tell how it goes; the process ends with 2 where the input was wrong.
+
+    Args:
+        work: called with the request and with what is to be told of progress; what it returns is told at the end.
+    """
+
+    def tell(**said: Any) -> None:
+        sys.stdout.write(json.dumps(said) + "\n")
+        sys.stdout.flush()
+
+    def progress(what: str, done: int, total: int) -> None:
+        tell(what=what, done_places=done, places=total)
+
+    try:
+        found = work(json.loads(sys.stdin.read()), progress)
+    except InputError as error:
+        tell(failed=str(error))
+        sys.exit(2)
+    tell(done=True, **found)

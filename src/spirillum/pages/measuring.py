@@ -1,0 +1,103 @@
+"""Films measured, or their observations calibrated, in a process of its own; run by `spirillum.pages.job`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from spirillum.pages.job import worker
+
+__all__ = ["calibration_shown", "measurement_shown"]
+
+_Tell = Callable[[str, int, int], None]
+
+
+def measurement_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """A measurement as the page shows it: rows of quantities with their interval, as texts and in SI.
+
+    Args:
+        answer: JSON of `spirillum.measure`.
+    """
+    from spirillum.measurement.trials import MEASURED, RATE_NAMES
+
+    def rows(items: Mapping[str, Any]) -> list[dict[str, Any]]:
+        wanted = [name for name in MEASURED if items[name]["value"] is not None or name in RATE_NAMES]
+        return [_row(name.replace("_", " "), name, items[name]) for name in wanted]
+
+    trials = [
+        {
+            "name": trial["name"],
+            "rows": rows(trial),
+            "flags": [flag["sentence"] for flag in trial["flags"]],
+            "markers": trial["scale"]["markers"],
+            "film": f"{trial['name']}.annotated.mp4",
+        }
+        for trial in answer["trials"]
+    ]
+    failures = [f"{Path(one['video']).name}: {one['sentence']}" for one in answer["failures"]]
+    return {
+        "robot": answer["robot"],
+        "summary": rows(answer["summary"]),
+        "trials": trials,
+        "warnings": [*failures, *answer.get("warnings", [])],
+        "files": [name for name in answer["files"] if "/" not in name],
+    }
+
+
+def calibration_shown(answer: Mapping[str, Any]) -> dict[str, Any]:
+    """A calibration as the page shows it.
+
+    Args:
+        answer: JSON of `spirillum.calibrate`.
+    """
+    return {
+        "model": answer["model"],
+        "method": answer["method"],
+        "rows": [_row(name, name, item) for name, item in answer["parameters"].items()],
+        "warnings": list(answer.get("warnings", [])),
+        "statement": answer.get("effective_friction_statement", ""),
+        "files": [name for name in answer["files"] if "/" not in name],
+        "figures": sorted(name for name in answer["files"] if name.endswith(".png")),
+    }
+
+
+def _row(label: str, name: str, item: Mapping[str, Any]) -> dict[str, Any]:
+    from spirillum.measurement.shown import shown
+
+    seen = shown(item["value"], item.get("low"), item.get("high"), item["unit"])
+    return {
+        "name": name,
+        "label": label,
+        "value": seen.value,
+        "low": seen.low,
+        "high": seen.high,
+        "unit": "" if seen.unit == "1" else seen.unit,
+        "si": item["value"],
+        "reason": item.get("reason", ""),
+    }
+
+
+def _work(request: dict[str, Any], progress: _Tell) -> dict[str, Any]:
+    output = Path(request["output"])
+    if request["what"] == "calibrate":
+        from spirillum.results.calibration import calibrate
+
+        found = calibrate(
+            request["observations"],
+            request["robot"],
+            output,
+            model=request["model"],
+            method=request["method"],
+            progress=progress,
+        )
+        return {"shown": calibration_shown(found.to_dict())}
+    from spirillum.results.measurement import measure
+
+    return {
+        "shown": measurement_shown(measure(request["films"], request["setup"], output, progress=progress).to_dict())
+    }
+
+
+if __name__ == "__main__":
+    worker(_work)

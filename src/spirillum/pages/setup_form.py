@@ -1,0 +1,150 @@
+"""The form of a setup: its fields in their order, and what each of them means."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from spirillum.errors import InputError
+
+__all__ = ["FORM", "form_fields", "form_list"]
+
+_LONGEST = 200
+"""Characters of a field."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One field of the setup file."""
+
+    field: str
+    label: str
+    group: str
+    example: str
+    """What stands in it while it is empty: what it means then, or an example."""
+    note: str
+    choices: tuple[str, ...] = ()
+    number: bool = False
+    """Whether it is a bare number, without a unit."""
+    uncertain: bool = False
+    """Whether it has a standard uncertainty beside it, in a field of its own."""
+
+
+FORM: tuple[Entry, ...] = (
+    Entry("robot.direction", "Nose points", "Picture", "", "Where in the picture the nose points.", ("right", "left")),
+    Entry(
+        "robot.stripes",
+        "Stripes",
+        "Picture",
+        "as in the robot file",
+        "Colours in their order, if not those of the robot file; with commas.",
+    ),
+    Entry(
+        "markers.spacing",
+        "Ruler spacing",
+        "Picture",
+        "such as 2 mm",
+        "From each line of the ruler to the next.",
+        uncertain=True,
+    ),
+    Entry(
+        "markers.length_per_pixel",
+        "Or per pixel",
+        "Picture",
+        "instead of a ruler",
+        "Length that one pixel shows at the height of the robot's axis.",
+        uncertain=True,
+    ),
+    Entry(
+        "camera.view",
+        "View",
+        "Heights",
+        "",
+        "top: from above; side: level, at right angles to the channel.",
+        ("top", "side"),
+    ),
+    Entry(
+        "camera.height",
+        "Lens",
+        "Heights",
+        "such as 210 mm",
+        "Of the lens above the reference plane: the tank's floor, or its far wall in a side view.",
+        uncertain=True,
+    ),
+    Entry("tank.surface", "Oil surface", "Heights", "none", "Of the flat surface between air and oil.", uncertain=True),
+    Entry("tank.index", "Index of oil", "Heights", "1.4", "Refractive index of the oil.", number=True, uncertain=True),
+    Entry(
+        "markers.height", "Ruler", "Heights", "such as 0 mm", "Of the ruler above the reference plane.", uncertain=True
+    ),
+    Entry(
+        "robot.axis_height",
+        "Robot's axis",
+        "Heights",
+        "such as 13 mm",
+        "Of the robot's axis above the reference plane.",
+        uncertain=True,
+    ),
+    Entry(
+        "start",
+        "From",
+        "Time",
+        "the beginning",
+        "Time in the film from which on to measure, as when the robot has started up.",
+    ),
+    Entry("end", "Until", "Time", "the end", "Time until which to measure."),
+    Entry(
+        "camera.frames_per_second",
+        "Frame rate",
+        "Time",
+        "the film's own",
+        "Frames a second, instead of the film's own time stamps, as in slow motion.",
+        number=True,
+    ),
+)
+"""The fields of the form; the robot's file stands apart."""
+
+_NUMBERS = {entry.field for entry in FORM if entry.number} | {"tank.index_uncertainty"}
+_KNOWN = {entry.field for entry in FORM} | {f"{entry.field}_uncertainty" for entry in FORM if entry.uncertain}
+
+
+def form_list() -> list[dict[str, Any]]:
+    """The form as the page builds it."""
+    return [asdict(entry) for entry in FORM]
+
+
+def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, Any]:
+    """Fields of a setup from what stands in the form, or in a file; empty ones are left out.
+
+    Args:
+        given: texts, numbers and lists by dotted field.
+        robots: names that `robot.file` may have.
+
+    Raises:
+        InputError: for a field that the form has not, as one that names a file, or a value that is too long.
+    """
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        if name != "robot.file" and name not in _KNOWN:
+            raise InputError(f"{str(name)[:60]} is no field of this form; allowed: {', '.join(sorted(_KNOWN))}")
+        if isinstance(value, list) and name == "robot.stripes":
+            value = ", ".join(map(str, value))  # noqa: PLW2901
+        if isinstance(value, bool) or not isinstance(value, (str, int, float)) or len(str(value)) > _LONGEST:
+            raise InputError(f"{name} = {str(value)[:60]!r}; allowed: a text of at most {_LONGEST} characters")
+        text = str(value).strip()
+        if name == "robot.file" and text not in robots:
+            raise InputError(f"robot.file = {text[:60]!r}; allowed: {', '.join(robots)}")
+        if text:
+            found[name] = _typed(name, text)
+    return found
+
+
+def _typed(name: str, text: str) -> Any:
+    if name == "robot.stripes":
+        return [part.strip() for part in text.split(",") if part.strip()]
+    if name in _NUMBERS:
+        try:
+            return float(text.replace(",", "."))
+        except ValueError:
+            return text
+    return text

@@ -1,0 +1,107 @@
+"""What is sent to the bench: refused where it is no film, kept under the page's own names, and removed with it."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from spirillum.errors import InputError
+from spirillum.pages import films as films_module
+from spirillum.pages.bench import Bench
+from spirillum.pages.setup_form import form_fields
+from spirillum.robot.load import load
+
+WHOLE = {
+    "robot.file": "biorob2012-wide",
+    "camera.height": "210 mm",
+    "markers.spacing": "2 mm",
+    "markers.height": "0 mm",
+    "robot.axis_height": "11.5 mm",
+}
+
+
+@pytest.fixture
+def bench() -> Any:
+    pytest.importorskip("av")
+    pytest.importorskip("cv2")
+    made = Bench()
+    yield made
+    made.close()
+    assert not made._folder.exists()
+
+
+def test_a_file_that_is_no_film_is_refused_and_removed(bench: Bench) -> None:
+    for kind in ("exe", "mp4/../../x", "m3u8", ""):
+        with pytest.raises(InputError, match=r"allowed: \.mp4"):
+            bench.films.room_for(kind)
+    path = bench.films.room_for("mp4")
+    path.write_bytes(b"no film at all")
+    with pytest.raises(InputError) as refused:
+        bench.films.add(path)
+    assert str(bench._folder) not in str(refused.value)
+    assert not path.exists()
+    assert bench.films.told() == []
+
+
+def test_room_ends_with_what_is_kept(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(films_module, "LARGEST_ALL", 1000)
+    bench.films.room_for("mp4").write_bytes(bytes(400))
+    assert bench.films.room_left() == 600
+    monkeypatch.setattr(films_module, "LARGEST_FILM", 100)
+    assert bench.films.room_left() == 100
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"robot.file": "/etc/passwd"},
+        {"robot.file": "../robot.toml"},
+        {"robot.file": "robot.toml"},
+        {"camera.checkerboard.images": "/etc"},
+        {"camera.height": ["210 mm"]},
+        {"camera.height": "9" * 500},
+    ],
+)
+def test_no_field_names_a_file(bench: Bench, fields: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="allowed"):
+        bench.desk.set_fields(fields)
+
+
+def test_a_dropped_robot_may_not_rest_on_another_file(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "secret.toml").write_text("secret = 1\n")
+    with pytest.raises(InputError, match="allowed on the page") as refused:
+        bench.desk.add_text(f'extends = "{tmp_path / "secret.toml"}"\n')
+    assert "secret = 1" not in str(refused.value)
+    bench.desk.add_text('extends = "biorob2012-wide"\nname = "mine"\n[tail]\nwavelength = "20 mm"\n')
+    assert bench.desk.fields()["robot.file"] == "robot.toml"
+    assert bench.desk.robot_text() == bench.desk.robot_text()
+    assert 'wavelength = "20 mm"' in bench.desk.robot_text()
+
+
+def test_a_dropped_setup_fills_the_form_and_is_the_same_file_again(bench: Bench, tmp_path: Path) -> None:
+    from spirillum.vision.setup import load_setup
+
+    bench.desk.set_fields(WHOLE)
+    assert bench.desk.checked()["problems"] == []
+    text = bench.desk.setup_text()
+    bench.desk.set_fields({"robot.file": "biorob2012-wide"})
+    assert bench.desk.checked()["problems"]
+    bench.desk.add_text(text)
+    assert bench.desk.setup_text() == text
+    (tmp_path / "setup.toml").write_text(text)
+    setup, robot = load_setup(tmp_path / "setup.toml")
+    assert setup.camera.height == pytest.approx(0.21)
+    assert robot == load("biorob2012-wide")
+
+
+def test_wrong_numbers_get_a_sentence_with_their_field(bench: Bench) -> None:
+    bench.desk.set_fields({**WHOLE, "tank.index": "oil", "robot.axis_height": "3 km"})
+    problems = bench.desk.checked()["problems"]
+    assert any(one.startswith("tank.index") for one in problems)
+    assert any(one.startswith("robot.axis_height") for one in problems)
+    with pytest.raises(InputError, match="no film"):
+        bench.measure()
+
+
+def test_decimal_commas_are_numbers() -> None:
+    assert form_fields({"tank.index": "1,4", "end": ""}, ()) == {"tank.index": 1.4}
