@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -60,8 +60,8 @@ def stored_study(
     """
     required("zarr", "a store", "cluster")
     if loaded.study.band or loaded.study.predicted:
-        asked = "band" if loaded.study.band else "predicted"
-        raise InputError(f"{asked} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
+        option = "band" if loaded.study.band else "predicted"
+        raise InputError(f"{option} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
     claim = {"mark": _MARK, "content": mark, "what": "study"}
     with results_folder(store_target(store), claim=claim) as folder:
@@ -79,11 +79,13 @@ def stored_study(
         return opened_store(folder)
 
 
-class _Work:
-    """What regions are written of, and where."""
+class _Work(NamedTuple):
+    """A study, and the folder that its regions are written into."""
 
-    def __init__(self, loaded: LoadedStudy, observed: ObservedArrays | None, plan: Plan, folder: Path) -> None:
-        self.loaded, self.observed, self.plan, self.folder = loaded, observed, plan, folder
+    loaded: LoadedStudy
+    observed: ObservedArrays | None
+    plan: Plan
+    folder: Path
 
 
 def _missing(plan: Plan, folder: Path) -> list[Region]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from math import prod
 from time import process_time
 from typing import NamedTuple
 
@@ -119,24 +120,16 @@ def _is_quick(name: str, loaded: LoadedStudy) -> bool:
     model = find_swimmer_model(name)
     if model.closed_form:
         return True
-    one = _single(loaded)
-    return all(quickest(model, batch) is not model for _, batch in groups(one))
-
-
-def _single(loaded: LoadedStudy) -> LoadedStudy:
     layout = layout_of(loaded)
-    first = next(layout.regions())
-    return cut(loaded, None, layout, first._replace(stop=tuple(start + 1 for start in first.start)))[0]
+    one = cut(loaded, None, layout, next(layout.regions()).of_one)[0]
+    return all(quickest(model, batch) is not model for _, batch in groups(one))
 
 
 def _job(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, first: Region, count: int) -> RegionJob:
     """The first region, with about so many of its robots."""
     stop = list(first.stop)
     for axis in range(len(stop)):
-        behind = 1
-        for size in stop[axis + 1 :]:
-            behind *= size
-        stop[axis] = min(stop[axis], max(count // behind, 1))
+        stop[axis] = min(stop[axis], max(count // prod(stop[axis + 1 :]), 1))
     own, seen = cut(loaded, observed, layout, first._replace(stop=tuple(stop)))
     plan = plan_of(own, seen, layout_of(own))
     return RegionJob(next(plan.layout.regions()), own, seen, plan)
@@ -145,9 +138,9 @@ def _job(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout, f
 def _timed(job: RegionJob) -> _Cost:
     """One region: once to be warm, once for the time, once for the memory."""
     encoded_region(job)
-    begun = process_time()
+    start = process_time()
     files = encoded_region(job)
-    seconds = process_time() - begun
+    seconds = process_time() - start
     tracemalloc.start()
     try:
         encoded_region(job)

@@ -38,6 +38,11 @@ class Region(NamedTuple):
         """Number of robots."""
         return prod(stop - start for start, stop in zip(self.start, self.stop, strict=True))
 
+    @property
+    def of_one(self) -> Region:
+        """Its first robot alone."""
+        return self._replace(stop=tuple(start + 1 for start in self.start))
+
 
 @dataclass(frozen=True)
 class Layout:

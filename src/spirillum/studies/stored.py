@@ -78,9 +78,7 @@ def plan_of(loaded: LoadedStudy, observed: ObservedArrays | None, layout: Layout
     """What a store of a study holds: known before anything is computed."""
     import xarray as xr
 
-    first = next(layout.regions())
-    one = first._replace(stop=tuple(start + 1 for start in first.start))
-    own, seen = cut(loaded, observed, layout, one)
+    own, seen = cut(loaded, observed, layout, next(layout.regions()).of_one)
     empty = _empty(loaded, observed)
     template = laid_out(own, [(task, empty) for task in tasks(own)], observed=seen)
     whole = xr.Dataset(coords=coordinates_of(loaded))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.robot.robot import Robot
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.lens import Lens
+from spirillum.virtual.tank import Tank
 
 __all__ = ["Disturbances", "tilt_of"]
 
@@ -27,6 +31,24 @@ def tilt_of(degradation: Degradation, seed: int) -> tuple[float, float]:
 
 class Disturbances:
     """The disturbances of one video, drawn from its seed; each kind from random numbers of its own."""
+
+    @classmethod
+    def of_robot(
+        cls, degradation: Degradation, seed: int, lens: Lens, duration: float, robot: Robot, tank: Tank
+    ) -> Self:
+        """Those of a video of a robot in its tank, with bubbles above the robot and below the oil's surface.
+
+        Args:
+            degradation: how much of each.
+            seed: of the random numbers.
+            lens: the camera.
+            duration: of the video, s.
+            robot: the robot.
+            tank: where it swims.
+        """
+        length, diameter = robot.body.length, robot.body.diameter
+        top = min(tank.tube_height + 0.8 * (tank.tube or 1.5 * diameter), 0.95 * lens.surface)
+        return cls(degradation, seed, lens, duration, (length, diameter), top)
 
     def __init__(
         self, degradation: Degradation, seed: int, lens: Lens, duration: float, body: tuple[float, float], top: float

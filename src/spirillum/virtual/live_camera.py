@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -73,9 +74,9 @@ class VirtualCamera:
         self._tank = tank_of(self.robot, self.camera.view)
         self._lens = lens_of(self.camera, tilt_of(self.degradation, seed))
         check_size(self.robot, self._tank, self._lens)
-        body, tube = (self.robot.body.length, self.robot.body.diameter), self._tank.tube
-        top = min(self._tank.tube_height + 0.8 * (tube or 1.5 * body[1]), 0.95 * self._lens.surface)
-        self._disturbances = Disturbances(self.degradation, seed, self._lens, _LAMP_TIME, body, top)
+        self._disturbances = Disturbances.of_robot(
+            self.degradation, seed, self._lens, _LAMP_TIME, self.robot, self._tank
+        )
         self._painter = Painter(self.robot, self._tank, self._lens)
         low, high = swimming_range(self.robot, self.camera)
         self._shift = low + _SHARE * (high - low) - float(pose.position[0])
@@ -133,9 +134,5 @@ class VirtualCamera:
             tail_phase=np.array([one.tail_phase for one in both]),
             roll=np.zeros(2),
         )
-        found = trajectory_of(
-            poses, self.camera.view, leftwards=self.camera.leftwards, axis=self._tank.tube_height
-        ).shifted(self._shift)
-        return TrialTrajectory(
-            poses.time, found.position, found.heading, found.pitch, found.body_angle, found.tail_phase
-        )
+        seen = trajectory_of(poses, self.camera.view, leftwards=self.camera.leftwards, axis=self._tank.tube_height)
+        return replace(seen.shifted(self._shift), time=poses.time)

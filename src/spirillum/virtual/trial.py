@@ -145,9 +145,7 @@ def render(
     if not 2 <= count <= _MOST_FRAMES:
         length = f"duration = {trajectory.duration:g} s makes {count} frames"
         raise InputError(f"{length}; allowed: 2 to {_MOST_FRAMES} frames")
-    body = robot.body.length, robot.body.diameter
-    top = min(tank.tube_height + 0.8 * (tank.tube or 1.5 * body[1]), 0.95 * lens.surface)
-    disturbances = Disturbances(degradation, seed, lens, trajectory.duration, body, top)
+    disturbances = Disturbances.of_robot(degradation, seed, lens, trajectory.duration, robot, tank)
     kept, counted = even_times(troubles, np.flatnonzero(disturbances.kept(count)), seed)
     names = names_beside(target) if setup is None else names_beside(target, Path(setup))
     robot_file = robot.name if is_preset(robot) else names["robot"].name

@@ -6,6 +6,7 @@ Answers are data and know no figures; this module knows both.
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from spirillum.calibration.calibrated import Calibrated
+from spirillum.controllers.control import Control
 from spirillum.designs.answer import Design
 from spirillum.dynamics.settling import Settling
 from spirillum.errors import InputError
@@ -23,7 +25,18 @@ from spirillum.robot.robot import Robot
 from spirillum.studies.ranking import can_be_ranked, ranking_of
 from spirillum.swimming.comparison import ModelComparison
 from spirillum.swimming.prediction import Prediction
+from spirillum.view.figures.calibration import calibration_figures
+from spirillum.view.figures.comparison import comparison_figure
+from spirillum.view.figures.control import control_figure
+from spirillum.view.figures.design import design_figure
+from spirillum.view.figures.flow import flow_figure
+from spirillum.view.figures.magnetic import magnetic_figure
+from spirillum.view.figures.measurement import measurement_figures
+from spirillum.view.figures.ranking import ranking_picture
+from spirillum.view.figures.robot import robot_figure
+from spirillum.view.figures.settling import settling_figure
 from spirillum.view.figures.style import DPI, save_as, styled
+from spirillum.view.figures.trajectory import trajectory_figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +74,7 @@ def plot(answer: Any) -> Plot:
 
     Args:
         answer: a robot (`sp.load`), a prediction (its robot in its place, to scale), or what `compare_models`, `study`,
-            `simulate`, `magnetic_sweep`, `settle`, `design`, `flow`, `measure` or `calibrate` returns.
+            `simulate`, `magnetic_sweep`, `settle`, `design`, `flow`, `control`, `measure` or `calibrate` returns.
 
     Raises:
         InputError: for anything else.
@@ -79,65 +92,49 @@ def plot(answer: Any) -> Plot:
             ) from error
 
 
+def _of_measurement(answer: Measurement) -> Figure:
+    """The first figure of a measurement.
+
+    Raises:
+        InputError: if it has no trial.
+    """
+    for picture in measurement_figures(answer).values():
+        return picture.figure()
+    raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")
+
+
+_FIGURES: dict[type, Callable[[Any], Figure]] = {
+    Robot: robot_figure,
+    Prediction: lambda answer: robot_figure(answer.robot),
+    ModelComparison: comparison_figure,
+    Settling: settling_figure,
+    Design: design_figure,
+    Flow: lambda answer: flow_figure(answer, answer.plane("xz")),
+    Control: control_figure,
+    Measurement: _of_measurement,
+    Calibrated: lambda answer: next(iter(calibration_figures(answer).values())),
+}
+"""Figures by the kind of the answer; those of datasets follow from what is in them."""
 _ALLOWED = (
-    "a robot, or what predict, compare_models, study, simulate, magnetic_sweep, settle, design, flow, measure or "
-    "calibrate returns"
+    "a robot, or what predict, compare_models, study, simulate, magnetic_sweep, settle, design, flow, control, measure "
+    "or calibrate returns"
 )
 
 
 def _of_answer(answer: Any) -> Figure:
-    if isinstance(answer, (Robot, Prediction)):
-        from spirillum.view.figures.robot import robot_figure
-
-        return robot_figure(answer if isinstance(answer, Robot) else answer.robot)
-    if isinstance(answer, ModelComparison):
-        from spirillum.view.figures.comparison import comparison_figure
-
-        return comparison_figure(answer)
-    if isinstance(answer, Settling):
-        from spirillum.view.figures.settling import settling_figure
-
-        return settling_figure(answer)
-    if isinstance(answer, Design):
-        from spirillum.view.figures.design import design_figure
-
-        return design_figure(answer)
-    if isinstance(answer, Flow):
-        from spirillum.view.figures.flow import flow_figure
-
-        return flow_figure(answer, answer.plane("xz"))
-    return _of_data(answer)
-
-
-def _of_data(answer: Any) -> Figure:
-    """The first figure of what was measured or fitted."""
-    if isinstance(answer, Measurement):
-        from spirillum.view.figures.measurement import measurement_figures
-
-        pictures = measurement_figures(answer)
-        if pictures:
-            return next(iter(pictures.values())).figure()
-        raise InputError("answer = a measurement without a trial has no figure; allowed: one with a trial")
-    if isinstance(answer, Calibrated):
-        from spirillum.view.figures.calibration import calibration_figures
-
-        return next(iter(calibration_figures(answer).values()))
+    for kind, draw in _FIGURES.items():
+        if isinstance(answer, kind):
+            return draw(answer)
     raise InputError(f"answer = {type(answer).__name__} has no figure; allowed: {_ALLOWED}")
 
 
 def _of_dataset(dataset: xr.Dataset) -> Figure:
     """A run over time, a sweep over the field's rate, or the ranking of a study."""
     if "time" in dataset.dims and "position" in dataset:
-        from spirillum.view.figures.trajectory import trajectory_figure
-
         return trajectory_figure(dataset)
     if "field_rate" in dataset.dims:
-        from spirillum.view.figures.magnetic import magnetic_figure
-
         return magnetic_figure(dataset)
     if can_be_ranked(dataset):
-        from spirillum.view.figures.ranking import ranking_picture
-
         ranking = ranking_of(dataset)
         if ranking.robots:
             return ranking_picture(ranking).figure()
