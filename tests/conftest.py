@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import Phase, settings
 
+from browser import LEFT_OUT
+
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -35,6 +37,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest tests first, so that all workers end at about the same time."""
     rank = {name: place for place, name in enumerate(_LONGEST)}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line where the tests of the page were left out for want of a browser."""
+    reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
+    if left := [reason for reason in reasons if reason.endswith(LEFT_OUT)]:
+        terminalreporter.write_line(f"{left[0].removeprefix('Skipped: ')} ({len(left)})", yellow=True)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,5 +1,6 @@
 """One server and one browser for all tests of the page."""
 
+import os
 import re
 import subprocess
 import sys
@@ -7,12 +8,19 @@ import time
 from collections.abc import Iterator
 from shutil import which
 from signal import SIGINT
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 
+from browser import LEFT_OUT
+
 FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 """WebGL without a graphics card."""
+
+
+def _left_out(why: str) -> NoReturn:
+    """Skip a test of the page, or fail where a browser has to be there, as in `.ci/run`."""
+    (pytest.fail if os.environ.get("SPIRILLUM_BROWSER") == "needed" else pytest.skip)(f"{why}: {LEFT_OUT}")
 
 
 class Served:
@@ -43,13 +51,16 @@ def served(cache_of_its_own: None) -> Iterator[Served]:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="tests of the page need playwright (extra `test`)")
+    try:
+        from playwright import sync_api
+    except ImportError:
+        _left_out("playwright is not installed (extra `test`)")
     system = next((path for name in ("chromium", "chromium-browser", "google-chrome") if (path := which(name))), None)
     with sync_api.sync_playwright() as playwright:
         try:
             found = playwright.chromium.launch(executable_path=system, args=list(FLAGS))
         except sync_api.Error:
-            pytest.skip("no Chromium is installed (`playwright install chromium`): tests of the page are left out")
+            _left_out("no Chromium is installed (`playwright install chromium`)")
         yield found
         found.close()
 
