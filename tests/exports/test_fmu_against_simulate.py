@@ -95,6 +95,8 @@ def test_parameters_can_be_set(units: dict[str, Path]) -> None:
     on = {"time": [0.0], "remote": [True]}
     found = simulated(units["plain"], on, stop=0.1, step=0.05, start_values={"battery.voltage": 3.2})
     assert found["position"][-1] == pytest.approx(float(run["position"][-1]), rel=1e-6)
+    dead = simulated(units["plain"], on, stop=0.1, step=0.05, start_values={"battery.voltage": 0.0})
+    assert not dead["position"].any()
 
 
 @needs_compiler

@@ -133,7 +133,8 @@ static bool integrate(Model *m, double length, double duty, double *charge) {
     const double *p = m->p;
     double at_rest = p[CONSTANT] + p[DECAY] + p[GROWTH];
     double current = m->state[CURRENT], done = 0.0, h = fmin(length, 0.1 * p[INDUCTANCE] / at_rest);
-    double allowed = 1e-10 * fmax(p[VOLTAGE] / at_rest, fabs(current)), integral = 0.0;
+    /* The last term keeps a robot without voltage and current from dividing nothing by nothing. */
+    double allowed = 1e-10 * fmax(fmax(p[VOLTAGE] / at_rest, fabs(current)), 1e-9), integral = 0.0;
     for (long step = 0; step < 100000000L && done < length; step++) {
         double k[7], at[7], error = 0.0, error_of_integral = 0.0, sum = 0.0;
         bool last = done + h >= length;
