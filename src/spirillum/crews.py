@@ -57,7 +57,7 @@ class Crew:
             return len(_workers(client, self.cluster))
 
     def check(self) -> None:
-        """Look whether all are there, before anything is written.
+        """Check that the workers are there, before anything is written.
 
         Raises:
             InputError: if a cluster does not answer, has no workers, or some that cannot do the work.
@@ -67,7 +67,7 @@ class Crew:
 
 
 def checked_crew(workers: int, cluster: str | None) -> Crew:
-    """Workers as they are asked for.
+    """A crew of so many workers, or of those of a cluster.
 
     Args:
         workers: number of processes.
@@ -166,10 +166,10 @@ def _lost(address: str, besides: str) -> InputError:
     return InputError(f"the scheduler at {address} was lost{besides}; allowed: the same again once one is there")
 
 
-def _at_worker(work: Callable[[_Task], _Answer], task: _Task, asked: tuple[str, str]) -> _Answer:
+def _at_worker(work: Callable[[_Task], _Answer], task: _Task, expected: tuple[str, str]) -> _Answer:
     """One task, one at a time in this process."""
-    if _about() != asked:
-        raise InputError(f"a worker of the cluster has {versions()}; allowed: workers with {asked[1]}")
+    if _about() != expected:
+        raise InputError(f"a worker of the cluster has {versions()}; allowed: workers with {expected[1]}")
     with _alone:
         return work(task)
 
@@ -183,7 +183,7 @@ class _Hand(Generic[_Task, _Answer]):
         self._room, self._looked, self._deaths = 0, -_LOOK, 0
 
     def fill(self) -> bool:
-        """Look who is there and send what they may do next; whether anything is with them."""
+        """Look which workers there are and send them their next tasks; whether any task is with them."""
         if monotonic() - self._looked >= _LOOK:
             known = self._client.scheduler_info(n_workers=-1)["workers"]
             machines = len({item["host"] for item in known.values()})
@@ -197,7 +197,7 @@ class _Hand(Generic[_Task, _Answer]):
         self._waiting[self._client.submit(_at_worker, self._work, task, _about(), pure=False)] = task
 
     def done(self) -> list[Any]:
-        """Those that are done, or none after a while.
+        """Tasks that are done, or none after a while.
 
         Raises:
             OSError: if the scheduler is gone.

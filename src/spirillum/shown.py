@@ -49,11 +49,11 @@ def _is_quantity(item: Any) -> bool:
 
 
 def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, Any]]) -> Row:
-    own = item["unit"]
-    shown = among(item["value"], own, [other["value"] for other in known.values() if other["unit"] == own])
-    value, low, high = ("" if item.get(key) is None else in_unit(item[key], own, shown) for key in _ENDS)
+    unit = item["unit"]
+    shown = among(item["value"], unit, [other["value"] for other in known.values() if other["unit"] == unit])
+    value, low, high = ("" if item.get(key) is None else in_unit(item[key], unit, shown) for key in _ENDS)
     plain = "" if shown == "1" else shown
-    si = "" if plain in ("", own) else f"{item['value']:.6g} {own}"
+    si = "" if plain in ("", unit) else f"{item['value']:.6g} {unit}"
     return Row(name.replace("_", " "), value, low, high, plain, si)
 
 
@@ -139,15 +139,15 @@ def _cells(texts: Iterable[str]) -> str:
 def _title(answer: Mapping[str, Any]) -> str:
     """Whose answer it is, of which kind, by which model."""
     kind = str(answer["schema"]).removeprefix("spirillum.").partition("/")[0].replace("-", " ")
-    said = [f"{name} {answer[name]}" for name in ("model", "friction") if isinstance(answer.get(name), str)]
+    words = [kind, *(f"{name} {answer[name]}" for name in ("model", "friction") if isinstance(answer.get(name), str))]
     if isinstance(answer.get("calibrated"), bool):
-        said.append("calibrated" if answer["calibrated"] else "not calibrated")
-    words = ", ".join([kind, *said])
-    return f"{answer['robot']}: {words}" if isinstance(answer.get("robot"), str) else words
+        words.append("calibrated" if answer["calibrated"] else "not calibrated")
+    title = ", ".join(words)
+    return f"{answer['robot']}: {title}" if isinstance(answer.get("robot"), str) else title
 
 
 _LONGEST, _MOST, _OF_A_LIST = 100, 10, 5
-_TOLD = ("schema", "robot", "model", "friction", "model_reason", "motion", "form")
+_IN_TITLE = ("schema", "robot", "model", "friction", "model_reason", "motion", "form")
 
 
 def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -155,7 +155,7 @@ def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         (name.replace("_", " "), str(item))
         for name, item in answer.items()
-        if name not in _TOLD
+        if name not in _IN_TITLE
         and isinstance(item, (str, int))
         and not isinstance(item, bool)
         and len(str(item)) < _LONGEST
@@ -184,7 +184,7 @@ def _errors(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
     error = answer.get("error_estimate")
     if not (isinstance(error, Mapping) and "statement" in error):
         return []
-    own = (
-        [] if error["value"] is None else [("error estimate", f"{100 * error['value']:.2g} % of the forward velocity")]
-    )
-    return [*own, ("known error", str(error["statement"]))]
+    known = ("known error", str(error["statement"]))
+    if error["value"] is None:
+        return [known]
+    return [("error estimate", f"{100 * error['value']:.2g} % of the forward velocity"), known]

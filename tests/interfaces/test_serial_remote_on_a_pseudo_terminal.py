@@ -159,11 +159,11 @@ def test_ports_that_are_none_are_a_sentence() -> None:
 @pytest.mark.parametrize("said", ["abc", "", "nan", "70000"])
 def test_answers_that_are_no_numbers_are_a_sentence(said: str, monkeypatch: pytest.MonkeyPatch) -> None:
     with sp.VirtualRemote() as far, sp.SerialRemote(far.port) as near:
-        monkeypatch.setattr(near, "_asked", lambda verb, more="": f"ACK 7 {said}")
+        monkeypatch.setattr(near, "_request", lambda verb, more="": f"ACK 7 {said}")
         with pytest.raises(sp.InputError, match="answers as no remote does"):
             near.send(0.5)
         with monkeypatch.context() as other:
-            other.setattr(sp.SerialRemote, "_asked", lambda self, verb, more="": f"WHO 1 x {said}")
+            other.setattr(sp.SerialRemote, "_request", lambda self, verb, more="": f"WHO 1 x {said}")
             with sp.VirtualRemote() as second, pytest.raises(sp.InputError, match="answers as no remote does"):
                 sp.SerialRemote(second.port)
 

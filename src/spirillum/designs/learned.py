@@ -241,7 +241,7 @@ def is_learned(model: SwimmerModel, space: Space, unknowns: Unknowns) -> bool:
 
 
 def _changing_the_flow(space: Space, unknowns: Unknowns) -> tuple[tuple[Variable, ...], list[str]]:
-    """As `_own_fields`; fields that are unknown and change the flow are among those of which it cannot be learned."""
+    """Fields that are varied and change the flow; names of those, varied or unknown, of which it cannot be learned."""
     own, strange = _own_fields(space)
     return own, strange + [item.path for item in unknowns.ranges if not item.path.startswith(_FREE)]
 

@@ -197,11 +197,11 @@ def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
     ]
     if robot.channel is not None:
         low, high = (float(end) for end in (poses.position[:, 0].min(), poses.position[:, 0].max()))
-        own = robot.body.length + robot.coupling.length + robot.tail.length
+        robot_length = robot.body.length + robot.coupling.length + robot.tail.length
         middle = -0.5 * (robot.coupling.length + robot.tail.length)
         length = robot.channel.length
         if length is None or not np.isfinite(length):
-            length, middle = _LONGEST_TUBE * (high - low + own), 0.5 * (low + high) + middle
+            length, middle = _LONGEST_TUBE * (high - low + robot_length), 0.5 * (low + high) + middle
         glass = foxglove.cylinder(robot.channel.diameter, length, middle)
         entities.append(foxglove.entity("tube", _LAB, glass, "cylinders"))
     return entities
@@ -210,10 +210,10 @@ def _scene(robot: Robot, poses: Poses) -> list[dict[str, Any]]:
 def _events(dataset: xr.Dataset) -> Iterator[Message]:
     try:
         events = json.loads(dataset.attrs.get("events", "[]"))
-        found = [(float(event["time"]), str(event["what"])) for event in events]
+        entries = [(float(event["time"]), str(event["what"])) for event in events]
     except (ValueError, TypeError, KeyError) as error:
         raise InputError("the run's attribute 'events' is no list of events; allowed: a run of simulate") from error
-    for time, what in sorted(found):
+    for time, what in sorted(entries):
         yield (
             "/events",
             _LOG,

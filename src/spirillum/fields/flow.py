@@ -116,7 +116,7 @@ class Flow(Shown):
         return envelope("flow", content, self.warnings)
 
     def with_held_force(self) -> Flow:
-        """The same with the sideways force that the fluid's traction amounts to."""
+        """This flow with the sideways force that the fluid's traction amounts to."""
         force = self.field.wrench()[:3]
         sideways = force - (force @ self.heading) * self.heading
         return replace(self, held_force=float(np.linalg.norm(sideways)))

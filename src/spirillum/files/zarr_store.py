@@ -50,10 +50,10 @@ def store_target(path: str | Path) -> Path:
     Raises:
         InputError: if it does not end in `.zarr`, or is a file.
     """
-    found = checked_path(path, "a Zarr store, for example study.zarr")
-    if found.suffix != ".zarr":
+    folder = checked_path(path, "a Zarr store, for example study.zarr")
+    if folder.suffix != ".zarr":
         raise InputError(f"store = {str(path)[:200]!r}; allowed: a name that ends in .zarr, for example study.zarr")
-    return found
+    return folder
 
 
 def store_files(
@@ -174,13 +174,13 @@ def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
         for numbered in (earlier, [last]):
             for number, key in numbered:
                 place = folder / key
-                _made(folder, place.parent)
+                _make_folder(folder, place.parent)
                 (hidden / str(number)).replace(place)
             for parent in {(folder / key).parent for _, key in numbered}:
                 synced(parent)
 
 
-def _made(folder: Path, inner: Path) -> None:
+def _make_folder(folder: Path, inner: Path) -> None:
     """Make a folder within another, no part of which may lead out of it."""
     for part in reversed([inner, *inner.parents][: len(inner.relative_to(folder).parts)]):
         if part.is_symlink():
@@ -198,7 +198,7 @@ def opened_store(folder: Path) -> xr.Dataset:
     import xarray as xr
 
     try:
-        found: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True, decode_times=False)
+        dataset: xr.Dataset = xr.open_zarr(folder, chunks=None, consolidated=True, decode_times=False)
     except Exception as error:  # a damaged store raises whatever the libraries meet first
         raise InputError(f"{folder} cannot be read ({str(error)[:120]}); allowed: a store of this study") from error
-    return found
+    return dataset

@@ -1,12 +1,14 @@
 """The line protocol of a remote at a serial port: how lines are written and read, and what the far end has to do.
 
 Every line is ASCII, ``BODY*HH`` and a line feed, HH the exclusive or of the bytes of BODY in hexadecimal, as in
-NMEA 0183. The page `docs/serial-remote.md` says all of it. Nothing here knows a port.
+NMEA 0183. `docs/serial-remote.md` describes it. Nothing here knows a port.
 """
 
 from __future__ import annotations
 
 import math
+from functools import reduce
+from operator import xor
 
 from spirillum.errors import InputError, clipped
 
@@ -29,21 +31,18 @@ def unframed(line: bytes) -> str | None:
     Args:
         line: without its line feed.
     """
-    body, star, said = line.rstrip(b"\r").rpartition(b"*")
-    if not star or len(said) != 2 or said.upper() != f"{_checksum(body):02X}".encode():
+    body, star, checksum = line.rstrip(b"\r").rpartition(b"*")
+    if not star or len(checksum) != 2 or checksum.upper() != f"{_checksum(body):02X}".encode():
         return None
     return body.decode("ascii", "replace")
 
 
 def _checksum(body: bytes) -> int:
-    found = 0
-    for byte in body:
-        found ^= byte
-    return found
+    return reduce(xor, body, 0)
 
 
 class Receiver:
-    """The far end: what a microcontroller beside the motor does. Its time is told by who calls it."""
+    """The far end: what a microcontroller beside the motor does. Its caller gives it the time."""
 
     def __init__(self, name: str = "spirillum", watchdog: float = WATCHDOG) -> None:
         """A motor that is off.
@@ -60,11 +59,11 @@ class Receiver:
         if not 0.0 < watchdog <= 10.0:
             raise InputError(f"watchdog = {watchdog:g} s; allowed: above 0, at most 10 s")
         self.name, self.watchdog = name, watchdog
-        self._duty, self._heard, self._rest = 0.0, -math.inf, b""
+        self._duty, self._last_command, self._rest = 0.0, -math.inf, b""
 
     def duty(self, now: float) -> float:
         """Duty of the motor at a time, s; 0 once the last valid command is older than the watchdog allows."""
-        return self._duty if now - self._heard <= self.watchdog else 0.0
+        return self._duty if now - self._last_command <= self.watchdog else 0.0
 
     def receive(self, data: bytes, now: float) -> bytes:
         """Take bytes as they come, and give the answer.
@@ -90,7 +89,7 @@ class Receiver:
         duty = 0.0 if verb == "OFF" else _duty_of(words[0]) if verb == "DUTY" and words else None
         if duty is None:
             return framed(f"NAK {number} unknown")
-        self._duty, self._heard = duty, now
+        self._duty, self._last_command = duty, now
         return framed(f"ACK {number} {duty:.3f}")
 
 

@@ -27,7 +27,7 @@ _PATIENCE = 0.15
 """Time in which an answer has to come, s: three tries end before the far end's watchdog does."""
 _TRIES = 3
 _REPEAT = 0.1
-"""How often a duty that is held is said again, s."""
+"""Time after which a duty that is held is sent again, s."""
 _LONGEST_HOLD = 86_400.0
 
 
@@ -36,7 +36,7 @@ class SerialRemote:
 
     @checked
     def __init__(self, port: str, *, baud: int = _BAUD) -> None:
-        """Open the port, and ask who is there.
+        """Open the port, and ask the far end for its name.
 
         Args:
             port: such as ``/dev/ttyUSB0`` or ``COM3``.
@@ -51,7 +51,7 @@ class SerialRemote:
         self.port = str(port)
         """The port."""
         self._gone: tuple[type[Exception], ...] = (serial.SerialException, OSError, TypeError)
-        self._number, self._rest = 0, b""
+        self._number, self._rest = 0, b""  # of the last command; bytes of a line that has not ended
         try:
             self._line: Any = serial.Serial(
                 self.port, baud, timeout=0.02, write_timeout=_PATIENCE, exclusive=True if os.name == "posix" else None
@@ -59,8 +59,8 @@ class SerialRemote:
         except (*self._gone, ValueError) as error:
             raise InputError(f"{self.port[:80]} cannot be opened ({_reason(error)}); allowed: {_ports()}") from error
         try:
-            answer = self._asked("WHO").split(" ")
-            self.name, self.watchdog = _printable(answer[2]), _told(answer[3], 1e4) * 1e-3
+            answer = self._request("WHO").split(" ")
+            self.name, self.watchdog = _printable(answer[2]), _number_in(answer[3], 1e4) * 1e-3
         except InputError:
             self._line.close()
             raise
@@ -75,7 +75,7 @@ class SerialRemote:
         self.close()
 
     def send(self, duty: float) -> float:
-        """Set the duty of the motor; it is off again after the watchdog's time unless it is said again.
+        """Set the duty of the motor; the watchdog switches it off after its time unless a duty is sent again.
 
         Args:
             duty: 0 (off) to 1.
@@ -87,14 +87,14 @@ class SerialRemote:
             InputError: for what is no duty (nothing is then sent), an unplugged port, or no answer.
         """
         _check_duty(duty)
-        answer = self._asked("DUTY", f" {float(duty):.3f}")
+        answer = self._request("DUTY", f" {float(duty):.3f}")
         try:
-            return _told(answer.split(" ")[2], 1.0)
+            return _number_in(answer.split(" ")[2], 1.0)
         except ValueError as error:
             raise InputError(f"{self.port[:80]} answers as no remote does; allowed: another port") from error
 
     def hold(self, duty: float, duration: float, told: Callable[[float], None] | None = None) -> None:
-        """Keep a duty for a time, said again every tenth of a second; then the motor is off.
+        """Keep a duty for a time, sent again every tenth of a second; then the motor is off.
 
         Args:
             duty: 0 to 1.
@@ -102,7 +102,7 @@ class SerialRemote:
             told: told how long it has been on, s.
 
         Raises:
-            InputError: as `send`, and for a time that is none.
+            InputError: for what is no duty or no time, an unplugged port, or no answer.
         """
         _check_length(duration)
         start = time.monotonic()
@@ -121,7 +121,7 @@ class SerialRemote:
         Raises:
             InputError: for an unplugged port, or no answer.
         """
-        self._asked("OFF")
+        self._request("OFF")
 
     def close(self) -> None:
         """Switch the motor off and leave the port; a port that is gone is left, and the watchdog does the rest."""
@@ -134,8 +134,8 @@ class SerialRemote:
             if self._line.is_open:
                 self.off()
 
-    def _asked(self, verb: str, more: str = "") -> str:
-        """Say something until it is answered.
+    def _request(self, verb: str, more: str = "") -> str:
+        """Send a command until it is answered, and give the answer.
 
         Raises:
             InputError: for an unplugged port, no answer, or a refusal.
@@ -162,8 +162,8 @@ class SerialRemote:
         """The answer to the last line; None where none comes in time."""
         end = time.monotonic() + _PATIENCE
         while time.monotonic() < end:
-            heard = self._line.read(max(1, min(self._line.in_waiting, LONGEST_LINE)))
-            *lines, self._rest = (self._rest + heard).split(b"\n")
+            received = self._line.read(max(1, min(self._line.in_waiting, LONGEST_LINE)))
+            *lines, self._rest = (self._rest + received).split(b"\n")
             self._rest = self._rest[-LONGEST_LINE:]
             for body in filter(None, map(unframed, lines)):
                 if body.startswith(f"{wanted} {self._number} "):
@@ -181,7 +181,7 @@ def _check_length(duration: Any) -> None:
         raise InputError(f"duration = {clipped(duration)}; allowed: above 0 s, at most {_LONGEST_HOLD:g} s")
 
 
-def _told(word: str, high: float) -> float:
+def _number_in(word: str, high: float) -> float:
     """A number of an answer.
 
     Raises:
@@ -198,8 +198,7 @@ def _printable(text: str) -> str:
 
 
 def _reason(error: Exception) -> str:
-    said = getattr(error, "strerror", None) or str(error)
-    return " ".join(str(said).split())[:100]
+    return " ".join(str(getattr(error, "strerror", None) or error).split())[:100]
 
 
 def _ports() -> str:
@@ -211,7 +210,7 @@ def _ports() -> str:
 
 @dataclass(frozen=True)
 class RemoteRun(Shown):
-    """What a remote was told."""
+    """A motor that was on for a time, through a remote."""
 
     port: str
     """The port."""
@@ -251,9 +250,9 @@ def remote(port: str, *, duty: float = 1.0, duration: str | float = 1.0, baud: i
     length = parse_option("duration", duration, KINDS["time"])
     _check_duty(duty)
     _check_length(length)
-    with SerialRemote(port, baud=baud) as there:
-        there.hold(duty, length)
-        return RemoteRun(there.port, there.name, round(float(duty), 3), length, there.watchdog)
+    with SerialRemote(port, baud=baud) as far_end:
+        far_end.hold(duty, length)
+        return RemoteRun(far_end.port, far_end.name, round(float(duty), 3), length, far_end.watchdog)
 
 
 class VirtualRemote:

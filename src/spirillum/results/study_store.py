@@ -94,12 +94,12 @@ def _missing(plan: Plan, folder: Path) -> list[Region]:
 
     def lacks(region: Region) -> bool:
         keys = [key for key in plan.pieces(region) if not (finished and key.startswith(_NOTES))]
-        return not all(_there(folder / key) for key in reversed(keys))
+        return not all(_is_written(folder / key) for key in reversed(keys))
 
     return [region for region in plan.layout.regions() if lacks(region)]
 
 
-def _there(path: Path) -> bool:
+def _is_written(path: Path) -> bool:
     with suppress(OSError):
         return path.stat().st_size > 0
     return False
@@ -115,12 +115,12 @@ def _finished(folder: Path) -> bool:
 def _begin(plan: Plan, folder: Path, attributes: Mapping[str, Any]) -> None:
     """Write what is in the store, unless it stands there."""
     files = store_files(plan.variables, plan.coordinates, {**attributes, "finished": "no"})
-    changed = {key: content for key, content in files.items() if not _same(folder / key, content)}
+    changed = {key: content for key, content in files.items() if not _holds(folder / key, content)}
     if changed:
         write_pieces(folder, changed)
 
 
-def _same(path: Path, content: bytes) -> bool:
+def _holds(path: Path, content: bytes) -> bool:
     with suppress(OSError):
         return path.stat().st_size == len(content) and path.read_bytes() == content
     return False
@@ -154,12 +154,12 @@ def _finish(
     warnings = warnings_of(loaded)
     warnings += summed((Caution(*item) for note in notes for item in note["cautions"]), loaded.count)
     warnings += warnings_of_calibrations(loaded)
-    own = {
+    results = {
         "warnings": "\n".join(dict.fromkeys(warnings)),
         "unanswered": sum(int(note["unanswered"]) for note in notes),
         "finished": "yes",
     }
-    files = store_files(plan.variables, plan.coordinates, {**attributes, **own})
+    files = store_files(plan.variables, plan.coordinates, {**attributes, **results})
     write_pieces(folder, {"zarr.json": files["zarr.json"]})
 
 
