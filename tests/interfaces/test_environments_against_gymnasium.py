@@ -80,6 +80,13 @@ def test_exact_lab_shows_the_truth() -> None:
     assert seen[1] == pytest.approx(1e3 * steady.forward_velocity, rel=1e-3)
 
 
+@pytest.mark.parametrize(("name", "column"), [(NAMES[0], 2), (NAMES[1], 3)])
+def test_an_agent_sees_what_it_sent_and_not_whether_that_arrived(name: str, column: int) -> None:
+    one = gymnasium.make(HOME + name, model="rft", lab={"remote": {"lost": 0.9}}).unwrapped
+    one.reset(seed=1)
+    assert all(one.step(np.array([action]))[0][column] == action for action in (1, 0, 1, 0, 1))
+
+
 def test_rules_score_as_their_limits_say() -> None:
     from spirillum.interfaces.baselines import baseline
 

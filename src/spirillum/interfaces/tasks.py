@@ -129,6 +129,7 @@ class Task(ABC):
         self._late, self._slow = late, slow
         self._frames = _Past(late + slow + 1, count)
         self._commands = _Past(round(self.lab.remote.delay / self.dt) + 1, count)
+        self._sent = np.zeros(count)
         self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
         self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
         self._goal_range = _range_of("goal", self.goals if goal is None else goal)
@@ -163,6 +164,7 @@ class Task(ABC):
         self.steps[which] = 0
         self._frames.forget(which)
         self._commands.forget(which)
+        self._sent[which] = 0.0
         self._wander[which] = rng.standard_normal(new)
         self._scale[which] = 1.0 + lab.camera.scale_error * rng.standard_normal(new)
         self._gain[which] = 1.0 + lab.meter.gain_error * rng.standard_normal(new)
@@ -183,10 +185,9 @@ class Task(ABC):
         Raises:
             InputError: for an action that is none; nothing has then moved.
         """
-        duty, count = self._duty(actions), self.count
-        lost = rng.random(count) < self.lab.remote.lost
-        arriving = np.where(lost, self._commands.ago(0), duty)
-        self._commands.append(arriving)
+        self._sent = self._duty(actions)
+        lost = rng.random(self.count) < self.lab.remote.lost
+        self._commands.append(np.where(lost, self._commands.ago(0), self._sent))
         self.plants.step(self.dt, duty=self._commands.ago(len(self._commands) - 1), flow=self._flow())
         self.steps += 1
         self._film(rng)
@@ -272,7 +273,7 @@ class StopAt(Task):
 
     def _observation(self, rng: np.random.Generator) -> list[Samples]:  # noqa: ARG002 - no sensor but the camera
         place, speed = self._seen()
-        return [_MM * (self.goal - place), _MM * speed, (self._commands.ago(0) > 0).astype(float), self._time_left()]
+        return [_MM * (self.goal - place), _MM * speed, (self._sent > 0).astype(float), self._time_left()]
 
 
 class HoldSpeed(Task):
@@ -298,7 +299,7 @@ class HoldSpeed(Task):
     def _observation(self, rng: np.random.Generator) -> list[Samples]:
         noise = self.lab.meter.current_noise * rng.standard_normal(self.count)
         current = self._gain * np.abs(self.plants.states[:, kernel.CURRENT]) + noise
-        return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._commands.ago(0), self._time_left()]
+        return [_MM * self.goal, _MM * self._seen()[1], _MM * current, self._sent, self._time_left()]
 
 
 TASKS: dict[str, type[Task]] = {"spirillum/StopAt-v0": StopAt, "spirillum/HoldSpeed-v0": HoldSpeed}
