@@ -280,7 +280,8 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name == "no-stripes" for flag in track.flags)
-    return _with_errors(rate, "m/s", _drift(track, (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel), scale)
+    drift = _drift(track, (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel)
+    return _with_errors(rate, "m/s", drift, scale, track.drift)
 
 
 def _mean(track: Track, values: Samples, unit: str, systematic: float) -> Measured:

@@ -6,6 +6,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
+from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
@@ -18,6 +19,7 @@ from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steps import Record
+from spirillum.vision.track.sway import Swayed, swayed_by
 from spirillum.vision.track.track import Track
 from spirillum.vision.track.unwrapping import contradictions, no_stripe_passes, nothing_moves, unwrapped
 from spirillum.vision.track.warnings import cut_off, gaps_of, sight_flags
@@ -28,7 +30,13 @@ __all__ = ["track_of"]
 
 
 def track_of(
-    video: Video, setup: Setup, sight: Sight, known: Identified, record: Record, flags: tuple[Flag, ...]
+    video: Video,
+    setup: Setup,
+    sight: Sight,
+    known: Identified,
+    record: Record,
+    flags: tuple[Flag, ...],
+    still: Steadied | None = None,
 ) -> Track:
     """The track of a film, with all flags.
 
@@ -39,6 +47,7 @@ def track_of(
         known: the robot.
         record: what was seen on every frame.
         flags: those of film, camera and first look.
+        still: how the camera swayed, where its pictures were moved to where the first one lies.
     """
     body, time = known.start.body, np.array(record.time)
     seen = np.array([one.known for one in record.placed])
@@ -67,6 +76,7 @@ def track_of(
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot)
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
+    swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
     return Track(
         time=time,
@@ -85,7 +95,8 @@ def track_of(
         video=video.name,
         words=video.words,
         time_uncertainty=restored.relative_error,
-        flags=(*early, *cuts, *roll_flags, *tail_flags, *odd),
+        drift=swayed.drift,
+        flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 
 

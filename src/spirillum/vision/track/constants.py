@@ -25,6 +25,7 @@ __all__ = [
     "SIZE",
     "STEADINESS",
     "STRIPES",
+    "SWAY",
     "TAIL",
     "UNWRAPPING",
     "VISIBILITY",
@@ -42,6 +43,7 @@ __all__ = [
     "SizeConstants",
     "SteadinessConstants",
     "StripeConstants",
+    "SwayConstants",
     "TailConstants",
     "UnwrappingConstants",
     "VisibilityConstants",
@@ -528,6 +530,20 @@ class DirectionConstants:
 
 
 @dataclass(frozen=True)
+class SwayConstants:
+    """A camera that swayed (`sway`)."""
+
+    window: int = 7
+    """Frames before and after a moment whose medians are compared."""
+    jump: float = 1.5
+    """Step of the robot against the background from which on pictures were not moved back well, pixels.
+
+    A ruler's lines are at least three pixels apart, by which a wrong registration is off."""
+    lateral: tuple[str, ...] = ("lateral_wobble_at_tail_rate", "lateral_wobble_at_body_rate")
+    """Quantities that are not given then either."""
+
+
+@dataclass(frozen=True)
 class VisibilityConstants:
     """Second robots, wrong directions, gaps, robots that leave, and glare (`warnings`)."""
 
@@ -581,5 +597,6 @@ UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
 LOST_FRAMES = LostFramesConstants()
 DIRECTION = DirectionConstants()
+SWAY = SwayConstants()
 VISIBILITY = VisibilityConstants()
 FOLLOWING = FollowingConstants()

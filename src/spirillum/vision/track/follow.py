@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spirillum.robot.robot import Robot
+from spirillum.vision.camera.anchor import steadied, sways
 from spirillum.vision.camera.camera import opened, samples_of, scale_of
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.assembly import track_of
@@ -49,17 +50,21 @@ def follow(
     """
     video = opened(video, setup)
     frames = samples_of(video, setup.start, setup.end)
+    still = steadied(video.frames(setup.start, setup.end)) if sways(frames) else None
+    if still is not None:
+        frames = [still.frame(frame) for frame in frames]
     learnt = learnt_from(video, frames, setup, robot, folder)
     follower = Follower(learnt.known, learnt.still)
     aside = ThreadPoolExecutor(1)  # runs while the frames are followed
     moved = aside.submit(camera_flags, frames, learnt.known.start, ruled=setup.markers.spacing is not None)
     aside.shutdown(wait=False)
     total = video.count
-    for count, frame in enumerate(video.frames(setup.start, setup.end), 1):
+    for count, taken in enumerate(video.frames(setup.start, setup.end), 1):
+        frame = taken if still is None else still.frame(taken)
         seen = follower.step(frame)
         if on_frame is not None:
             on_frame(frame.index, frame.image, seen)
         if progress is not None:
             progress(count, total)
     flags = (*video.flags, *learnt.sight.flags, *moved.result(), *learnt.flags)
-    return track_of(video, setup, learnt.sight, learnt.known, follower.record, flags)
+    return track_of(video, setup, learnt.sight, learnt.known, follower.record, flags, still)
