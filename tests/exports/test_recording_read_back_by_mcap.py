@@ -156,6 +156,8 @@ def test_command_writes_what_python_writes(run: xr.Dataset, tmp_path: Path, caps
     ("arguments", "sentence"),
     [
         (["run.nc", "run.mcap", "--gap", "1mm"], "options of a robot with .mcap"),
+        (["run.nc", "run.mcap", "--phase", "90deg"], "options of a robot with .mcap"),
+        (["run.nc", "run.mcap", "--fineness", "2"], "options of a robot with .mcap"),
         (["biorob2012-wide", "robot.stl", "--film", "x.mp4"], "only with .mcap"),
         (["nowhere.nc", "run.mcap"], "nowhere.nc"),
     ],

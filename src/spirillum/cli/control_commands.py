@@ -85,7 +85,7 @@ def control(
         list[str] | None,
         typer.Option(
             "--with",
-            metavar="FIELD=VALUE",
+            metavar="PATH=VALUE",
             help="A field of the lab, such as camera.latency=50ms; repeatable.",
             rich_help_panel=_LAB,
         ),
@@ -177,8 +177,4 @@ def _lab(path: Path | None, changes: list[str] | None) -> Lab:
     from spirillum.controllers.lab import Lab
     from spirillum.robot.load import parse_setting
 
-    found = {}
-    for text in changes or []:
-        name, value = parse_setting(text, "FIELD=VALUE; for example --with camera.latency=50ms")
-        found[name] = value
-    return Lab.read(path, found)
+    return Lab.read(path, dict(parse_setting(text, "--with", "camera.latency=50ms") for text in changes or []))

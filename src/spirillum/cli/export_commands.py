@@ -23,6 +23,8 @@ from spirillum.cli.options import (
 
 __all__ = ["export"]
 
+_PHASE = "0rad"
+
 
 def _complete_units(incomplete: str) -> list[str]:
     return starting(("m", "mm"), incomplete)
@@ -41,7 +43,7 @@ def export(
             metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
         ),
     ],
-    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
+    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = _PHASE,
     fineness: Annotated[float, typer.Option(help="Triangles along every line, relative to the normal ones.")] = 1.0,
     unit: Annotated[
         str | None, typer.Option(autocompletion=_complete_units, help="Unit of an STL file: mm, or m.")
@@ -81,8 +83,8 @@ def export(
     if target.suffix == ".mcap":
         from spirillum.exports.recording import export_run
 
-        given = (unit, model, friction, calibration, gap, pitch, flow, settings, sidecar or None, no_sidecar or None)
-        if any(item is not None for item in given):
+        given = (unit, model, friction, calibration, gap, pitch, flow, settings)
+        if any(item is not None for item in given) or phase != _PHASE or fineness != 1.0 or sidecar or no_sidecar:
             raise InputError("options of a robot with .mcap; allowed: --film and --speed, for the run has its robot")
         renderer.show(export_run(robot, target, film=film, speed=speed).to_dict(), json=json)
         return

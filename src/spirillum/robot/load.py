@@ -131,12 +131,13 @@ def _looks_like_a_name(robot: str | Path) -> bool:
     return isinstance(robot, str) and re.fullmatch(r"[\w-]{1,99}", robot) is not None
 
 
-def parse_setting(text: str, asked: str = "PATH=VALUE; for example --set tail.wavelength=20mm") -> tuple[str, Any]:
+def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelength=20mm") -> tuple[str, Any]:
     """Split ``PATH=VALUE``; VALUE is read as TOML, else taken as text (a quantity or a word).
 
     Args:
         text: the setting.
-        asked: form and example for the sentence of an error, the option as its last word but one.
+        option: that takes it, for the sentence of an error.
+        example: of a setting, for that sentence.
 
     Raises:
         InputError: if there is no ``=`` or no path.
@@ -144,9 +145,9 @@ def parse_setting(text: str, asked: str = "PATH=VALUE; for example --set tail.wa
     path, equals, value = text.partition("=")
     path, value = path.strip(), value.strip()
     if not equals or not path or not value:
-        raise InputError(f"{asked.split()[-2]} {text[:80]!r} is not {asked}")
+        raise InputError(f"{option} {text[:80]!r} is not PATH=VALUE; for example {option} {example}")
     try:
-        parsed = parse_toml(f"value = {value}", "--set", "PATH=VALUE")
+        parsed = parse_toml(f"value = {value}", option, "PATH=VALUE")
     except InputError:
         return path, value
     return path, parsed["value"] if set(parsed) == {"value"} else value
