@@ -84,7 +84,7 @@ def test_a_stream_of_the_network_is_tracked_by_its_own_times(filmed, pictures):
         server.start()
         found = track(f"tcp://127.0.0.1:{listening.getsockname()[1]}", setup_of(filmed), learn_from=filmed)
         server.join(10.0)
-    assert found.tracked + found.dropped > 60
+    assert found.frames + found.dropped == len(pictures)
     assert found.trial.quantities["forward_velocity"].value == pytest.approx(4e-3, rel=0.03)
     assert any("this computer's" in note for note in found.notes)  # three times too fast
 
