@@ -20,8 +20,6 @@ SMALL = ("--model", "slender", "--resolution", "30", "--volume-resolution", "20"
 def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A model in closed form for the motion, and a sphere for the flow."""
     import spirillum.fields.flow as module
-    import spirillum.fields.in_tube as tube
-    import spirillum.fields.unbounded as core
     from spirillum.fluid.tube.tube import Tube
     from spirillum.swimming.prediction import predict, prepared
 
@@ -34,8 +32,8 @@ def _quick(sphere: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(found, model=Tube(), batch=placed)
 
     monkeypatch.setattr(module, "predict", quick)
-    monkeypatch.setattr(tube, "tube_flow_field", lambda *_: sphere)
-    monkeypatch.setattr(core, "flow_field", lambda *_: sphere)
+    monkeypatch.setattr(module, "tube_flow_field", lambda *_: sphere)
+    monkeypatch.setattr(module, "flow_field", lambda *_: sphere)
 
 
 def test_summary_agrees_with_the_files(run: Callable[..., Any], tmp_path: Path) -> None:

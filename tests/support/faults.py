@@ -24,6 +24,7 @@ import numpy as np
 
 WIDE = "biorob2012-wide"
 _SIZE = ("--size", "64x64", "--fps", "5", "--duration", "0.6s")
+_VARY = ("--vary", "tail.wavelength=15mm:30mm")
 COMMANDS: dict[str, list[str]] = {
     "simulate": ["simulate", WIDE, "-o", "out.nc", "--duration", "0.2s", "--plot", "out.png"],
     "study": ["study", "s.toml", "-o", "out"],
@@ -35,6 +36,23 @@ COMMANDS: dict[str, list[str]] = {
     "join": ["observations", "join", "o.csv", "p.csv", "-o", "out.csv"],
     "compare": ["compare-models", WIDE, "--model", "sbt", "--model", "rft", "-o", "out.svg"],
     "measure": ["measure", "a.mp4", "--setup", "a.setup.toml", "--marks", "m.csv", "--no-tracking", "-o", "out"],
+    "control": [
+        "control",
+        WIDE,
+        "--model",
+        "rft",
+        "--at",
+        "2mm",
+        "--tolerance",
+        "0.5mm",
+        "--duration",
+        "0.3s",
+        "-o",
+        "out.nc",
+    ],
+    "design": ["design", WIDE, "--model", "rft", "--maximise", "forward_velocity", *_VARY, "-o", "out.toml"],
+    "store": ["study", "s.toml", "--store", "out.zarr"],
+    "track": ["track", "a.mp4", "--setup", "a.setup.toml", "--pace", "fast"],
     "new": ["robot", "new", "out.toml"],
 }
 _ROWS = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"

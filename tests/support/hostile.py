@@ -42,6 +42,11 @@ OBSERVATIONS = (
 )
 DUTY = "time_s,duty\n0,1\n1,0.5\n2,1\n"
 CANDIDATES = "channel_diameter_mm,wavelength_mm,amplitude_mm\n40,20,2.5\n40,25,2.5\n"
+LAB = (
+    '[camera]\nfps = 30.0\nlatency = "100 ms"\ndropped = 0.02\nposition_noise = "0.01 mm"\n[meter]\nrate = 10.0\n'
+    '[remote]\nperiod = "108 ms"\nlost = 0.05\n[pulse]\nvelocity = "0.5 mm/s"\n[unknown]\nfriction_factor = 3.0\n'
+)
+CONTROL = ["control", WIDE, "--model", "rft", "--at", "2mm", "--tolerance", "0.5mm", "--duration", "0.3s", "-o", "c.nc"]
 MARKS = "video,time_s,x_px,y_px\na,0,10,20\na,1,30,20\n"
 NASTY = (
     *("nan", "-inf", "1e400", "-0", "1" * 400, "0x7fffffffffffffff", "1979-05-27", "true", '""', '"1 mm"', '"0 mm"'),
@@ -209,6 +214,51 @@ def _setup(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
     return Case("", files, command)
 
 
+def _lab(rng: np.random.Generator, _whole: dict[str, bytes]) -> Case:
+    return Case("", {"lab.toml": bent_text(rng, LAB)}, [*CONTROL, "--lab", "lab.toml"])
+
+
+def _goal(rng: np.random.Generator, _whole: dict[str, bytes]) -> Case:
+    """Wrong words for a task."""
+    options = ("--at", "--tolerance", "--speed", "--duration", "--with", "--seed", "--task", "--controller", "--gap")
+    command = list(CONTROL)
+    for _ in range(int(rng.integers(1, 3))):
+        option, token = str(_one(rng, options)), str(_one(rng, NASTY)).replace("\0", "")
+        field = _one(rng, ("camera.latency=", "remote.period=", "unknown.friction_factor=", "pulse.start=", ""))
+        command += [option, f"{field}{token}" if option == "--with" else token]
+    return Case("", {}, command)
+
+
+def _design(rng: np.random.Generator, _whole: dict[str, bytes]) -> Case:
+    """Wrong words for a search."""
+    low, high, token = (str(_one(rng, NASTY)).replace("\0", "") for _ in range(3))
+    varied = str(_one(rng, (f"tail.wavelength={low}:30mm", f"tail.amplitude=1mm:{high}", f"{low}=1mm:2mm", token)))
+    option = str(_one(rng, ("--subject-to", "--unknown", "--level", "--draws", "--minimise", "--model", "--set")))
+    command = ["design", WIDE, "--model", "rft", "--maximise", "forward_velocity", "--vary", varied]
+    return Case("", {}, command if rng.integers(2) else [*command, option, token])
+
+
+def _live(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
+    film = whole["film.mp4"] if rng.integers(2) else bent_bytes(rng, whole["film.mp4"])
+    files = {"s.toml": SETUP.encode(), "a.mp4": film, "b.mp4": bent_bytes(rng, whole["film.mp4"])}
+    learnt = ["--learn-from", "b.mp4"] if rng.integers(2) else []
+    return Case("", files, ["track", "a.mp4", "--setup", "s.toml", "--pace", "fast", *learnt])
+
+
+def _recording(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
+    files = {"run.nc": bent_bytes(rng, whole["run.nc"])}
+    return Case("", files, ["export", "run.nc", "out.mcap"])
+
+
+def _store(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
+    """A store that holds something bent."""
+    names = sorted(name for name in whole if name.startswith("out.zarr/"))
+    files = {name: whole[name] for name in names}
+    bent = names[int(rng.integers(len(names)))] if rng.integers(2) else "out.zarr/study.json"
+    files[bent] = bent_bytes(rng, files[bent])
+    return Case("", {"s.toml": STUDY.encode(), **files}, ["study", "s.toml", "--store", "out.zarr"])
+
+
 def _film(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
     files = {"s.toml": SETUP.encode(), "a.mp4": bent_bytes(rng, whole["film.mp4"])}
     return Case("", files, ["measure", "a.mp4", "--setup", "s.toml", "-o", "out"])
@@ -315,6 +365,12 @@ _MAKERS: list[tuple[int, _Maker]] = [
     (2, _run),
     (2, _study_folder),
     (6, _words),
+    (3, _lab),
+    (3, _goal),
+    (3, _design),
+    (1, _live),
+    (1, _recording),
+    (2, _store),
 ]
 _LONGEST = 20.0
 _LARGEST = 1500 << 10
@@ -345,6 +401,7 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     report, run.keep, written.write_report = written.write_report, copied, lambda *_: None
     try:
         sp.study(folder / "s.toml", output=folder / "out")
+        sp.study(folder / "s.toml", store=folder / "out.zarr")
     finally:
         run.keep, written.write_report = kept, report
     import pyarrow as pa
@@ -356,6 +413,9 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     names = ("run.nc", "posterior.nc", "film.mp4", "part.npz", "o.parquet")
     found = {name: (folder / name).read_bytes() for name in names}
     found |= {name: (folder / "out" / name).read_bytes() for name in ("study.json", "dataset.nc")}
+    found |= {
+        str(path.relative_to(folder)): path.read_bytes() for path in (folder / "out.zarr").rglob("*") if path.is_file()
+    }
     from spirillum.robot.load import preset_text
 
     return found | {"robot.toml": preset_text(WIDE).encode()}
