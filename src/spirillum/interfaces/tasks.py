@@ -129,7 +129,7 @@ class Task(ABC):
         self._late, self._slow = late, slow
         self._frames = _Past(late + slow + 1, count)
         self._commands = _Past(round(self.lab.remote.delay / self.dt) + 1, count)
-        self._sent = np.zeros(count)
+        self._sent: Samples = np.zeros(count)
         self._wander, self._scale, self._gain = np.zeros(count), np.ones(count), np.ones(count)
         self._pulse_start, self._pulse = np.zeros(count), np.zeros(count)
         self._goal_range = _range_of("goal", self.goals if goal is None else goal)
