@@ -49,6 +49,31 @@ def test_knob_gives_the_number_that_python_gives(tab: Any) -> None:
     tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'fluid.viscosity' && knob.value == 3.5)")
 
 
+def test_forces_are_those_of_the_prediction(tab: Any) -> None:
+    tab.page.select_option("#model", "slender")
+    tab.until(f"spirillum.scene.lanes[0].swims_by == 'slender' && {NUMBERS}?.model == 'slender'")
+    tab.page.click(".layers button:has-text('Forces')")
+    tab.until("spirillum.lanes[0].stage.renderer.marks[0]?.tips.length == 3")
+    forces = {one["name"]: one["value"] for one in tab.value("spirillum.lanes[0].stage.renderer.marks[0].tips")}
+    weight = sp.load("biorob2012-wide").derived()["submerged_weight"].value
+    assert forces["weight less buoyancy"] == pytest.approx(-weight)
+    assert forces["drag of the body"] == pytest.approx(-forces["thrust of the tail"])
+    tab.page.click(".layers button:has-text('Forces')")
+
+
+@pytest.mark.slow
+def test_flow_is_drawn_on_the_plane(tab: Any) -> None:
+    tab.page.select_option("#model", "slender")
+    tab.until("spirillum.scene.lanes[0].swims_by == 'slender' && spirillum.frame.lanes[0].ready")
+    before = _picture(tab)
+    tab.page.click(".layers button:has-text('Flow')")
+    tab.until("spirillum.lanes[0].plane && spirillum.lanes[0].stage.renderer.planes.length", 300.0)
+    tab.until("spirillum.lanes[0].note.textContent.includes('Flow of steady swimming (slender)')")
+    assert (np.abs(_picture(tab) - before).max(axis=2) > 15.0).mean() > 0.1
+    tab.page.click(".layers button:has-text('Flow')")
+    tab.until("!spirillum.lanes[0].plane")
+
+
 def test_wrong_value_gets_a_sentence_at_its_knob(tab: Any) -> None:
     tab.page.fill("#tail-amplitude", "40")
     tab.page.keyboard.press("Enter")

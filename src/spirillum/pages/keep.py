@@ -17,7 +17,7 @@ from spirillum.version import own_version
 
 __all__ = ["MODULES", "asset", "command_line", "python_lines", "replay_page", "robot_file"]
 
-MODULES = ("format.js", "matrix.js", "renderer.js", "stage.js", "section.js", "plots.js", "replay.js")
+MODULES = ("format.js", "matrix.js", "renderer.js", "layers.js", "stage.js", "section.js", "plots.js", "replay.js")
 """Modules that a replay needs, each after those that it imports."""
 _IMPORT = re.compile(r'(from|import) "\./([\w-]+\.js)"')
 _PLACE = {"gap": "--gap", "pitch": "--pitch", "flow": "--flow"}

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
+from spirillum.pages.flowing import Flowing
 from spirillum.pages.knobs import MODELS, Settings
 from spirillum.pages.numbers import SERIES, quantity_list
 from spirillum.pages.recording import Recording, finite
@@ -86,6 +89,8 @@ class Lane:
     recording: Recording = field(default_factory=Recording)
     preparing: dict[str, Any] | None = None
     """Progress of a table that is being made."""
+    flowing: Flowing | None = None
+    """The flow that is shown around it, or on its way."""
     _undo: list[Settings] = field(default_factory=list)
     _redo: list[Settings] = field(default_factory=list)
     _last: tuple[str, float] = ("", 0.0)
@@ -136,6 +141,25 @@ class Lane:
         self.built = self.moment = None
         self.trouble = ""
         self.recording = Recording()
+        self.without_flow()
+
+    def with_flow(self, tell: Callable[[], None]) -> None:
+        """Compute the flow around it, with its tail as it is now.
+
+        Raises:
+            InputError: if it does not swim.
+        """
+        if self.built is None or self.moment is None:
+            raise InputError("flow: the robot does not swim yet; allowed: one that swims")
+        self.without_flow()
+        phase = self.moment.pose.tail_phase % (2.0 * math.pi)
+        self.flowing = Flowing(self.predicted(), self.built.model, self.settings.run, phase, tell)
+
+    def without_flow(self) -> None:
+        """No flow is shown."""
+        if self.flowing is not None:
+            self.flowing.stop()
+        self.flowing = None
 
     def take(self, built: Built) -> None:
         """The robot is laid down."""
@@ -221,6 +245,7 @@ class Lane:
             "needs_table": built.needs_table if built else False,
             "roughness": built.plant.roughness if built else None,
             "preparing": self.preparing,
+            "flow": None if self.flowing is None else self.flowing.told(),
             "trouble": self.trouble,
             "numbers": self.numbers,
             "quantities": quantity_list(self.numbers["rows"] if self.numbers else None),

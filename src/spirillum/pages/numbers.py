@@ -12,7 +12,7 @@ from spirillum.units import display_unit, shown_in
 if TYPE_CHECKING:
     from spirillum.swimming.prediction import Prediction
 
-__all__ = ["SERIES", "TABLE", "prediction_answer", "quantity_list"]
+__all__ = ["SERIES", "TABLE", "axial_forces_of", "prediction_answer", "quantity_list"]
 
 TABLE = (
     "forward_velocity",
@@ -103,6 +103,7 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "friction": answer["friction"],
         "calibrated": answer["calibrated"],
         "rows": rows,
+        "forces": forces_of(prediction),
         "band": "band" in answer,
         "error": _finite(error.get("value")),
         "against": error.get("against", ""),
@@ -110,6 +111,33 @@ def prediction_answer(prediction: Prediction) -> dict[str, Any]:
         "others": answer.get("other_models", {}).get("statement", ""),
         "warnings": list(answer.get("warnings", [])),
     }
+
+
+def forces_of(prediction: Prediction) -> list[dict[str, Any]]:
+    """Forces on a robot in steady swimming, N, each with the part of the robot at which it is drawn.
+
+    Weight less buoyancy is vertical, where masses are known.
+    """
+    found = axial_forces_of(prediction)
+    weight = prediction.robot.derived().get("submerged_weight")
+    if weight is not None:
+        found.append({"name": "weight less buoyancy", "at": "body", "axis": "z", "value": -weight.value})
+    return found
+
+
+def axial_forces_of(prediction: Prediction) -> list[dict[str, Any]]:
+    """Drag and thrust of the fluid along the axis, N; none for a table, which holds the force-free robot as a whole."""
+    from spirillum.swimming.steady import axial_forces
+
+    if prediction.model.form == "table":
+        return []
+    along = axial_forces(prediction.batch, prediction.model, prediction.swimming, calibrated=prediction.calibrated)[0]
+    parts = (("drag of the body", "body", along[0]), ("thrust of the tail", "tail", along[2]))
+    return [
+        {"name": name, "at": at, "axis": "x", "value": float(value)}
+        for name, at, value in parts
+        if math.isfinite(value)
+    ]
 
 
 def _finite(value: Any) -> float | None:

@@ -190,6 +190,7 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
         *[Route(f"/{name}", _file(name)) for name in _OWN if name != "index.html"],
         *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
         *bench_routes(house.bench, house.theatre),
+        Route("/flow", _flow(house.theatre)),
         Route("/first-run", _first(first_run)),
         Route("/replay", _replayed, methods=["POST"]),
         WebSocketRoute("/live", house.connect),
@@ -276,6 +277,17 @@ def _kept(name: str, theatre: Theatre) -> Handler:
             return await asyncio.to_thread(made, request.query_params.get("lane", "0"))
         except InputError as error:
             return PlainTextResponse(str(error), status_code=400)
+
+    return serve
+
+
+def _flow(theatre: Theatre) -> Handler:
+    async def serve(request: Request) -> Response:
+        lane = request.query_params.get("lane", "")
+        found = theatre.flow(int(lane)) if lane in ("0", "1") else None
+        if found is None:
+            return PlainTextResponse("there is no flow", status_code=404)
+        return JSONResponse(found)
 
     return serve
 

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import json
 import queue
-import re
 import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from spirillum.errors import InputError
+from spirillum.pages.commands import number_of, refusal_of, robot_tables, text_of
 from spirillum.pages.knobs import Settings
 from spirillum.pages.lane import Built, Lane, build
 from spirillum.pages.numbers import prediction_answer, quantity_list
 from spirillum.pages.preparing import Preparing
-from spirillum.robot.load import load, preset_names
+from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot
-from spirillum.robot.text import robot_text
 
 __all__ = ["SLOWEST_PACE", "Theatre"]
 
@@ -27,9 +26,6 @@ _LATE = 1.0
 """Time by which the run may fall behind before it no longer tries to catch up, s."""
 SLOWEST_PACE, FASTEST_PACE = 1.0 / 64.0, 64.0
 _MOST_WAITING = 2_000
-
-_SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
-"""What a sentence about a field says of where the robot comes from: here it stands at the knob."""
 
 Command = tuple[Mapping[str, Any], Callable[[str], None]]
 """What a client asks for, and where to say why not."""
@@ -48,7 +44,7 @@ class Theatre:
         Raises:
             InputError: if it cannot be loaded.
         """
-        self._own = source if isinstance(source, str) and source in preset_names() else _tables(source)
+        self._own = source if isinstance(source, str) and source in preset_names() else robot_tables(source)
         self._publish = publish
         self._inbox: queue.Queue[Command | None] = queue.Queue(_MOST_WAITING)
         self._wanted: dict[int, tuple[int, str, Settings, Robot, Robot]] = {}
@@ -81,6 +77,8 @@ class Theatre:
             self._work.notify_all()
         if self._preparing is not None:
             self._preparing.stop()
+        for lane in self._lanes:
+            lane.without_flow()
         for thread in self._threads:
             thread.join(timeout=2.0)
 
@@ -94,7 +92,7 @@ class Theatre:
         try:
             self._inbox.put_nowait((command, refuse))
         except queue.Full:
-            refuse(_refusal(command, "the page is busy; allowed: fewer changes at once"))
+            refuse(refusal_of(command, "the page is busy; allowed: fewer changes at once"))
 
     def look(self, watched: bool) -> None:  # noqa: FBT001 - one thing to say
         """Whether anybody looks; the robots wait for who does."""
@@ -115,6 +113,13 @@ class Theatre:
                 return None
             lane = self._lanes[index]
             return lane, lane.recording.data()
+
+    def flow(self, index: int) -> dict[str, Any] | None:
+        """The plane of the flow around a robot; None if there is none."""
+        with self._lock:
+            flowing = self._lanes[index].flowing if 0 <= index < len(self._lanes) else None
+        plane: dict[str, Any] | None = None if flowing is None else flowing.progress().get("plane")
+        return plane
 
     # the thread of the simulation
 
@@ -165,7 +170,7 @@ class Theatre:
                 with self._lock:
                     self._do(command)
             except InputError as error:
-                refuse(_refusal(command, str(error)))
+                refuse(refusal_of(command, str(error)))
             changed = True
             try:
                 item = self._inbox.get_nowait()
@@ -189,12 +194,12 @@ class Theatre:
         action(self, lane, command)
 
     def _set(self, lane: Lane, command: Mapping[str, Any]) -> None:
-        name, value = _text(command, "field"), _text(command, "value")
+        name, value = text_of(command, "field"), text_of(command, "value")
         if name != "run.flow" or not lane.flow(value):
             lane.set(name, value)
 
     def _preset(self, lane: Lane, command: Mapping[str, Any]) -> None:
-        lane.preset(_text(command, "value"), self._own)
+        lane.preset(text_of(command, "value"), self._own)
         drive = lane.robot.drive
         lane.duty = drive.duty if drive is not None else 1.0
 
@@ -212,7 +217,14 @@ class Theatre:
         lane.remote = bool(command.get("value"))
 
     def _duty(self, lane: Lane, command: Mapping[str, Any]) -> None:
-        lane.duty = _number(command, 0.0, 1.0)
+        lane.duty = number_of(command, 0.0, 1.0)
+        lane.without_flow()  # it was that of another speed
+
+    def _flow(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        if command.get("value"):
+            lane.with_flow(self._wake_up)
+        else:
+            lane.without_flow()
 
     def _play(self, _lane: Lane, command: Mapping[str, Any]) -> None:
         self._playing = bool(command.get("value"))
@@ -224,13 +236,15 @@ class Theatre:
                 lane.advance(self._pace / RATE)
 
     def _set_pace(self, _lane: Lane, command: Mapping[str, Any]) -> None:
-        self._pace = _number(command, SLOWEST_PACE, FASTEST_PACE)
+        self._pace = number_of(command, SLOWEST_PACE, FASTEST_PACE)
 
     def _wake(self, _lane: Lane, _command: Mapping[str, Any]) -> None:
         """Only to be listened to."""
 
     def _compare(self, _lane: Lane, command: Mapping[str, Any]) -> None:
         if not command.get("value"):
+            for lane in self._lanes[1:]:
+                lane.without_flow()
             del self._lanes[1:]
         elif len(self._lanes) == 1:
             first = self._lanes[0]
@@ -363,34 +377,8 @@ _ACTIONS: dict[str, Callable[[Theatre, Lane, Mapping[str, Any]], None]] = {
     "step": Theatre._step,  # noqa: SLF001
     "pace": Theatre._set_pace,  # noqa: SLF001
     "compare": Theatre._compare,  # noqa: SLF001
+    "flow": Theatre._flow,  # noqa: SLF001
     "prepare": Theatre._prepare,  # noqa: SLF001
     "leave-off": Theatre._leave_off,  # noqa: SLF001
     "wake": Theatre._wake,  # noqa: SLF001
 }
-
-
-def _tables(source: Any) -> dict[str, Any]:
-    """A robot as its tables, which fields can be laid over, and which no longer depend on a file."""
-    import tomllib
-
-    return tomllib.loads(robot_text(load(source)))
-
-
-def _text(command: Mapping[str, Any], name: str) -> str:
-    value = command.get(name)
-    if not isinstance(value, str):
-        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
-    return value
-
-
-def _number(command: Mapping[str, Any], low: float, high: float) -> float:
-    value = command.get("value")
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
-    return float(value)
-
-
-def _refusal(command: Mapping[str, Any], sentence: str) -> str:
-    name = str(command.get("field") or command.get("do") or "")[:60]
-    sentence = _SOURCE.sub("", sentence)
-    return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})

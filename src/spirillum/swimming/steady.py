@@ -55,6 +55,25 @@ def calibrated_resistance(batch: RobotBatch, model: SwimmerModel, *, calibrated:
     return _with_factors(model.resistance(batch, np.zeros(1)), (0, 3), batch, model, calibrated=calibrated)
 
 
+def axial_forces(batch: RobotBatch, model: SwimmerModel, motion: Swimming, *, calibrated: bool = True) -> Samples:
+    """Force and torque of the fluid along the axis on body and rotor in a steady motion, (robots, 4), N and N m.
+
+    In the order of `SwimmerModel.axial`: force and torque on the body, force and torque on the rotor. The two forces
+    are drag and thrust; they cancel, as nothing else pushes along the axis.
+
+    Args:
+        batch: robots.
+        model: the model that predicted the motion.
+        motion: their steady motion.
+        calibrated: apply calibration factors, as the prediction did.
+    """
+    r = _with_factors(model.axial(batch), (0, 1), batch, model, calibrated=calibrated)
+    rates = (motion.forward_velocity, motion.body_rotation_rate, motion.forward_velocity, motion.tail_rotation_rate)
+    force: Samples = -(r @ np.stack(rates, axis=-1)[..., None])[..., 0]
+    load = model.axial_load(batch)
+    return force + load
+
+
 def _with_factors(
     r: Samples, entries: tuple[int, int], batch: RobotBatch, model: SwimmerModel, *, calibrated: bool
 ) -> Samples:

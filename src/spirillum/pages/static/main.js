@@ -74,7 +74,13 @@ class Lane {
     for (const [view, name] of [["free", "3D"], ["side", "Side"], ["top", "Top"], ["front", "Front"]]) {
       views.append(element("button", { class: "quiet wordy", text: name, onclick: () => this.stage.look(view) }));
     }
-    this.holder.append(this.name, this.headline, this.note, views);
+    const layers = element("div", { class: "layers", role: "group", "aria-label": "Show" });
+    this.toggles = Object.fromEntries([["flow", "Flow"], ["forces", "Forces"]].map(([what, name]) => {
+      const button = element("button", { class: "quiet wordy", text: name, "aria-pressed": "false", onclick: () => this.toggle(what) });
+      layers.append(button);
+      return [what, button];
+    }));
+    this.holder.append(this.name, this.headline, this.note, layers, views);
     this.crossing = new Section(this.section);
     this.generation = -1;
     this.stage.setTheme(theme());
@@ -112,10 +118,48 @@ class Lane {
     this.quantities = quantities;
     for (const plot of this.drawn) plot.quantity = quantities[plot.name];
     for (const plot of this.drawn) plot.band = lane.numbers?.rows[plot.name]?.value != null && lane.remote ? lane.numbers.rows[plot.name] : null;
+    this.numbers = lane.numbers;
+    this.takeFlow(lane.flow);
     this.trouble = lane.trouble;
     this.quietNote = lane.trouble ? "" : lane.caution ? (lane.needs_table ? "Without walls: no table for this tube yet" : "") : "";
     this.ready = false;
     this.say("");
+  }
+
+  // The flow is computed by Python, in seconds to a minute; forces come with the numbers.
+  toggle(what) {
+    if (what === "flow") send({ do: "flow", value: !this.flow, lane: this.index });
+    else this.showForces(!this.forcesOn);
+  }
+
+  showForces(on) {
+    this.forcesOn = on;
+    this.toggles.forces.setAttribute("aria-pressed", String(on));
+    this.stage.setForces(on ? [...(this.numbers?.forces ?? []), ...(this.plane?.forces ?? [])] : null);
+  }
+
+  async takeFlow(flow) {
+    this.flow = flow;
+    this.toggles.flow.setAttribute("aria-pressed", String(Boolean(flow)));
+    if (flow?.done && !this.plane) {
+      const answer = await fetch(`/flow?lane=${this.index}`);
+      if (!answer.ok || !this.flow) return;
+      this.plane = await answer.json();
+      this.stage.setFlow(this.plane);
+    } else if (!flow && this.plane) {
+      this.plane = null;
+      this.stage.setFlow(null);
+    }
+    this.showForces(Boolean(this.forcesOn));
+    this.say(this.flowWords() || this.quietNote);
+  }
+
+  flowWords() {
+    if (this.flow?.failed) return `The flow: ${this.flow.failed}.`;
+    if (this.flow && !this.flow.done) return `Flow on the plane of the axis: ${this.flow.what} \u2026`;
+    if (!this.plane) return "";
+    const speed = this.quantities.forward_velocity;
+    return `Flow of steady swimming (${this.plane.model}), tail at ${Math.round((180 / Math.PI) * this.plane.phase)}\u00b0; full colour: ${inUnit(this.plane.fastest, speed, 2)} ${unitText(speed.unit)}`;
   }
 
   setFrame(frame) {
@@ -131,7 +175,7 @@ class Lane {
       const value = frame.values[plot.name];
       if (value !== undefined) plot.add(frame.time, value);
     }
-    this.say(frame.ended ? `The run has ended: ${frame.ended}. Restart lays it down again.` : this.quietNote);
+    this.say(frame.ended ? `The run has ended: ${frame.ended}. Restart lays it down again.` : this.flowWords() || this.quietNote);
     this.dirty = true;
   }
 

@@ -201,6 +201,8 @@ export class Renderer {
     this.square = mesh(gl, new Float32Array([-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0]), [0, 1, 2, 0, 2, 3], [3]);
     this.tube = mesh(gl, ...cylinder(96, 24), [3]);
     this.parts = {};
+    this.planes = []; // what is drawn between robot and glass
+    this.marks = []; // and over everything
     this.theme = THEMES.light;
   }
 
@@ -284,10 +286,12 @@ export class Renderer {
     this.parts.body.draw();
     this.use(programs.solid, { ...common, u_pose: rotor });
     this.parts.rotor.draw();
+    for (const layer of this.planes) layer.draw(this, { body, common });
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     if (radius > 0) this.glass(common, radius, place[0], true);
     gl.depthMask(true);
+    for (const layer of this.marks) layer.draw(this, { body, common });
   }
 
   glass(common, radius, middle, front) {
@@ -329,7 +333,7 @@ function inSoftware() {
   return /swiftshader|llvmpipe|software/i.test(name);
 }
 
-function program(gl, vertex, fragment) {
+export function program(gl, vertex, fragment) {
   const handle = gl.createProgram();
   for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const shader = gl.createShader(kind);
@@ -348,7 +352,7 @@ function program(gl, vertex, fragment) {
   return { handle, uniforms };
 }
 
-function mesh(gl, vertices, triangles, sizes) {
+export function mesh(gl, vertices, triangles, sizes) {
   const array = gl.createVertexArray(), places = gl.createBuffer(), corners = gl.createBuffer();
   gl.bindVertexArray(array);
   gl.bindBuffer(gl.ARRAY_BUFFER, places);

@@ -1,6 +1,7 @@
 // A robot on its stage: follows it with the camera, turns with the pointer and the keys, writes the ruler's numbers.
 
-import { colourOf, element, fitted } from "./format.js";
+import { colourOf, element, figure, fitted } from "./format.js";
+import { Arrows, FlowPlane } from "./layers.js";
 import { ANGLE, Renderer } from "./renderer.js";
 
 const VIEWS = {
@@ -35,8 +36,28 @@ export class Stage {
     this.dirty = true;
   }
 
+  // The plane of a flow as Python sends it; null: none.
+  setFlow(plane) {
+    const { renderer } = this;
+    for (const layer of renderer.planes) layer.free(renderer);
+    renderer.planes = plane ? [new FlowPlane(renderer, plane)] : [];
+    this.dirty = true;
+  }
+
+  // Forces in N, each with its part and axis; null: none are drawn.
+  setForces(forces) {
+    const { renderer } = this;
+    if (forces) {
+      this.arrows ??= new Arrows(renderer);
+      this.arrows.forces = forces;
+    }
+    renderer.marks = forces ? [this.arrows] : [];
+    this.dirty = true;
+  }
+
   setTheme(name) {
     this.renderer.setTheme(name);
+    for (const layer of this.renderer.planes) layer.paint(this.renderer);
     this.dirty = true;
   }
 
@@ -112,6 +133,10 @@ export class Stage {
   write() {
     const { context, width, height } = fitted(this.words);
     const { ruler, renderer } = this;
+    for (const { place, name, value } of renderer.marks.flatMap((layer) => layer.tips)) {
+      const seen = renderer.project(place);
+      if (seen) label(context, `${name} ${force(value)}`, seen[0] * width, seen[1] * height);
+    }
     if (this.view.pitch < 0.08) return;
     context.font = "500 11px system-ui, sans-serif";
     context.fillStyle = colourOf("--soft");
@@ -180,6 +205,23 @@ export class Stage {
     this.zoom = Math.min(Math.max(this.zoom * factor, 0.35), 12);
     this.dirty = true;
   }
+}
+
+function label(context, text, x, y) {
+  context.font = "600 12px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.lineWidth = 4;
+  context.lineJoin = "round";
+  context.strokeStyle = colourOf("--paper");
+  context.strokeText(text, x, y);
+  context.fillStyle = colourOf("--ink");
+  context.fillText(text, x, y);
+}
+
+function force(newtons) {
+  const size = Math.abs(newtons);
+  const [factor, unit] = size >= 1 ? [1, "N"] : size >= 1e-3 ? [1e3, "mN"] : size >= 1e-6 ? [1e6, "\u00b5N"] : size >= 1e-9 ? [1e9, "nN"] : [1e12, "pN"];
+  return `${figure(size * factor)} ${unit}`;
 }
 
 // A ruler on the bench with marks of 1, 5 and 10 of a round step; `mark` is that step in `unit`.

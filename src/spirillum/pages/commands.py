@@ -1,0 +1,55 @@
+"""Commands of the page, read: what they ask for, and what is answered where they cannot be followed."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.robot.load import load
+from spirillum.robot.text import robot_text
+
+__all__ = ["number_of", "refusal_of", "robot_tables", "text_of"]
+
+_SOURCE = re.compile(r"^(preset [\w-]+|the robot): ")
+"""What a sentence about a field says of where the robot comes from: here it stands at the knob."""
+
+
+def robot_tables(source: Any) -> dict[str, Any]:
+    """A robot as its tables, which fields can be laid over, and which no longer depend on a file."""
+    import tomllib
+
+    return tomllib.loads(robot_text(load(source)))
+
+
+def text_of(command: Mapping[str, Any], name: str) -> str:
+    """A text of a command.
+
+    Raises:
+        InputError: if it is none.
+    """
+    value = command.get(name)
+    if not isinstance(value, str):
+        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
+    return value
+
+
+def number_of(command: Mapping[str, Any], low: float, high: float) -> float:
+    """The number that a command asks for, within limits.
+
+    Raises:
+        InputError: if it is none, or beyond them.
+    """
+    value = command.get("value")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise InputError(f"{command.get('do')} = {str(value)[:40]}; allowed: {low:g} to {high:g}")
+    return float(value)
+
+
+def refusal_of(command: Mapping[str, Any], sentence: str) -> str:
+    """What a client is sent whose command cannot be followed, JSON."""
+    name = str(command.get("field") or command.get("do") or "")[:60]
+    sentence = _SOURCE.sub("", sentence)
+    return json.dumps({"t": "refused", "field": name, "lane": command.get("lane", 0), "sentence": sentence})
