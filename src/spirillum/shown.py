@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from spirillum.units import among, in_unit
 
-__all__ = ["Row", "Shown", "html_of", "rows_of", "text_of"]
+__all__ = ["Row", "Shown", "counted", "html_of", "rows_of", "text_of"]
 
 
 class Row(NamedTuple):
@@ -58,6 +58,11 @@ def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, An
 
 
 _ENDS = ("value", "low", "high")
+
+
+def counted(number: int, word: str) -> str:
+    """A number with its noun, in the plural where it is not one."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
 class Shown(ABC):

@@ -105,7 +105,7 @@ def _aliasing(measurement: Measurement) -> str:
     also = f", and so does a body that turns faster or slower by whole multiples of {body}" if stripes else ""
     return (
         f"What no camera can tell: a tail that turns faster or slower by whole multiples of {tail} looks the same from "
-        f"frame to frame{also}. Where a rate is given, nothing that was seen spoke for that."
+        f"frame to frame{also}. Where a rate is given, no sign of that was seen."
     )
 
 

@@ -11,6 +11,7 @@ from spirillum.citations import REFERENCES
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.quantities import unit_of
 from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
+from spirillum.shown import counted
 from spirillum.studies.ranking import ENDS, RANKED, Best, RankedRobot, StudyRanking, best_in_words
 from spirillum.units import among, display_unit, in_unit
 
@@ -101,11 +102,13 @@ def _question(dataset: xr.Dataset) -> str:
     """The question of the study in a line."""
     sizes = dataset.sizes
     if "channel" in sizes:
-        robots = f"{sizes['channel']} channels × {sizes['wavelength']} wavelengths × {sizes['amplitude']} amplitudes"
+        found = [counted(sizes[name], name) for name in ("channel", "wavelength", "amplitude")]
     else:
-        robots = f"{sizes['robot']} robots"
-    rates = f" × {sizes['assumed_motor_rate']} assumed motor rates" if "assumed_motor_rate" in sizes else ""
-    return f"{robots} × {sizes['model']} models × {sizes['friction']} friction readings{rates}"
+        found = [counted(sizes["robot"], "robot")]
+    found += [counted(sizes["model"], "model"), counted(sizes["friction"], "friction reading")]
+    if "assumed_motor_rate" in sizes:
+        found.append(counted(sizes["assumed_motor_rate"], "assumed motor rate"))
+    return " × ".join(found)
 
 
 def _known_errors(name: str, robots: list[Mapping[str, Any]]) -> str:

@@ -8,7 +8,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from spirillum.cli.tables.parts import Answer, counted, grid
+from spirillum.cli.tables.parts import Answer, grid
+from spirillum.shown import counted
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]

@@ -6,7 +6,8 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.calibration.fit_warnings import CALLED
-from spirillum.cli.tables.parts import Answer, counted, grid
+from spirillum.cli.tables.parts import Answer, grid
+from spirillum.shown import counted
 
 __all__ = ["table"]
 

@@ -16,7 +16,6 @@ __all__ = [
     "Answer",
     "add_bands",
     "add_quantities",
-    "counted",
     "friendly",
     "grid",
     "show_error",
@@ -118,8 +117,3 @@ def show_error(error: Answer, console: Console) -> None:
         said = f"error estimate: {share} of the forward velocity, against {against}"
         console.print(said, highlight=False, soft_wrap=True)
     console.print(f"known error: {escape(error['statement'])}", highlight=False, soft_wrap=True)
-
-
-def counted(number: int, word: str) -> str:
-    """A number with its noun, in the plural where it is not one."""
-    return f"{number} {word}" if number == 1 else f"{number} {word}s"

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.markup import escape
 
-from spirillum.cli.tables.parts import Answer, counted, grid
+from spirillum.cli.tables.parts import Answer, grid
+from spirillum.shown import counted
 from spirillum.studies.ranking import ENDS, RANKED, best_in_words
 from spirillum.units import display_unit, in_unit
 

@@ -43,7 +43,7 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
     for trial in measurement.trials:
         found[f"series-{trial.name}"] = Picture(
             f"Series of {plain(trial.name)}",
-            "Left: what was seen on every frame (dots) and the fitted line. Right: dots less line; frames that were "
+            "Left: what was seen on every frame (dots) and the fitted line. Right: residuals; frames that were "
             "left out are not shown.",
             f"Position, body angle and tail phase of {plain(trial.name)} over time, with residuals",
             lambda trial=trial: trial_figure(trial),  # type: ignore[misc]
