@@ -5,13 +5,14 @@ import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import Phase, settings
 
 from browser import LEFT_OUT
+from spirillum.cli import main
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -63,6 +64,28 @@ def flat_pictures() -> ModuleType:
     import flat_pictures
 
     return flat_pictures
+
+
+class Outcome(NamedTuple):
+    """What a command printed and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
+    """Run a command and return its exit code and output."""
+
+    def command(*arguments: str) -> Outcome:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            main(list(arguments))
+        printed = capsys.readouterr()
+        return Outcome(int(stopped.value.code or 0), printed.out, printed.err)
+
+    return command
 
 
 @pytest.fixture(scope="session")

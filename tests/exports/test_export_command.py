@@ -6,37 +6,16 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
 import spirillum as sp
-from spirillum.cli import main
 
 WIDE = "biorob2012-wide"
 
 
-class Outcome(NamedTuple):
-    """What a command printed and how it ended."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
-    def command(*arguments: str) -> Outcome:
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as stopped:
-            main(list(arguments))
-        printed = capsys.readouterr()
-        return Outcome(int(stopped.value.code or 0), printed.out, printed.err)
-
-    return command
-
-
-def test_answer_agrees_with_the_file(run: Callable[..., Outcome], tmp_path: Path) -> None:
+def test_answer_agrees_with_the_file(run: Callable[..., Any], tmp_path: Path) -> None:
     outcome = run("export", WIDE, str(tmp_path / "robot.stl"), "--phase", "90deg", "--fineness", "0.5", "--json")
     assert (outcome.code, outcome.err) == (0, "")
     answer = json.loads(outcome.out)
@@ -54,14 +33,14 @@ def test_answer_agrees_with_the_file(run: Callable[..., Outcome], tmp_path: Path
 
 
 @pytest.mark.parametrize("ending", ["stl", "glb", "vtp"])
-def test_one_file_and_nothing_else_is_written(run: Callable[..., Outcome], tmp_path: Path, ending: str) -> None:
+def test_one_file_and_nothing_else_is_written(run: Callable[..., Any], tmp_path: Path, ending: str) -> None:
     outcome = run("export", WIDE, str(tmp_path / f"robot.{ending}"))
     assert (outcome.code, outcome.err) == (0, "")
     assert [path.name for path in tmp_path.iterdir()] == [f"robot.{ending}"]
 
 
 @pytest.mark.parametrize("ending", ["urdf", "mjcf", "xml"])
-def test_a_description_refers_to_files_beside_it(run: Callable[..., Outcome], tmp_path: Path, ending: str) -> None:
+def test_a_description_refers_to_files_beside_it(run: Callable[..., Any], tmp_path: Path, ending: str) -> None:
     outcome = run("export", WIDE, str(tmp_path / f"robot.{ending}"), "--model", "rft")
     assert outcome.code == 0
     beside = {f"robot.{ending}", "robot-meshes", "robot.resistance.json"}
@@ -73,7 +52,7 @@ def test_a_description_refers_to_files_beside_it(run: Callable[..., Outcome], tm
     assert ("MuJoCo's own fluid must stay off" in outcome.out) == (ending != "urdf")
 
 
-def test_own_files_are_replaced_and_others_stay(run: Callable[..., Outcome], tmp_path: Path) -> None:
+def test_own_files_are_replaced_and_others_stay(run: Callable[..., Any], tmp_path: Path) -> None:
     command = ("export", WIDE, str(tmp_path / "robot.urdf"), "--no-sidecar")
     assert run(*command).code == 0
     (tmp_path / "robot-meshes" / "mine.stl").write_text("mine")
@@ -126,7 +105,7 @@ MICRO = (
     ],
 )
 def test_bad_input_is_one_sentence_and_leaves_nothing(
-    run: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder.stl").mkdir()
@@ -173,7 +152,7 @@ def test_a_failure_on_the_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_closed_folder_is_named_before_any_work(run: Callable[..., Outcome], tmp_path: Path) -> None:
+def test_a_closed_folder_is_named_before_any_work(run: Callable[..., Any], tmp_path: Path) -> None:
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)
     outcome = run("export", WIDE, str(closed / "robot.stl"))
@@ -181,9 +160,7 @@ def test_a_closed_folder_is_named_before_any_work(run: Callable[..., Outcome], t
     assert "permission denied" in outcome.err
 
 
-def test_the_example_of_the_help_runs(
-    run: Callable[..., Outcome], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_example_of_the_help_runs(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")
     example = re.search(r"Example: spirillum (.*)", run("export", "--help").out)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.cli import main
 from spirillum.robot.load import with_resolution
 from spirillum.robot.placement import Placement
 
@@ -21,17 +20,6 @@ def refused(call: Callable[[], Any]) -> str:
     with pytest.raises(sp.InputError) as caught:
         call()
     return str(caught.value)
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
-    def command(*arguments: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as stopped:
-            main(list(arguments))
-        printed = capsys.readouterr()
-        return int(stopped.value.code or 0), printed.out, printed.err
-
-    return command
 
 
 def test_prediction(walled: Any) -> None:

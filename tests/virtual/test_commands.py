@@ -6,24 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from spirillum.cli import main
 from spirillum.units import Hz
 
 Run = Callable[..., tuple[int, str, str]]
 TINY = ("--duration", "0.1s", "--size", "96x64", "--tail-rate", "1.2Hz")
-
-
-@pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """Exit code, standard output and error of a command."""
-
-    def call(*words: str) -> tuple[int, str, str]:
-        with pytest.raises(SystemExit) as end:
-            main(list(words))
-        out, err = capsys.readouterr()
-        return int(end.value.code or 0), out, err
-
-    return call
 
 
 def test_render_answers_with_the_truth(run: Run, tmp_path: Path) -> None:
