@@ -58,6 +58,14 @@ REFERENCES: dict[str, str] = {
         "IEEE Transactions on Automatic Control 10:434-439, 1965."
     ),
     "astrom2006": "K. J. Astrom and T. Hagglund. Advanced PID Control. ISA, 2006.",
+    "caldag2020": (
+        "H. O. Caldag and S. Yesilyurt. Steering control of magnetic helical swimmers in swirling flows due to "
+        "confinement. IEEE International Conference on Robotics and Automation, 2020."
+    ),
+    "mohammadi2021": (
+        "A. Mohammadi and M. W. Spong. Integral line-of-sight path following control of magnetic helical microswimmers "
+        "subject to step-out frequencies. Automatica 109554, 2021."
+    ),
     "tsypkin1984": "Y. Z. Tsypkin. Relay Control Systems. Cambridge University Press, 1984.",
     "honda1996": (
         "T. Honda, K. I. Arai and K. Ishiyama. Micro swimming mechanisms propelled by external magnetic fields. "

@@ -220,6 +220,8 @@ _CONTROLLED = (
     Quantity("seen_heading", "", "rad", "yaw as seen from above", "camera"),
     Quantity("seen_body_angle", "", "rad", "the body's angle as seen", "camera"),
     Quantity("seen_tail_phase", r"\phi", "rad", "the tail's phase against the body as seen", "camera"),
+    Quantity("seen_side", "y", "m", "y of the body's mid-length as seen from above", "camera"),
+    Quantity("seen_height", "z", "m", "z of the body's mid-length as seen by a second camera, from the side", "camera"),
     Quantity("reading_time", "t", "s", "when the meter was read", "meter"),
     Quantity("read_current", "I", "A", "motor current as read", "meter"),
     Quantity("read_voltage", "V", "V", "battery voltage as read", "meter"),
@@ -230,6 +232,10 @@ _CONTROLLED = (
     Quantity("estimated_speed", "", "m/s", "estimated speed at the robot's own duty in fluid at rest", _CONTROL),
     Quantity("estimated_friction_factor", "", "1", "estimated friction over that of the robot file", _CONTROL),
     Quantity("estimated_gap_factor", "", "1", "estimated gap at the start over that of the robot file", _CONTROL),
+    Quantity("estimated_side", "y", "m", "y of the body's mid-length as estimated at the decision", _CONTROL),
+    Quantity("estimated_height", "z", "m", "z of the body's mid-length as estimated at the decision", _CONTROL),
+    Quantity("field_yaw", "", "rad", "yaw of the field's axis that was sent", _CONTROL),
+    Quantity("field_pitch", "", "rad", "pitch of the field's axis that was sent", _CONTROL),
     Quantity("estimated_drift", "", "m/s", "estimated speed at which the fluid carries the robot", _CONTROL),
 )
 

@@ -34,7 +34,7 @@ class Toy:
     steps: list[tuple[float, float]] = field(default_factory=list)
     duty: float = 0.0
 
-    def step(self, dt: float, *, duty: float) -> Moment:
+    def step(self, dt: float, *, duty: float, field: None = None) -> Moment:
         if self.state.ended:
             raise sp.InputError("the run has ended")
         self.duty = duty

@@ -31,9 +31,9 @@ def test_a_robot_that_slows_down_evenly_is_followed_without_a_rest(toy: Any) -> 
     """Its speed at full duty falls by half; an integral of the speed's error alone would stay behind by its ramp."""
 
     class Slowing(toy):  # type: ignore[misc]
-        def step(self, dt: float, *, duty: float) -> Any:
+        def step(self, dt: float, **command: Any) -> Any:
             self.speed = SPEED * (1.0 - 0.5 * self.state.time / 60.0)
-            return super().step(dt, duty=duty)
+            return super().step(dt, **command)
 
     lab = Lab.exact()
     run = run_loop(Slowing(), KeepCourse(lab, SPEED, 1.0, ASKED, leash=LEASH), lab, 60.0)

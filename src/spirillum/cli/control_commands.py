@@ -34,13 +34,21 @@ def _complete_controllers(incomplete: str) -> list[str]:
     return starting(CONTROLLERS, incomplete)
 
 
+def _complete_laws(incomplete: str) -> list[str]:
+    from typing import get_args
+
+    from spirillum.controllers.steering import Law
+
+    return starting(get_args(Law), incomplete)
+
+
 def control(
     robot: RobotArgument,
     task: Annotated[
         str,
         typer.Option(
             autocompletion=_complete_tasks,
-            help="What to do: stop-at, hold-speed, ride-out, save-battery.",
+            help="What to do: stop-at, hold-speed, ride-out, save-battery, keep-axis.",
             rich_help_panel=_TASK,
         ),
     ] = "stop-at",
@@ -56,7 +64,19 @@ def control(
     ] = None,
     speed: Annotated[
         str | None,
-        typer.Option(metavar="VELOCITY", help="The other tasks: speed along the robot's way.", rich_help_panel=_TASK),
+        typer.Option(metavar="VELOCITY", help="Tasks of speed: along the robot's way.", rich_help_panel=_TASK),
+    ] = None,
+    law: Annotated[
+        str | None,
+        typer.Option(
+            autocompletion=_complete_laws,
+            help="keep-axis: position (feedback of the place), aim (at the axis ahead).",
+            rich_help_panel=_TASK,
+        ),
+    ] = None,
+    rate: Annotated[
+        str | None,
+        typer.Option(metavar="RATE", help="keep-axis: rate of the field, else the robot's.", rich_help_panel=_TASK),
     ] = None,
     duration: Annotated[
         str | None,
@@ -133,7 +153,7 @@ def control(
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
     if movie is not None:
         check_movie(movie)
-    fields = {"at": at, "tolerance": tolerance, "speed": speed, "duration": duration}
+    fields = {"at": at, "tolerance": tolerance, "speed": speed, "law": law, "rate": rate, "duration": duration}
     place = placement_from(gap, eccentricity, pitch, None, ends, None)
     with protected(lab), renderer.progress_bar(quiet=json) as progress:
         found = answer(

@@ -20,6 +20,7 @@ from spirillum.controllers.lab import Unknown
 from spirillum.controllers.sensors import Drawn
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Moment, Plant, uninterrupted
+from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 
 __all__ = ["Bank", "Paths", "interpolation", "points"]
@@ -78,6 +79,8 @@ class Bank:
         Raises:
             InputError: for a robot that cannot have these factors.
         """
+        if robot.drive is None or robot.drive.kind != "dc-motor":
+            raise InputError(f"learn is given with {robot.name}; allowed: a robot with drive.kind 'dc-motor'")
         self.friction, self.gap = points(unknown.friction_factor), points(unknown.gap_factor)
         factors = [float(unknown.friction_factor**u) for u in self.friction]
         members = [Drawn(factor, float(unknown.gap_factor**v)) for factor in factors for v in self.gap]

@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.controllers.bank import Bank
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import BLOCK, SETTLING, Learnt, Stretch, learnt
-from spirillum.controllers.signals import Controller, News, Reading, Sight
+from spirillum.controllers.signals import Command, Controller, News, Reading, Sight
 
 __all__ = ["Learner", "Learning"]
 
@@ -94,11 +94,11 @@ class Learning(Controller):
         self._controller, self.learner = controller, learner
         self.blind, self.knowing = controller.blind, controller.knowing
 
-    def decide(self, news: News) -> float:
+    def decide(self, news: News) -> float | Command:
         """The controller's duty, which the learner takes note of."""
-        duty = self._controller.decide(news)
-        self.learner.take(news, duty)
-        return duty
+        asked = self._controller.decide(news)
+        self.learner.take(news, asked.duty if isinstance(asked, Command) else asked)
+        return asked
 
     def estimate(self) -> Mapping[str, float]:
         """The controller's, and median and 95 % interval of the factors of friction and gap; NaN before."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.sensors import FlowPulse, Senses
-from spirillum.controllers.signals import Controller, News, Reading, Sight
+from spirillum.controllers.signals import Command, Controller, News, Reading, Sight
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Moment, Plant
 from spirillum.dynamics.tube_integration import INTERRUPTED
@@ -101,7 +101,7 @@ class _Loop:
         self.plant, self.controller, self.lab, self.flow = plant, controller, lab, flow
         self.senses = Senses(lab, seed)
         self.run = LoopRun()
-        self.duty = 0.0
+        self.command = Command(0.0)
         self.imposed = 0.0
         self.still = plant.state.flow
         self._queue: list[tuple[float, int, int, Any]] = []
@@ -123,7 +123,7 @@ class _Loop:
         """Move the robot up to a time; whether it got there."""
         dt = time - self.plant.state.time
         if dt > _AT_ONCE:
-            self.run.moments.append(self.plant.step(dt, duty=self.duty))
+            self.run.moments.append(self.plant.step(dt, duty=self.command.duty, field=self.command.field))
             self.run.flows.append(self.imposed)
         self.run.ended = self.plant.state.ended
         return not self.run.ended
@@ -137,17 +137,18 @@ class _Loop:
         if self._sights:
             self._last_delivery = time
         truth = self.now() if self.controller.knowing else None
-        duty = float(self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth)))
+        asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
+        command = asked if isinstance(asked, Command) else Command(float(asked))
         self._sights, self._readings = [], []
-        if not 0.0 <= duty <= 1.0:
-            self.run.ended = f"the controller asked for a duty of {duty:g}; allowed: 0 to 1"
+        if not 0.0 <= command.duty <= 1.0:
+            self.run.ended = f"the controller asked for a duty of {command.duty:g}; allowed: 0 to 1"
             return False
         if not self.controller.blind and time - self._last_delivery > SILENCE + self.lab.camera.latency:
-            duty = 0.0
+            command = Command(0.0)
             self.run.silent = time if self.run.silent is None else self.run.silent
-        self.run.decisions.append(Decision(time, duty, dict(self.controller.estimate())))
+        self.run.decisions.append(Decision(time, command.duty, dict(self.controller.estimate())))
         if self.senses.command_arrives():
-            self.push(time + self.lab.remote.delay, _Kind.ARRIVAL, duty)
+            self.push(time + self.lab.remote.delay, _Kind.ARRIVAL, command)
         else:
             self.run.lost += 1
         return True
@@ -157,13 +158,13 @@ class _Loop:
         if kind is _Kind.DELIVERY:
             (self._sights if isinstance(content, Sight) else self._readings).append(content)
             return True
-        if kind is _Kind.ARRIVAL and content == self.duty:
+        if kind is _Kind.ARRIVAL and content == self.command:
             return True
         if (kind is not _Kind.DECISION or self.controller.knowing) and not self.advance(time):
             return False
         match kind:
             case _Kind.ARRIVAL:
-                self.duty = content
+                self.command = content
             case _Kind.FLOW:
                 self.imposed = content
                 self.plant.impose_flow(content if content else self.still)
@@ -190,7 +191,7 @@ class _Loop:
 
     def switch_off(self) -> None:
         """Switch the drive off, whatever has happened, and follow the robot until it stands."""
-        ended, self.duty = self.run.ended, 0.0
+        ended, self.command = self.run.ended, Command(0.0)
         if self.plant.state.ended == INTERRUPTED:
             self.plant.reset(replace(self.plant.state, ended=""))
         if not self.plant.state.ended:

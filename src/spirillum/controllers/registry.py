@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from spirillum.controllers.axis_task import KeepAxisTask
 from spirillum.controllers.course_tasks import HoldSpeedTask, RideOutTask, SaveBatteryTask
 from spirillum.controllers.stop_task import StopAtTask
 from spirillum.controllers.task import Task
@@ -12,7 +13,8 @@ from spirillum.errors import InputError, did_you_mean
 
 __all__ = ["TASKS", "task_of"]
 
-TASKS: dict[str, type[Task]] = {task.kind: task for task in (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask)}
+_TASKS: tuple[type[Task], ...] = (StopAtTask, HoldSpeedTask, RideOutTask, SaveBatteryTask, KeepAxisTask)
+TASKS = {task.kind: task for task in _TASKS}
 """Tasks by their kinds."""
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["record"]
 
 _SEEN = {"position": "seen_position", "heading": "seen_heading", "body_angle": "seen_body_angle"}
-_SEEN |= {"tail_phase": "seen_tail_phase"}
+_SEEN |= {"tail_phase": "seen_tail_phase", "side": "seen_side", "height": "seen_height"}
 _MEANINGS = {"duty": "duty of the drive up to here; 0 while it is off"}
 
 

@@ -16,7 +16,7 @@ from spirillum.dynamics.plant import Moment
 
 __all__ = ["Drawn", "FlowPulse", "Senses", "draw"]
 
-_STREAMS = ("unknown", "pulse", "camera", "meter", "remote")
+_STREAMS = ("unknown", "pulse", "camera", "meter", "remote", "across")
 _SEEN = ("position", "heading", "body_angle", "tail_phase")
 _LATEST = 0.9
 """Share of a run in which a pulse may begin."""
@@ -90,6 +90,8 @@ class Senses:
             [[getattr(lab.camera, f"{name}_{kind}") for name in _SEEN] for kind in ("noise", "wander")]
         )
         self._wander, self._last = self._camera.standard_normal(4), 0.0
+        self._across = _stream(seed, "across")
+        self._wander_across = self._across.standard_normal(2)
         self._gains = 1.0 + lab.meter.gain_error * self._meter.standard_normal(2)
 
     def sight(self, moment: Moment) -> Sight | None:
@@ -99,15 +101,19 @@ class Senses:
         noise = self._camera.standard_normal((2, 4))
         kept = np.exp(-(moment.time - self._last) / camera.memory)
         self._wander, self._last = kept * self._wander + np.sqrt(1.0 - kept**2) * noise[1], moment.time
+        noise_across = self._across.standard_normal((2, 2))
+        self._wander_across = kept * self._wander_across + np.sqrt(1.0 - kept**2) * noise_across[1]
         if lost or (camera.fails_at is not None and moment.time >= camera.fails_at):
             return None
         errors = (self._sizes[0] * noise[0] + self._sizes[1] * self._wander).tolist()
+        across = self._scale * moment.pose.position[1:] + self._sizes[:, 0] @ [noise_across[0], self._wander_across]
         return Sight(
             moment.time,
             self._scale * float(moment.pose.position[0]) + errors[0],
             moment.values["yaw"] + errors[1],
             moment.values["body_angle"] + errors[2],
             moment.pose.tail_phase + errors[3],
+            *across.tolist(),
         )
 
     def reading(self, moment: Moment) -> Reading:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import nan
 from typing import Protocol
 
 from spirillum.dynamics.plant import Moment
+from spirillum.dynamics.turning_field import Field
 
-__all__ = ["Controller", "News", "Reading", "Sight"]
+__all__ = ["Command", "Controller", "News", "Reading", "Sight"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,20 @@ class Sight:
     """Unwrapped, rad."""
     tail_phase: float
     """Of the tail against the body, unwrapped, rad."""
+    side: float = nan
+    """y of the body's mid-length, m."""
+    height: float = nan
+    """z of the body's mid-length, m; by a second camera, that looks from the side."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What is sent to a robot."""
+
+    duty: float
+    """Of its drive, 0 (off) to 1; a field is on at any duty but 0."""
+    field: Field | None = None
+    """What changes of the field of a magnetic robot."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +77,8 @@ class Controller(Protocol):
     knowing: bool = False
     """Whether it is told the truth."""
 
-    def decide(self, news: News) -> float:
-        """Duty from now on, 0 (off) to 1."""
+    def decide(self, news: News) -> float | Command:
+        """Duty from now on, 0 (off) to 1; for a magnetic robot a command with its field."""
         ...
 
     def estimate(self) -> Mapping[str, float]:

@@ -75,6 +75,8 @@ class Task(Options):
     """What `Score.error` is, in words."""
     error_unit: ClassVar[str]
     """SI."""
+    across: ClassVar[bool] = False
+    """Whether it is about the distance from the tube's axis, not the place along it."""
 
     duration: Annotated[Time, within(0.1, _LONGEST, "s")] | None = None
     """Of a run; None: from the speed that is predicted."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -40,9 +42,9 @@ def control_figure(control: Control) -> Figure:
         add_letters(panels)
         time = control.dataset["time"].values
         target, around = control.task.target(time, float(np.sign(control.speed)))
-        scale = Scale.of(control.dataset["position"].values[:, 0], "m")
+        scale = Scale.of(_path_of(control).true, "m")
         _places(panels[0], control, scale, target, around)
-        _rests(panels[1], control, target, around)
+        _residuals(panels[1], control, target, around)
         _commands(panels[2], control)
         for axes in panels:
             _shade(axes, control)
@@ -68,35 +70,54 @@ def _legend(control: Control) -> list[Line2D]:
         Line2D([], [], color=COLOURS["black"], label="robot"),
         Line2D([], [], color=COLOURS["sky"], marker=".", linestyle="", label="seen"),
     ]
-    if "estimated_position" in control.dataset:
+    if _path_of(control).estimated is not None:
         found.append(Line2D([], [], color=COLOURS["vermillion"], linestyle="--", label="estimated"))
     found.append(Line2D([], [], color=COLOURS["green"], linestyle=(0, (4, 2)), label="aimed at, with what is good"))
     return found
 
 
-def _places(axes: Axes, control: Control, scale: Scale, target: Samples, around: float) -> None:
+class _Path(NamedTuple):
+    """What a task is about: the place along the tube, or the distance from its axis; m."""
+
+    true: Samples
+    seen: Samples
+    estimated: Samples | None
+    words: str
+
+
+def _path_of(control: Control) -> _Path:
     data = control.dataset
+    if not control.task.across:
+        estimated = data["estimated_position"].values if "estimated_position" in data else None
+        return _Path(data["position"].values[:, 0], data["seen_position"].values, estimated, "place x")
+    estimated = None
+    if "estimated_side" in data:
+        estimated = np.hypot(data["estimated_side"].values, data["estimated_height"].values)
+    seen = np.hypot(data["seen_side"].values, data["seen_height"].values)
+    return _Path(np.hypot(*data["position"].values[:, 1:].T), seen, estimated, "distance from the axis")
+
+
+def _places(axes: Axes, control: Control, scale: Scale, target: Samples, around: float) -> None:
+    data, path = control.dataset, _path_of(control)
     time = data["time"].values
     every = max(1, data.sizes["frame_time"] // _MOST_SEEN)
-    seen = data["seen_position"].values[::every]
-    axes.plot(data["frame_time"].values[::every], scale(seen), ".", color=COLOURS["sky"], markersize=2.5)
-    axes.plot(time, scale(data["position"].values[:, 0]), color=COLOURS["black"])
-    if "estimated_position" in data:
-        middle = data["estimated_position"].values
-        axes.plot(data["decision_time"].values, scale(middle), "--", color=COLOURS["vermillion"], linewidth=1.0)
+    axes.plot(data["frame_time"].values[::every], scale(path.seen[::every]), ".", color=COLOURS["sky"], markersize=2.5)
+    axes.plot(time, scale(path.true), color=COLOURS["black"])
+    if path.estimated is not None:
+        axes.plot(data["decision_time"].values, scale(path.estimated), "--", color=COLOURS["vermillion"], linewidth=1.0)
     _aim(axes, time, scale(target), around / scale.factor)
-    axes.set_ylabel(f"place x ({scale.unit})")
+    axes.set_ylabel(f"{path.words} ({scale.unit})")
 
 
-def _rests(axes: Axes, control: Control, target: Samples, around: float) -> None:
-    data = control.dataset
+def _residuals(axes: Axes, control: Control, target: Samples, around: float) -> None:
+    data, path = control.dataset, _path_of(control)
     time = data["time"].values
     scale = Scale.of(np.array([4.0 * around]), "m")
-    rest = data["position"].values[:, 0] - target
+    rest = path.true - target
     axes.plot(time, scale(rest), color=COLOURS["black"])
-    if "estimated_position" in data:
+    if path.estimated is not None:
         when = data["decision_time"].values
-        middle = data["estimated_position"].values - np.interp(when, time, target)
+        middle = path.estimated - np.interp(when, time, target)
         axes.plot(when, scale(middle), "--", color=COLOURS["vermillion"], linewidth=1.0)
         if "estimated_position_error" in data:
             half = 1.96 * data["estimated_position_error"].values
@@ -108,7 +129,7 @@ def _rests(axes: Axes, control: Control, target: Samples, around: float) -> None
         last = scale(np.array([np.nanmin(rest[time > 0.5 * time[-1]]), np.nanmax(rest)]))
         room = 1.3 * around / scale.factor
         axes.set_ylim(max(min(-room, float(last[0])), -4.0 * room), min(max(room, 1.1 * float(last[1])), 4.0 * room))
-    axes.set_ylabel(f"x - aim ({scale.unit})")
+    axes.set_ylabel(f"{'distance' if control.task.across else 'x - aim'} ({scale.unit})")
 
 
 def _aim(axes: Axes, time: Samples, middle: Samples, around: float) -> None:
@@ -118,6 +139,15 @@ def _aim(axes: Axes, time: Samples, middle: Samples, around: float) -> None:
 
 def _commands(axes: Axes, control: Control) -> None:
     data = control.dataset
+    if "field_yaw" in data:
+        for name, colour in (("yaw", "blue"), ("pitch", "orange")):
+            tilt = np.degrees(data[f"field_{name}"].values)
+            axes.step(
+                data["decision_time"].values, tilt, where="post", color=COLOURS[colour], linewidth=1.0, label=name
+            )
+        axes.set_ylabel("field's axis (°)")
+        axes.legend(loc="upper right", ncols=2)
+        return
     axes.step(data["time"].values, data["duty"].values, where="pre", color=COLOURS["blue"], linewidth=1.0)
     axes.set_ylim(-0.08, 1.08)
     axes.set_ylabel("duty")
