@@ -20,7 +20,8 @@ from spirillum.robot.load import with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.swimming.answer import STEADY, Swimming
-from spirillum.swimming.prediction import Prediction, checked_batch, least_gap
+from spirillum.swimming.loading import checked_batch, least_gap
+from spirillum.swimming.prediction import Prediction
 from spirillum.swimming.steady import requirements
 from spirillum.units import KINDS, parse_option, show
 

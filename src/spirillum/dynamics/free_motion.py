@@ -33,7 +33,8 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.answer import Swimming
 from spirillum.swimming.drives import current_at
-from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.swimming.loading import prepared
+from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import Rates, swimming_of
 from spirillum.units import KINDS, parse_option, show

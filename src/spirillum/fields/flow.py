@@ -26,8 +26,9 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
 from spirillum.shown import Shown
+from spirillum.swimming.loading import prepared
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
-from spirillum.swimming.prediction import Prediction, predict, prepared
+from spirillum.swimming.prediction import Prediction, predict
 from spirillum.units import KINDS, Kind, parse_option
 from spirillum.version import versions
 

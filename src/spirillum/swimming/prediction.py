@@ -12,19 +12,16 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_placement, with_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
-from spirillum.fitted.warnings import fitted_of
+from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import all_hold, assembly_limits, broken
-from spirillum.robot.load import load, with_resolution
+from spirillum.robot.limits import broken
+from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
-from spirillum.robot.seat import GAP_SHARE
 from spirillum.shown import Shown
 from spirillum.swimming.answer import STEADY, Intervals, Swimming, headline
 from spirillum.swimming.band import Band, band_of
@@ -33,21 +30,14 @@ from spirillum.swimming.discrepancy import PosteriorFor, posterior_for_of
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
+from spirillum.swimming.loading import prepared
 from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
 from spirillum.swimming.other_models import OtherModels, other_models
-from spirillum.swimming.steady import (
-    calibrated_balance,
-    friction_reading,
-    requirements,
-    speed_difference,
-)
-from spirillum.units import KINDS, parse_option, show
+from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
+from spirillum.units import KINDS, parse_option
 
-__all__ = ["Prediction", "checked_batch", "least_gap", "predict", "prepared"]
-
-_GAP_STEP = 1.02
-"""Ratio of gaps to which the least one that a model resolves is told."""
+__all__ = ["Prediction", "predict"]
 
 
 @dataclass(frozen=True)
@@ -238,7 +228,7 @@ def predict(
     drawn, given = None, Placement.of(placement)
     where = given
     robot = load(robot)
-    unset = robot.friction.effective is None
+    names_friction = robot.friction.effective is not None
     if posterior is not None:
         if calibration is not None or not calibrated:
             raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
@@ -250,71 +240,127 @@ def predict(
         robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
     )
     reading = friction_reading(friction or ready.friction.reading)
-    fitted = fitted_of(calibration, drawn)
-    rate = _rate(tail_rate, batch.placement)
+    rate, fitted = _rate(tail_rate, batch.placement), fitted_of(calibration, drawn)
+    case = _Case(ready, chosen, batch, reading, rate, calibrated, motion, fitted)
     if rate is None and ready.drive is None:
         raise InputError(f"{ready.name} has no [drive]; allowed: a drive, or a tail rate (--tail-rate '1 Hz')")
-
-    def answer(there: RobotBatch, of: SwimmerModel = chosen) -> Swimming:
-        rates = None if rate is None else np.array([rate])
-        asked = {"tail_rate": rates, "friction": reading, "calibrated": calibrated, "motion": motion}
-        return swim_on_floor(there, of, [ready], fitted.dry_friction(of), **asked)
-
     whose = posterior_for_of(posterior_for, drawn, ready)
-    known = None
+    intervals = None
     if drawn is not None:
         from spirillum.swimming.intervals import intervals_of  # loads compiled loops
 
-        known = intervals_of(
+        intervals = intervals_of(
             ready, chosen, drawn, tail_rate=rate, friction=reading, posterior_for=whose, placement=given
         )
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
         tell(f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
-    result = answer(batch)
+    result = case.swim(batch)
     if not result.valid[0]:
-        raise InputError(_why_not(batch, chosen, reading, rate, calibrated=calibrated))
+        raise InputError(case.why_not())
     warnings = [
         *ready.warnings,
         *([choice.caution] if choice.caution else []),
-        *(calibration_warnings(ready, chosen.name) if calibrated else ()),
-        *(limit.sentence() for limit in broken(accuracy_limits(batch, chosen, result))),
-        *drive_warnings(_without_fitted_friction(ready) if unset and rate else ready, chosen, reading, result, rate),
+        *case.warnings(result, names_friction=names_friction),
     ]
-    warnings += _free_warnings(ready, motion)
-    applied = calibrated and chosen.name in ready.calibration
-    check = chosen.checked_by(ready.model)
-    error = (
-        chosen.stated_speed_error(batch) if check is None else float(speed_difference(answer(batch, check), result)[0])
-    )
-    bound = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
-    over = band_of(batch, chosen, result, answer, tell) if bound else None
-    left_out = () if over is None else over.left_out
-    warnings += no_band_warnings(batch, chosen) if band is None and not bound else []
-    if known is not None and whose == "measured":
-        middles = {name: np.array([middle]) for name, middle in known.middle.items() if np.isfinite(middle)}
+    error = case.error_estimate(result)
+    with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
+    over = band_of(batch, chosen, result, case.swim, tell) if with_band else None
+    warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
+    if intervals is not None and whose == "measured":
+        middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
         result = replace(result, **middles)
-    warnings += fitted.idle_warnings([ready], [chosen])
-    if rate is None:
-        warnings += fitted.run_warnings(ready, chosen, reading)
-    else:
-        warnings += fitted.origin_warnings([ready], [chosen])
+    warnings += case.fitted_warnings()
     return Prediction(
-        ready,
-        chosen,
-        reading,
-        applied,
-        batch,
-        result,
-        error,
-        (*warnings, *left_out),
-        known,
-        over,
-        motion_of(motion),
-        _interval_statement(drawn, ready, whose),
+        robot=ready,
+        model=chosen,
+        friction=reading,
+        calibrated=calibrated and chosen.name in ready.calibration,
+        batch=batch,
+        swimming=result,
+        error_estimate=error,
+        warnings=(*warnings, *(() if over is None else over.left_out)),
+        intervals=intervals,
+        band=over,
+        motion=motion_of(motion),
+        interval_of=_interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
     )
+
+
+@dataclass(frozen=True)
+class _Case:
+    """A robot in its place, its model, and all else that its steady motion follows from."""
+
+    robot: Robot
+    model: SwimmerModel
+    batch: RobotBatch
+    friction: FrictionReading
+    rate: float | None
+    """Rate of the tail, rad/s; None: the robot's drive."""
+    calibrated: bool
+    motion: str
+    fitted: Fitted
+
+    def swim(self, batch: RobotBatch, model: SwimmerModel | None = None) -> Swimming:
+        """Steady swimming of the robot in some places, by its model or by another."""
+        model = model or self.model
+        return swim_on_floor(
+            batch,
+            model,
+            [self.robot],
+            self.fitted.dry_friction(model),
+            tail_rate=None if self.rate is None else np.array([self.rate]),
+            friction=self.friction,
+            calibrated=self.calibrated,
+            motion=self.motion,
+        )
+
+    def error_estimate(self, result: Swimming) -> float:
+        """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
+        check = self.model.checked_by(self.robot.model)
+        if check is None:
+            return self.model.stated_speed_error(self.batch)
+        return float(speed_difference(self.swim(self.batch, check), result)[0])
+
+    def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
+        """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.
+
+        Args:
+            result: the answer.
+            names_friction: whether the robot's user has set its effective friction.
+        """
+        known = self.robot if names_friction or not self.rate else _without_fitted_friction(self.robot)
+        return [
+            *(calibration_warnings(self.robot, self.model.name) if self.calibrated else ()),
+            *(limit.sentence() for limit in broken(accuracy_limits(self.batch, self.model, result))),
+            *drive_warnings(known, self.model, self.friction, result, self.rate),
+            *_free_warnings(self.robot, self.motion),
+        ]
+
+    def fitted_warnings(self) -> list[str]:
+        """What to be careful about in what was fitted."""
+        idle = self.fitted.idle_warnings([self.robot], [self.model])
+        if self.rate is None:
+            return [*idle, *self.fitted.run_warnings(self.robot, self.model, self.friction)]
+        return [*idle, *self.fitted.origin_warnings([self.robot], [self.model])]
+
+    def why_not(self) -> str:
+        """Why there is no steady motion."""
+        if self.rate is not None:
+            paper = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x"
+            return (
+                f"tail-rate = {self.rate:.4g} rad/s: motor and battery have no steady state there; allowed: a rate at "
+                f"which (17) has a root with a positive battery voltage{paper if self.friction == 'paper' else ''}"
+            )
+        if self.friction == "paper":
+            limit = calibrated_balance(self.batch, self.model, calibrated=self.calibrated).bb[0]
+            return (
+                f"friction.effective = {self.batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
+                f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
+            )
+        return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
 
 
 def _interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: PosteriorFor) -> str:
@@ -336,81 +382,6 @@ def _without_fitted_friction(robot: Robot) -> Robot:
     return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": None})})
 
 
-def prepared(
-    robot: str | Path | Mapping[str, Any] | Robot,
-    model: str,
-    *,
-    calibration: str | Path | None = None,
-    resolution: Resolution | Mapping[str, Any] | None = None,
-    placement: Placement | Mapping[str, Any] | None = None,
-) -> tuple[Robot, SwimmerModel, RobotBatch]:
-    """A loaded robot with its model and batch, in its place and inside the model's domain; arguments as `predict`.
-
-    Raises:
-        InputError: for wrong input, or a robot outside the model's domain.
-    """
-    ready = load(robot)
-    if calibration is not None:
-        ready = with_calibration(ready, calibration)
-        if not placement and find_swimmer_model(model).placed:
-            placement = calibrated_placement(ready, calibration)
-    ready = with_resolution(ready, resolution, model)
-    chosen = find_swimmer_model(model)
-    placed = Placement.of(placement)
-    known = RobotBatch.of(ready, placed)
-    if np.all(all_hold(assembly_limits(known))):  # a table reaches closer to the wall than a direct solution
-        chosen = quickest(chosen, known)
-    return ready, chosen, checked_batch(ready, chosen, placed)
-
-
-def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None = None) -> RobotBatch:
-    """The robot in its place, as a batch of one.
-
-    Raises:
-        InputError: if it is outside the model's domain, or placed for a model that does not compute the walls.
-    """
-    batch = RobotBatch.of(robot, placement)
-    check_placement(batch.placement, model)
-    outside = broken(requirements(batch, quickest(model, batch)))
-    if outside:
-        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_least_gap(batch, model)}")
-    return batch
-
-
-def _least_gap(batch: RobotBatch, model: SwimmerModel) -> str:
-    """Where only a thin film keeps a model from an answer: the least gap that it resolves, and what else helps."""
-    least = least_gap(batch, model) if model.placed else float("nan")
-    if not np.isfinite(least):
-        return ""
-    return f"; here at least placement.gap = {show(least, 'mm')}, or a table (`spirillum prepare`)"
-
-
-def least_gap(batch: RobotBatch, model: SwimmerModel) -> float:
-    """Least gap that a model resolves where only the film is too thin for it, to 2 %, m; NaN where that is not so.
-
-    It is looked for between the gap that is asked for and the one that is taken where none is.
-
-    Args:
-        batch: one robot in its place.
-        model: a model that computes the walls.
-    """
-    asked = batch.placement.gap
-    if asked is None:
-        return float("nan")
-
-    def fits(gap: float) -> bool:
-        placed = batch.placement.model_copy(update={"gap": gap})
-        return not broken(requirements(replace(batch, placement=placed), model))
-
-    low, high = asked, GAP_SHARE * 0.5 * float(batch.body_diameter[0])
-    if low >= high or not fits(high):
-        return float("nan")
-    while high > _GAP_STEP * low:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if fits(middle) else (middle, high)
-    return high
-
-
 def _rate(value: str | float | None, placement: Placement) -> float | None:
     if value is None:
         return None
@@ -418,24 +389,6 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
     if rate == 0 and not placement.flow:
         raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
     return rate
-
-
-def _why_not(
-    batch: RobotBatch, model: SwimmerModel, reading: FrictionReading, rate: float | None, *, calibrated: bool
-) -> str:
-    if rate is not None:
-        slow = ", and with friction reading 'paper' not so slow that B_eff exceeds E_x" if reading == "paper" else ""
-        return (
-            f"tail-rate = {rate:.4g} rad/s: motor and battery have no steady state there; allowed: a rate at which "
-            f"(17) has a root with a positive battery voltage{slow}"
-        )
-    if reading == "paper":
-        limit = calibrated_balance(batch, model, calibrated=calibrated).bb[0]
-        return (
-            f"friction.effective = {batch.effective_friction[0]:.4g} N m s/rad; allowed: less than "
-            f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
-        )
-    return f"model '{model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
 
 
 def _free_warnings(robot: Robot, motion: str) -> list[str]:

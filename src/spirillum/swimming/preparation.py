@@ -22,7 +22,7 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
-from spirillum.swimming.prediction import prepared
+from spirillum.swimming.loading import prepared
 
 __all__ = ["Prepared", "preparations_answer", "prepare", "prepare_all"]
 
