@@ -14,7 +14,7 @@ def points(count: int = 200, seed: int = 0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, {"tilt_x": 0.03, "tilt_y": -0.05, "rotation": 0.1}, {"k1": -0.1, "k2": 0.03}, {"leftward": True}]
+    "changes", [{}, {"tilt_x": 0.03, "tilt_y": -0.05, "rotation": 0.1}, {"k1": -0.1, "k2": 0.03}, {"direction": "left"}]
 )
 def test_a_pixel_shows_the_point_that_appears_there(changes):
     optics = UPRIGHT.moved(changes)
@@ -54,7 +54,7 @@ def test_a_tilt_shifts_the_picture_as_a_rotation_does():
 
 
 def test_leftward_is_the_picture_turned_by_half_a_turn():
-    turned = UPRIGHT.moved({"leftward": True}).pixels(points())
+    turned = UPRIGHT.moved({"direction": "left"}).pixels(points())
     assert turned == pytest.approx(np.array([639.0, 479.0]) - UPRIGHT.pixels(points()), abs=1e-9)
 
 

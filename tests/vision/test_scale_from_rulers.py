@@ -112,9 +112,9 @@ def test_pictures_without_a_ruler_show_none():
     assert lines_in(tubes, BOUNDS) is None
 
 
-def test_a_portrait_film_is_told_to_be_turned() -> None:
+def test_a_portrait_film_names_the_directions_it_may_have() -> None:
     film = Video(Path("portrait.mp4"), SIZE[::-1], 1.0, 30.0)
-    with pytest.raises(InputError, match=r"along the columns of the picture.*turn the film by a quarter"):
+    with pytest.raises(InputError, match=r"ruler along the columns of the picture; allowed: 'up' or 'down'"):
         sight_of(film, setup(), np.rot90(ruler(camera())), None)
 
 

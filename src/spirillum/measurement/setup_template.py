@@ -60,7 +60,7 @@ _SECTIONS: dict[str, tuple[tuple[str, str, str], ...]] = {
         ("file", '"biorob2012-wide"', "a preset, or a robot file beside this one"),
         ("axis_height", '"13 mm"', "of the robot's axis"),
         ("axis_height_uncertainty", '"1 mm"', ""),
-        ("direction", '"right"', 'where in the picture the nose points: "right" or "left"'),
+        ("direction", '"right"', 'where in the picture the nose points: "right", "left", "up" or "down"'),
         ("# stripes", '["red", "yellow"]', "colours in their order, if not those of the robot file"),
     ),
     "# region": (

@@ -111,7 +111,7 @@ class RobotSetup(Section):
     """Height of the robot's axis above the reference plane."""
     axis_height_uncertainty: LengthOrZero = 0.0
     """Standard uncertainty of that height: 10 mm of depth can be 7 % of scale."""
-    direction: Literal["right", "left"] = "right"
+    direction: Literal["right", "left", "up", "down"] = "right"
     """Where in the picture the nose points."""
     stripes: Stripes | None = None
     """Colours of the stripes in their order, from the first one towards -y, if they are not those of the robot file."""

@@ -9,7 +9,8 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.checkerboard import lens_of
-from spirillum.vision.camera.ruler import lines_in, still_picture
+from spirillum.vision.camera.optics import DIRECTIONS
+from spirillum.vision.camera.ruler import ruler_in, still_picture
 from spirillum.vision.camera.scale import Sight, fitted_camera, given_camera
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Frame, Video, open_video
@@ -99,16 +100,18 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) ->
     if setup.markers.spacing is None:
         return given_camera(setup, video.size, lens)
     bounds = bounds_of(setup, video)
-    lines = lines_in(still, bounds)
+    lines = ruler_in(still, bounds, -DIRECTIONS[setup.robot.direction])
     if lines is None:
-        left, top, right, bottom = bounds
-        if lines_in(np.swapaxes(still, 0, 1), (top, left, bottom, right)) is not None:
+        side = setup.robot.direction
+        if ruler_in(still, bounds, 0.5 * np.pi - DIRECTIONS[side]) is not None:
+            across, other = ("columns", ("up", "down")) if side in ("right", "left") else ("rows", ("right", "left"))
             raise InputError(
-                f"{video.name} shows its ruler along the columns of the picture; allowed: a channel along the rows: "
-                "turn the film by a quarter, so that the nose points to the side that robot.direction says"
+                f"robot.direction = '{side}', but {video.name} shows its ruler along the {across} of the picture; "
+                f"allowed: '{other[0]}' or '{other[1]}', where the nose points"
             )
         raise InputError(
-            f"{video.name} shows no ruler: no equally spaced lines across the direction of swimming were found; "
-            "allowed: a ruler and a channel along the rows of the picture, or markers.length_per_pixel"
+            f"{video.name} shows no ruler: no equally spaced lines across the direction of swimming were found, where "
+            f"the nose points {side} within 45 degrees; allowed: a ruler, robot.direction as it is in the picture, or "
+            "markers.length_per_pixel"
         )
     return fitted_camera(setup, video.size, lines, lens)

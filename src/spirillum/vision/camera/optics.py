@@ -15,7 +15,15 @@ from spirillum.vision.setup import Setup
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-__all__ = ["BodyPose", "Optics", "optics_of", "placed", "places_seen_by", "seen"]
+__all__ = ["DIRECTIONS", "BodyPose", "Optics", "opposite", "optics_of", "placed", "places_seen_by", "seen"]
+
+DIRECTIONS = {"right": 0.0, "left": -np.pi, "up": 0.5 * np.pi, "down": -0.5 * np.pi}
+"""Angle by which each direction in the picture lies against the clock from the right, rad."""
+
+
+def opposite(direction: str) -> str:
+    """The other end of a direction in the picture."""
+    return {"right": "left", "left": "right", "up": "down", "down": "up"}[direction]
 
 
 class BodyPose(NamedTuple):
@@ -35,8 +43,8 @@ class Optics:
 
     The frame has x along the channel towards the nose, z from the reference plane towards the camera, y = z x x; the
     lens is at (0, 0, height). Pixels (u right, v down) have their centres at integer coordinates. Without tilts the
-    camera looks along -z with x to the right, or to the left for `leftward`. It is rotated by `rotation` about its
-    optical axis, then by `tilt_y` about y, then by `tilt_x` about x.
+    camera looks along -z with x towards `direction` in the picture. It is rotated by `rotation` about its optical axis,
+    then by `tilt_y` about y, then by `tilt_x` about x.
     """
 
     size: tuple[int, int]
@@ -63,13 +71,13 @@ class Optics:
     """Radial distortion: r, the tangent of the angle to the optical axis, becomes r (1 + k1 r^2 + k2 r^4)."""
     k2: float = 0.0
     """Radial distortion of fourth order."""
-    leftward: bool = False
-    """Whether x points to the left in the picture."""
+    direction: str = "right"
+    """Where in the picture x points: one of `DIRECTIONS`."""
 
     @cached_property
     def numbers(self) -> Samples:
         """Parameters for the compiled loops, (17,): focal, u, v, k1, k2, height, surface, index, rotation matrix."""
-        turn = self.rotation + (np.pi if self.leftward else 0.0)
+        turn = self.rotation - DIRECTIONS[self.direction]
         (c_x, s_x), (c_y, s_y), (c_z, s_z) = ((np.cos(a), np.sin(a)) for a in (self.tilt_x, self.tilt_y, turn))
         about_x = np.array([[1.0, 0.0, 0.0], [0.0, c_x, -s_x], [0.0, s_x, c_x]])
         about_y = np.array([[c_y, 0.0, s_y], [0.0, 1.0, 0.0], [-s_y, 0.0, c_y]])
@@ -80,6 +88,11 @@ class Optics:
         surface, index = (self.surface, self.index) if refracts else (-1e30, 1.0)
         head = [self.focal, u, v, self.k1, self.k2, self.height, surface, index]
         return np.concatenate([np.array(head, dtype=float), axes.ravel()])
+
+    @property
+    def upright(self) -> bool:
+        """Whether the channel runs along the picture's columns rather than its rows."""
+        return self.direction in ("up", "down")
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -132,7 +145,7 @@ def optics_of(setup: Setup, size: tuple[int, int], focal: float) -> Optics:
         axis_height=setup.robot.axis_height,
         surface=setup.tank.surface,
         index=setup.tank.index,
-        leftward=setup.robot.direction == "left",
+        direction=setup.robot.direction,
     )
 
 

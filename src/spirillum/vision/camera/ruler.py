@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.extras import required
 
-__all__ = ["Lines", "lines_in", "still_picture"]
+__all__ = ["Lines", "lines_in", "ruler_in", "still_picture"]
 
 _SHORTEST = 3.0
 """Shortest resolved distance of lines, pixels."""
@@ -27,6 +28,10 @@ _CLEAR = 8.0
 """Least height of the ruler's spectral peak over the local median of the spectrum."""
 _CHANNELS = (0.299, 0.587, 0.114), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 """Channels in which a ruler is searched, as weights of red, green and blue: brightness, then single colours."""
+_ROLLS = tuple(math.radians(sign * angle) for angle in (7.0, 14.0, 21.0, 28.0, 35.0, 42.0) for sign in (1.0, -1.0))
+"""Rolls of the camera that are tried where no ruler lies as it should, rad."""
+_UPRIGHT = math.radians(6.0)
+"""Roll up to which lines are taken as they were found, rad; beyond it they are taken along the channel."""
 _BAND = 16
 """Rows sorted at once, so that they stay in the cache."""
 
@@ -92,7 +97,7 @@ def _sorting(count: int) -> list[tuple[int, int]]:
     return pairs
 
 
-def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | None:
+def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:
     """Detect a ruler in a static picture; None if there is none.
 
     The local phase of the lines' fundamental wave is computed in a Gaussian window, which avoids pixel locking, and
@@ -101,18 +106,55 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int]) -> Lines | Non
     Args:
         picture: 0 to 255, (h, w, 3).
         bounds: region of interest: left, top, right, bottom; the last two are exclusive.
+        turn: angle of the channel to the rows, positive downwards to the right, rad, to some degrees.
     """
     left, top, right, bottom = bounds
-    colours = picture[top:bottom, left:right].astype(np.float32)
+    colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32)
+    back = None
+    if turn:
+        colours, back = _turned(colours, turn)
     for weights in _CHANNELS:
-        found = _lines_of(np.ascontiguousarray(colours @ np.array(weights, dtype=np.float32)), left, top)
+        found = _lines_of(np.ascontiguousarray(colours @ np.array(weights, dtype=np.float32)))
         if found is not None:
-            return found
+            pixels = found.pixels if back is None else found.pixels @ back[:, :2].T + back[:, 2]
+            return found._replace(pixels=pixels + np.array([left, top], dtype=float))
     return None
 
 
-def _lines_of(part: Samples, left: int, top: int) -> Lines | None:
-    """Detect a ruler in one channel of a region, (h, w), whose corner is at column `left` and row `top`."""
+def ruler_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:
+    """Detect a ruler at any roll of the camera; None if there is none.
+
+    Args:
+        picture: 0 to 255, (h, w, 3).
+        bounds: region of interest: left, top, right, bottom; the last two are exclusive.
+        turn: angle of the channel to the rows, positive downwards to the right, rad; off by up to 45 degrees.
+    """
+    found = lines_in(picture, bounds, turn)
+    if found is None:
+        tried = [one for roll in _ROLLS if (one := lines_in(picture, bounds, turn + roll)) is not None]
+        found = max(tried, key=lambda one: len(one.number), default=None)
+    if found is None or abs(math.remainder(found.roll - turn, math.pi)) < _UPRIGHT:
+        return found
+    return lines_in(picture, bounds, found.roll) or found
+
+
+def _turned(part: np.ndarray, turn: float) -> tuple[np.ndarray, Samples]:
+    """A picture turned against the clock, and the map from its pixels to those of the first one, (2, 3)."""
+    cv2 = required("cv2", "measuring a video", "video")
+    height, width = part.shape[:2]
+    c, s = abs(math.cos(turn)), abs(math.sin(turn))
+    size = math.ceil(c * width + s * height), math.ceil(s * width + c * height)
+    matrix = cv2.getRotationMatrix2D((0.5 * (width - 1), 0.5 * (height - 1)), math.degrees(turn), 1.0)
+    matrix[:, 2] += 0.5 * (size[0] - width), 0.5 * (size[1] - height)
+    ground = np.median(part.reshape(-1, 3), axis=0).tolist()
+    turned = cv2.warpAffine(
+        part, matrix, size, flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_CONSTANT, borderValue=ground
+    )
+    return np.asarray(turned), np.asarray(cv2.invertAffineTransform(matrix))
+
+
+def _lines_of(part: Samples) -> Lines | None:
+    """Detect a ruler in one channel of a region, (h, w)."""
     cv2 = required("cv2", "measuring a video", "video")
     flat = part / np.maximum(cv2.GaussianBlur(part, (0, 0), 15.0), 1.0) - 1.0
     flat = np.clip(flat, -0.6, 0.6)
@@ -153,7 +195,7 @@ def _lines_of(part: Samples, left: int, top: int) -> Lines | None:
     if not pieces:
         return None
     u, v, number, strip = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    found = Lines(np.stack([u + left, v + top], axis=1), number, strip, distance)
+    found = Lines(np.stack([u, v], axis=1), number, strip, distance)
     return found if found.lines + 2 * 2.5 * _WINDOW >= _FEWEST else None
 
 

@@ -12,12 +12,12 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robust import mad_scale
 from spirillum.vision.camera.checkerboard import Lens
-from spirillum.vision.camera.optics import Optics, optics_of
+from spirillum.vision.camera.optics import DIRECTIONS, Optics, optics_of
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 
-__all__ = ["Scale", "Sight", "fitted_camera", "given_camera", "with_source"]
+__all__ = ["Scale", "Sight", "first_rotation", "fitted_camera", "given_camera", "with_source"]
 
 _PRIOR_TILT = 0.1
 """Prior standard deviation of the camera's tilts, rad."""
@@ -33,6 +33,8 @@ _MODEL = 3e-4
 """Relative standard uncertainty of lengths by the models of lens and body, with an exact setup.
 
 Assumed; on rendered films with an exact setup, errors of the speed are below 0.02 %."""
+_SMALL_ROLL = 0.1
+"""Roll from which on the fit does not begin with an upright camera, rad."""
 _STEP = 1e-3
 """Relative step of numerical derivatives."""
 
@@ -100,6 +102,7 @@ def fitted_camera(setup: Setup, size: tuple[int, int], lines: Lines, lens: Lens 
     assert height is not None  # noqa: S101
     start = _with_lens(optics_of(setup, size, float(size[0])), lens)
     start = start.moved({"focal": _first_focal(start, lines, spacing, height)})
+    start = start.moved({"rotation": first_rotation(start, lines)})
     fit = _Fit(lines, distorted=lens is None and float(np.ptp(lines.pixels[:, 0])) > 0.6 * size[0])
     optics, residual, own = fit.run(start, spacing, height)
     ratio = optics.focal / size[0]
@@ -159,6 +162,18 @@ def _first_focal(optics: Optics, lines: Lines, spacing: float, height: float) ->
     return optics.focal * lines.distance / float(np.hypot(*(seen[1] - seen[0])))
 
 
+def first_rotation(optics: Optics, lines: Lines) -> float:
+    """Rotation of the camera, by the angle of the channel against the stated direction, rad; 0 where it is small.
+
+    Args:
+        optics: the camera, without rotation.
+        lines: of the ruler.
+    """
+    off = -DIRECTIONS[optics.direction] - lines.roll  # both clockwise, as rows count downwards
+    off -= np.pi * round(off / np.pi)  # lines are counted in either sense
+    return 0.0 if abs(off) < _SMALL_ROLL else float(off)
+
+
 class _Fit:
     """Robust least squares fit of the camera's parameters, with a free offset of each strip."""
 
@@ -169,6 +184,8 @@ class _Fit:
         )
         _, self.strip = np.unique(lines.strip, return_inverse=True)
         self.strips = int(self.strip.max()) + 1
+        self.sense = 1.0
+        """1 where the lines are counted towards the nose, -1 where they are counted away from it."""
         self.scale = _LINE_ERROR * np.sqrt(_CORRELATED)
 
     def _optics(self, numbers: Samples, start: Optics) -> Optics:
@@ -181,7 +198,7 @@ class _Fit:
     def _residuals(self, numbers: Samples, start: Optics, spacing: float, height: float) -> Samples:
         """Residual of each point of the ruler, pixels, (n,)."""
         x = self._optics(numbers, start).points(self.lines.pixels, height)[:, 0] / spacing
-        x = np.nan_to_num(-x if start.leftward else x, nan=1e3)
+        x = np.nan_to_num(self.sense * x, nan=1e3)
         gap = x - self.lines.number
         offsets = np.bincount(self.strip, weights=gap, minlength=self.strips) / np.bincount(self.strip)
         return np.asarray((gap - offsets[self.strip]) * self.lines.distance)
@@ -189,6 +206,9 @@ class _Fit:
     def run(self, start: Optics, spacing: float, height: float) -> tuple[Optics, float, float]:
         """The fitted camera, the root mean square residual, pixels, and the relative standard error of its scale."""
         from scipy.optimize import least_squares
+
+        x = start.points(self.lines.pixels, height)[:, 0]
+        self.sense = float(np.sign(np.nansum((x - np.nanmean(x)) * (self.lines.number - self.lines.number.mean()))))
 
         prior_width = np.array([_PRIOR_TILT, _PRIOR_TILT, 10.0, _PRIOR_K1])[: len(self.names) - 1]
         start_values = np.array([start.tilt_x, start.tilt_y, 0.0, start.k1])[: len(self.names) - 1]

@@ -12,7 +12,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robust import least_squares_line
-from spirillum.vision.camera.optics import BodyPose, places_seen_by
+from spirillum.vision.camera.optics import BodyPose, opposite, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, VISIBILITY
@@ -91,7 +91,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     found = _places(body, images, still)
     if not _clear(found):
         if _clear(_places(body, images, still, turn=np.pi)):
-            side, other = ("left", "right") if body.optics.leftward else ("right", "left")
+            side, other = body.optics.direction, opposite(body.optics.direction)
             raise InputError(
                 f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
                 f"the other side; allowed: '{other}', if it points there"

@@ -17,9 +17,9 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import bounds_of, samples_of
-from spirillum.vision.camera.optics import Optics
-from spirillum.vision.camera.ruler import Lines, lines_in, still_picture
-from spirillum.vision.camera.scale import given_camera
+from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
+from spirillum.vision.camera.ruler import Lines, ruler_in, still_picture
+from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, SCOUTING
@@ -29,8 +29,6 @@ from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.video.frames import Frame, Video
 
 __all__ = ["Scouted", "Walls", "scouted"]
-
-_DIRECTIONS = ("right", "left")
 
 
 class Walls(NamedTuple):
@@ -91,13 +89,25 @@ def scouted(video: Video, robot: Robot, spacing: float | None = None) -> Scouted
     anywhere = _setup(robot, video.size, 1e-4, "right")
     frames = samples_of(video, anywhere.start, anywhere.end)
     still = still_picture([frame.image for frame in frames])
-    lines = lines_in(still, bounds_of(anywhere, video))
+    lines, directions = _ruler(still, bounds_of(anywhere, video))
     for guess in _guesses(robot, video.size, lines, spacing):
-        for direction, known in _found_at(video, robot, guess, frames, still):
+        for direction, known in _found_at(video, robot, (guess, lines, directions), frames, still):
             stripes = _stripes_seen(robot, known)
             walls = _walls(still, known, lines)
             return Scouted(lines, known, direction, stripes, walls, frames)
     return Scouted(lines, None, "right", (), None, frames)
+
+
+def _ruler(still: Samples, bounds: tuple[int, int, int, int]) -> tuple[Lines | None, tuple[str, ...]]:
+    """The ruler, and the directions in which the nose may point."""
+    along = {side: ruler_in(still, bounds, -DIRECTIONS[side]) for side in ("right", "down")}
+    known = [(len(lines.number), side, lines) for side, lines in along.items() if lines is not None]
+    if not known:
+        left, top, right, bottom = bounds
+        sides = ("right", "left", "up", "down")
+        return None, sides if right - left >= bottom - top else sides[::-1]
+    _, side, lines = max(known, key=lambda one: one[0])
+    return lines, (side, opposite(side))
 
 
 def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
@@ -124,13 +134,21 @@ def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: 
 
 
 def _found_at(
-    video: Video, robot: Robot, guess: float, frames: list[Frame], still: Samples
+    video: Video,
+    robot: Robot,
+    guess: tuple[float, Lines | None, tuple[str, ...]],
+    frames: list[Frame],
+    still: Samples,
 ) -> Iterator[tuple[str, Identified]]:
     """The robot near a guessed scale, with the direction of its nose; then at half to twice of it."""
     finders = {}
-    for direction in _DIRECTIONS:
-        setup = _setup(robot, video.size, guess, direction)
-        finders[direction] = setup, BodyFinder(robot, given_camera(setup, video.size).optics, bounds_of(setup, video))
+    pixel, lines, directions = guess
+    for direction in directions:
+        setup = _setup(robot, video.size, pixel, direction)
+        optics = given_camera(setup, video.size).optics
+        if lines is not None:
+            optics = optics.moved({"rotation": first_rotation(optics, lines)})
+        finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
     for sized in (False, True):
         for direction, (setup, finder) in finders.items():
             size = best_other_size(finder, [frame.image for frame in frames], still) if sized else 1.0
@@ -180,8 +198,12 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     body = known.start.body
     optics, diameter = body.optics, body.robot.body.diameter
     poses = np.array([pose for _, pose in known.start.path])
-    angle = float(np.median(poses[:, 2])) if lines is None else -lines.roll
-    way, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    way = np.array([np.cos(heading := float(np.median(poses[:, 2]))), np.sin(heading)])
+    if lines is not None:
+        along = 50.0 * np.array([[-np.cos(lines.roll), -np.sin(lines.roll)], [np.cos(lines.roll), np.sin(lines.roll)]])
+        first, last = optics.points(along + np.array(optics.middle), optics.axis_height)[:, :2]
+        way = (last - first) / np.linalg.norm(last - first)
+    side = np.array([-way[1], way[0]])
     centre = np.median(poses[:, :2], axis=0)
     centre = centre + way * ((optics.origin[:2] - centre) @ way)
     step = optics.length_per_pixel

@@ -44,6 +44,9 @@ def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> View:
         ruled: whether a ruler is in the picture.
     """
     still, bounds = still_picture(list(images)), start.body.bounds
+    if start.body.optics.upright:  # the channel's shift is looked for along the rows
+        left, top, right, bottom = bounds
+        still, bounds = np.ascontiguousarray(np.swapaxes(still, 0, 1)), (top, left, bottom, right)
     return View(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start)))
 
 
@@ -89,11 +92,12 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
 
 
 def _rows_of(start: Start) -> tuple[int, int]:
-    """First and last row of the picture that the robot ever covers."""
+    """First and last row of the picture that the robot ever covers; columns, where the channel runs along these."""
     body = start.body
     wide = max(0.5 * body.robot.body.diameter, body.robot.tail.amplitude) + body.robot.tail.wire_diameter
     sides = np.array([[0.0, -wide, 0.0], [0.0, wide, 0.0]])
-    rows = [seen(sides, pose, body.optics)[:, 1] for _, pose in start.path]
+    across = 0 if body.optics.upright else 1
+    rows = [seen(sides, pose, body.optics)[:, across] for _, pose in start.path]
     low, high = np.nanmin(rows) - STEADINESS.rows_beside, np.nanmax(rows) + STEADINESS.rows_beside
     return max(0, int(low)), max(0, int(high))
 

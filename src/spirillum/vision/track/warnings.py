@@ -74,7 +74,7 @@ def turned_flags(
         turned = _turned(body, seen, still)
     if turned <= VISIBILITY.turned:
         return ()
-    side = "left" if body.optics.leftward else "right"
+    side = body.optics.direction
     sentence = (
         f"the nose is on the other side than robot.direction = '{side}' says: turned round, it fits {turned:.2g} times "
         "better; all signs would be wrong, so that nothing is given"
