@@ -18,7 +18,7 @@ from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.learning import Stretch, learnt
 from spirillum.controllers.loop import run_loop
-from spirillum.controllers.sensors import drawn
+from spirillum.controllers.sensors import draw
 from spirillum.controllers.stopping import Timed
 
 LAB = {
@@ -45,7 +45,7 @@ def main() -> None:
     paths = bank.paths()
     found: dict[tuple[str, float], list[tuple[bool, float, float]]] = {}
     for seed in range(seeds):
-        truth = drawn(lab.unknown, lab.pulse, seed, DURATION)
+        truth = draw(lab.unknown, lab.pulse, seed, DURATION)
         always = Timed(lab, 10.0 * DURATION, 1.0)
         run = run_loop(plant_of(robot, {}, truth), always, lab, DURATION, seed=seed, flow=truth.pulse)
         for end in ENDS:
