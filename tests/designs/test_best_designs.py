@@ -229,6 +229,17 @@ def test_intervals_of_the_probability_hold_it() -> None:
     assert np.mean(held) >= 0.9
 
 
+def test_a_design_that_is_about_to_step_out_says_so() -> None:
+    vary = {"tail.amplitude": "1 mm:5 mm"}
+    best = sp.design("magnetic-helix", vary, maximise="forward_velocity", model="rft")
+    rate = sp.load("magnetic-helix").magnetic.rotation_rate  # type: ignore[union-attr]
+    assert rate / best.quantities["step_out_rate"] > 0.95
+    assert any("of the step-out rate" in line for line in best.warnings)
+    room = ["step_out_rate >= 1.2 Hz"]
+    safe = sp.design("magnetic-helix", vary, maximise="forward_velocity", model="rft", subject_to=room)
+    assert not any("of the step-out rate" in line for line in safe.warnings)
+
+
 def test_conditions_have_the_units_of_their_quantity() -> None:
     condition = condition_of("motor_current <= 400 mA")
     assert (condition.relation, condition.bound) == ("<=", 0.4)

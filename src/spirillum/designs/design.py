@@ -31,7 +31,7 @@ from spirillum.swimming.answer import LEVEL, STEADY, Swimming
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.steady import friction_reading
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["design"]
 
@@ -42,6 +42,8 @@ _SETS = 16
 _NEAR = 0.1
 """The runner-up differs from the best design by at least this share of a range."""
 _FRONT_POINTS = 13
+_MOST_OF_STEP_OUT = 0.95
+"""Share of the step-out rate above which a warning says how little room there is."""
 _STATED_SEED = 7919
 """Added to the seed for the draws of what is stated."""
 
@@ -347,7 +349,22 @@ def _warnings(
     if not {"friction.effective", "friction", "shared_friction"} & set(unknown):
         reading = friction_reading(given.friction.reading)
         found += drive_warnings(stated.space.robot, stated.model, reading, swum, stated.tail_rate)
+    found += _near_step_out(_built(given, stated.space, best), swum)
     found += [limit.sentence() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     if any("end of its range" in words for words in bound_by):
         found.append("the best design lies at the end of a range: a wider one may hold a better design")
     return tuple(dict.fromkeys(found))
+
+
+def _near_step_out(robot: Robot, swum: Swimming) -> list[str]:
+    """That the best design hardly follows its field: it is the fastest just before it slips."""
+    if robot.magnetic is None:
+        return []
+    share = abs(robot.magnetic.rotation_rate) / float(np.min(np.abs(swum.step_out_rate)))
+    if not share > _MOST_OF_STEP_OUT:
+        return []
+    room = show(1.2 * abs(robot.magnetic.rotation_rate), "Hz")
+    return [
+        f"at the best design the field turns at {100 * share:.3g} % of the step-out rate, beyond which the robot slips "
+        f"behind it: --subject-to 'step_out_rate >= {room}' leaves room"
+    ]
