@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from spirillum.fields.flow import flow as flow
     from spirillum.fluid.resistance import Resistance as Resistance
     from spirillum.fluid.resistance import resistance as resistance
+    from spirillum.interfaces.bench import Bench as Bench
     from spirillum.interfaces.python_control import LinearSystem as LinearSystem
     from spirillum.interfaces.python_control import control_system as control_system
     from spirillum.interfaces.python_control import linear_system as linear_system
@@ -106,6 +107,7 @@ _HOME = {
     "Resistance": "spirillum.fluid.resistance",
     "Robot": "spirillum.robot.robot",
     "RobotBatch": "spirillum.robot.batch",
+    "Bench": "spirillum.interfaces.bench",
     "SerialRemote": "spirillum.interfaces.serial_remote",
     "Settling": "spirillum.dynamics.settling",
     "Suggestion": "spirillum.calibration.suggest",

@@ -21,6 +21,7 @@ class ToyState:
     x: float = 0.0
     flow: float | None = None
     ended: str = ""
+    command: float = 1.0
 
 
 @dataclass

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +15,7 @@ from spirillum.cli.options import Eccentricity, Ends, Gap, Json, Pitch, RobotArg
 
 if TYPE_CHECKING:
     from spirillum.controllers.lab import Lab
+    from spirillum.controllers.sensors import Senses
 
 __all__ = ["control"]
 
@@ -20,6 +23,7 @@ _TASK = "Task"
 _LAB = "Laboratory"
 _SCORES = "Seeds and scores"
 _PICTURES = "Pictures"
+_EYES = ("model", "tracker")
 
 
 def _complete_tasks(incomplete: str) -> list[str]:
@@ -40,6 +44,10 @@ def _complete_laws(incomplete: str) -> list[str]:
     from spirillum.controllers.steering import Law
 
     return starting(get_args(Law), incomplete)
+
+
+def _complete_eyes(incomplete: str) -> list[str]:
+    return starting(_EYES, incomplete)
 
 
 def control(
@@ -114,6 +122,22 @@ def control(
         bool,
         typer.Option("--learn", help="Estimate friction and gap beside the controller.", rich_help_panel=_LAB),
     ] = False,
+    seen_by: Annotated[
+        str,
+        typer.Option(
+            autocompletion=_complete_eyes,
+            help="model: the camera of the lab; tracker: pictures of the virtual camera, tracked.",
+            rich_help_panel=_LAB,
+        ),
+    ] = "model",
+    remote: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PORT",
+            help="Send the commands through a remote at a serial port, too; virtual: one made for the run.",
+            rich_help_panel=_LAB,
+        ),
+    ] = None,
     live: Annotated[
         bool, typer.Option("--live", help="Run at the pace of the clock on the wall.", rich_help_panel=_LAB)
     ] = False,
@@ -167,6 +191,7 @@ def control(
             learn=learn,
             workers=workers,
             live=live,
+            bench=_bench(seen_by, remote),
             progress=progress,
         )
         files: dict[str, Any] = {"file": None if output is None else str(output)}
@@ -186,6 +211,23 @@ def control(
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)
     if found.interrupted:
         raise KeyboardInterrupt
+
+
+def _bench(seen_by: str, port: str | None) -> Callable[..., Senses] | None:
+    """What makes camera and remote of a run; None: the modelled ones.
+
+    Raises:
+        InputError: for other eyes.
+    """
+    from spirillum.errors import InputError
+
+    if seen_by not in _EYES:
+        raise InputError(f"seen-by = {seen_by[:40]!r}; allowed: {', '.join(_EYES)}")
+    if seen_by == "model" and port is None:
+        return None
+    from spirillum.interfaces.bench import Bench
+
+    return partial(Bench, tracked=seen_by == "tracker", port=port)
 
 
 def _lab(path: Path | None, changes: list[str] | None) -> Lab:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time as clock
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,7 @@ from spirillum.controllers.loop import LoopRun
 from spirillum.controllers.registry import task_of
 from spirillum.controllers.run_record import record
 from spirillum.controllers.scores import Scores, scored
-from spirillum.controllers.sensors import Drawn
+from spirillum.controllers.sensors import Drawn, Senses
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
@@ -133,6 +133,7 @@ def control(
     learn: bool = False,
     workers: int = 1,
     live: bool = False,
+    bench: Callable[[Plant, Lab, int], Senses] | None = None,
     progress: Progress | None = None,
 ) -> Control:
     """Control a robot: plant, sensors, remote and controller in a closed loop, all of it drawn from a seed.
@@ -148,6 +149,8 @@ def control(
         learn: estimate friction and gap beside the controller, from camera and meter, by a bank of robots.
         workers: processes for the scores.
         live: run at the pace of the clock on the wall.
+        bench: makes camera, meter and remote of the run from plant, lab and seed in place of the modelled ones, such as
+            `spirillum.Bench`: pictures, tracker and a remote at a port. Scores are of the modelled ones.
         progress: told what is being computed, how much is done, and of how much.
 
     Returns:
@@ -165,7 +168,8 @@ def control(
     actual, drawn = draw_plant(job)
     learner = Learner(lab, Bank(robot, lab.unknown, arguments, progress)) if learn else None
     pace = _Pace() if live else None
-    run = run_job(job, actual, drawn, learner, pace=pace, progress=progress)
+    senses = None if bench is None else bench(actual, lab, seed)
+    run = run_job(job, actual, drawn, learner, senses=senses, pace=pace, progress=progress)
     scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
     warnings = (*actual.warnings, *cautions, *cut_short, *_warnings_of(run))
     return Control(

@@ -9,7 +9,7 @@ from typing import Any
 from spirillum.controllers.drawn_plant import plant_of
 from spirillum.controllers.learner import Learner, Learning
 from spirillum.controllers.loop import LoopRun, run_loop
-from spirillum.controllers.sensors import Drawn, draw
+from spirillum.controllers.sensors import Drawn, Senses, draw
 from spirillum.controllers.task import Brief, Score, Task
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
@@ -56,6 +56,7 @@ def run_job(
     drawn: Drawn,
     learner: Learner | None = None,
     *,
+    senses: Senses | None = None,
     pace: Callable[[float], None] | None = None,
     progress: Progress | None = None,
 ) -> LoopRun:
@@ -66,6 +67,7 @@ def run_job(
         plant: its robot; it is moved.
         drawn: what was drawn for it.
         learner: learns beside the controller.
+        senses: camera, meter and remote in place of the modelled ones.
         pace: told the time of each decision before it is taken, s; it may wait.
         progress: told what is being computed, how much is done, and of how much.
     """
@@ -73,7 +75,15 @@ def run_job(
     if learner is not None:
         controller = Learning(controller, learner)
     return run_loop(
-        plant, controller, lab, job.brief.duration, seed=job.seed, flow=drawn.pulse, pace=pace, progress=progress
+        plant,
+        controller,
+        lab,
+        job.brief.duration,
+        seed=job.seed,
+        senses=senses,
+        flow=drawn.pulse,
+        pace=pace,
+        progress=progress,
     )
 
 

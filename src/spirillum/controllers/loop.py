@@ -20,11 +20,14 @@ from spirillum.controllers.signals import Command, Controller, News, Reading, Si
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Moment, Plant
 from spirillum.dynamics.tube_integration import INTERRUPTED
+from spirillum.errors import InputError
 
 __all__ = ["SILENCE", "Decision", "LoopRun", "run_loop"]
 
 SILENCE = 1.0
 """Beyond its latency the camera may be silent for so long before the drive is switched off, s."""
+_LONGEST_WAIT = 12.0
+"""So long the robot swims on without being seen while it is learnt how it looks, s."""
 _AT_ONCE = 1e-9
 _LEAST_OFF = 0.05
 """The run goes on for at least so long after the last command, s."""
@@ -97,9 +100,10 @@ class LoopRun:
 class _Loop:
     """A run while it goes on."""
 
-    def __init__(self, plant: Plant, controller: Controller, lab: Lab, seed: int, flow: FlowPulse | None) -> None:
+    def __init__(self, plant: Plant, controller: Controller, lab: Lab, senses: Senses, flow: FlowPulse | None) -> None:
         self.plant, self.controller, self.lab, self.flow = plant, controller, lab, flow
-        self.senses = Senses(lab, seed)
+        self.senses = senses
+        self.own = Command(plant.state.command)
         self.run = LoopRun()
         self.command = Command(0.0)
         self.imposed = 0.0
@@ -136,6 +140,9 @@ class _Loop:
         """Let the controller decide and send its command; whether it gave a valid one."""
         if self._sights:
             self._last_delivery = time
+        waiting = "" if self.controller.blind else self.senses.not_ready(time)
+        if waiting:
+            return self.swim_until_seen(time, waiting)
         truth = self.now() if self.controller.knowing else None
         asked = self.controller.decide(News(time, tuple(self._sights), tuple(self._readings), truth))
         command = asked if isinstance(asked, Command) else Command(float(asked))
@@ -146,7 +153,19 @@ class _Loop:
         if not self.controller.blind and time - self._last_delivery > SILENCE + self.lab.camera.latency:
             command = Command(0.0)
             self.run.silent = time if self.run.silent is None else self.run.silent
-        self.run.decisions.append(Decision(time, command.duty, dict(self.controller.estimate())))
+        return self.send(time, command, dict(self.controller.estimate()))
+
+    def swim_until_seen(self, time: float, waiting: str) -> bool:
+        """Swim at the robot's own duty while its look is learnt, but not for ever; whether there is still time."""
+        self._last_delivery = time
+        if time > _LONGEST_WAIT:
+            self.run.ended = f"nothing is seen after {time:.3g} s: {waiting}"
+            return False
+        return self.send(time, self.own, {})
+
+    def send(self, time: float, command: Command, estimate: dict[str, float]) -> bool:
+        """Note a decision and send it."""
+        self.run.decisions.append(Decision(time, command.duty, estimate))
         if self.senses.command_arrives():
             self.push(time + self.lab.remote.delay, _Kind.ARRIVAL, command)
         else:
@@ -158,13 +177,11 @@ class _Loop:
         if kind is _Kind.DELIVERY:
             (self._sights if isinstance(content, Sight) else self._readings).append(content)
             return True
-        if kind is _Kind.ARRIVAL and content == self.command:
-            return True
+        if kind is _Kind.ARRIVAL:
+            return self.arrive(time, content)
         if (kind is not _Kind.DECISION or self.controller.knowing) and not self.advance(time):
             return False
         match kind:
-            case _Kind.ARRIVAL:
-                self.command = content
             case _Kind.FLOW:
                 self.imposed = content
                 self.plant.impose_flow(content if content else self.still)
@@ -180,6 +197,19 @@ class _Loop:
                 return self.decide(time)
             case _:
                 return False
+        return True
+
+    def arrive(self, time: float, sent: Command) -> bool:
+        """A command reaches the robot; whether what carries it is still there, and the run goes on."""
+        try:
+            command = self.senses.deliver(sent)
+        except InputError as error:
+            self.run.ended = str(error)
+            return False
+        if command != self.command:
+            if not self.advance(time):
+                return False
+            self.command = command
         return True
 
     def _frame(self, time: float) -> None:
@@ -206,6 +236,7 @@ def run_loop(
     duration: float,
     *,
     seed: int = 0,
+    senses: Senses | None = None,
     flow: FlowPulse | None = None,
     pace: Callable[[float], None] | None = None,
     progress: Progress | None = None,
@@ -218,6 +249,7 @@ def run_loop(
         lab: sensors and remote.
         duration: of the run, s.
         seed: of all errors of sensors and remote.
+        senses: camera, meter and remote of this run; None: those of the lab. They are closed at its end.
         flow: the pulse of flow of this run; None: none.
         pace: told the time of each decision before it is taken, s; it may wait.
         progress: told what is being computed, how much is done, and of how much.
@@ -226,7 +258,7 @@ def run_loop(
         The run; with an interrupt, an end of the channel or a wrong command what was done until then. The drive is off
         at its end.
     """
-    loop = _Loop(plant, controller, lab, seed, flow)
+    loop = _Loop(plant, controller, lab, senses or Senses(lab, seed), flow)
     loop.run.moments.append(plant.observe())
     loop.run.flows.append(0.0)
     loop.push(duration, _Kind.END)
@@ -253,4 +285,5 @@ def run_loop(
         loop.run.ended = INTERRUPTED
     finally:
         loop.switch_off()
+        loop.senses.close()
     return loop.run

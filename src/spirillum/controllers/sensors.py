@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spirillum.controllers.lab import Lab, Pulse, Unknown
-from spirillum.controllers.signals import Reading, Sight
+from spirillum.controllers.signals import Command, Reading, Sight
 from spirillum.dynamics.plant import Moment
 
 __all__ = ["Drawn", "FlowPulse", "Senses", "draw"]
@@ -126,6 +126,21 @@ class Senses:
             float(self._gains[0]) * true[0] + meter.current_noise * current,
             float(self._gains[1]) * true[1] * (1.0 + meter.voltage_noise * voltage),
         )
+
+    def not_ready(self, time: float) -> str:  # noqa: ARG002 - modelled ones are ready at once
+        """Why nothing can be seen yet at a time, s, in half a sentence; empty once it can, and if no frames come."""
+        return ""
+
+    def deliver(self, command: Command) -> Command:
+        """The command as the robot takes it.
+
+        Raises:
+            InputError: if what carries commands is gone.
+        """
+        return command
+
+    def close(self) -> None:
+        """Put away what the run needed."""
 
     def command_arrives(self) -> bool:
         """Whether the next command reaches the robot."""
