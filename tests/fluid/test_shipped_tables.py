@@ -22,7 +22,7 @@ from spirillum.kernels.tube_table import INSIDE, YAW_SLACK, largest_yaw
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
-from spirillum.studies.spec import load_study
+from spirillum.studies.loading import load_study
 
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 

@@ -9,7 +9,7 @@ import spirillum as sp
 from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.placement import Placement
-from spirillum.studies.spec import load_study
+from spirillum.studies.loading import load_study
 from spirillum.swimming.model_choice import choose_model
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"

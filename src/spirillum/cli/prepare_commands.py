@@ -34,7 +34,7 @@ def prepare(
     from spirillum.cli import renderer
     from spirillum.errors import InputError
     from spirillum.papers.biorob2012.study import paper_study
-    from spirillum.studies.spec import load_study
+    from spirillum.studies.loading import load_study
     from spirillum.swimming.preparation import preparations_answer, prepare_all
 
     if not robots and study is None:

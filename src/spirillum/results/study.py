@@ -18,10 +18,11 @@ from spirillum.papers.registry import claims_of, predictions_of
 from spirillum.results.study_report import write_report
 from spirillum.results.study_store import stored_study
 from spirillum.studies.dataset import read_dataset
+from spirillum.studies.loading import LARGEST_STUDY, load_study
 from spirillum.studies.observed import observed_arrays
 from spirillum.studies.ranking import ranking_of
 from spirillum.studies.run import Progress, computed_study, study_fingerprint
-from spirillum.studies.spec import LARGEST_STORED, LARGEST_STUDY, load_study
+from spirillum.studies.spec import LARGEST_STORED
 
 if TYPE_CHECKING:
     import xarray as xr

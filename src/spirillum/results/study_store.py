@@ -18,10 +18,10 @@ from spirillum.extras import required
 from spirillum.files import opened_store, read_json, results_folder, store_files, store_target, write_pieces
 from spirillum.studies.dataset import described
 from spirillum.studies.estimate import estimate_of, is_large
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.regions import Region, layout_of
 from spirillum.studies.run import warnings_of, warnings_of_calibrations
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.stored import Plan, encoded_region, plan_of, region_jobs
 from spirillum.studies.work import Caution, summed
 

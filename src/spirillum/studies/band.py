@@ -18,7 +18,7 @@ from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import all_hold, assembly_limits, broken
 from spirillum.robot.seat import GAP_SHARE
-from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.work import Indices, Part, groups
 from spirillum.swimming.band import at_place, band_places, joined
 from spirillum.swimming.steady import requirements, swim

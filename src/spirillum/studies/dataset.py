@@ -18,8 +18,8 @@ from spirillum.quantities import QUANTITIES, attributes
 from spirillum.studies.band import BandTask, placed_at, with_band
 from spirillum.studies.laid_down import LaidDownTask
 from spirillum.studies.laid_down_dataset import laid_down_coordinates, laid_down_variables
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import REASONS, Part, Task
 from spirillum.version import versions
 

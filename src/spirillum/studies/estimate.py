@@ -10,9 +10,9 @@ from typing import NamedTuple
 from spirillum.crews import ESTIMATE, Crew
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.processes import AHEAD, memory_in_use
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.regions import Layout, Region, cut, layout_of
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.stored import Plan, RegionJob, encoded_region, plan_of
 from spirillum.studies.work import groups
 

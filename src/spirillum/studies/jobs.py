@@ -13,8 +13,8 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels.compiled import rows_in_one_thread
 from spirillum.studies.band import BandTask
 from spirillum.studies.laid_down import LaidDownTask
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Indices, Part, Task, answer
 
 __all__ = ["Job", "answered", "job_of", "one_thread_each"]

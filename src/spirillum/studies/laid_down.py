@@ -26,7 +26,8 @@ from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.studies.factorial import Levels, half_fraction
-from spirillum.studies.spec import LaidDown, LoadedStudy
+from spirillum.studies.loading import LoadedStudy
+from spirillum.studies.spec import LaidDown
 from spirillum.studies.work import Indices, Part
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.steady import swim

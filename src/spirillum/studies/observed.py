@@ -19,7 +19,7 @@ from spirillum.measurement.observations import (
     summarised,
 )
 from spirillum.robot.robot import Robot
-from spirillum.studies.spec import LoadedStudy
+from spirillum.studies.loading import LoadedStudy
 
 __all__ = ["ObservedArrays", "observed_arrays", "observed_at"]
 

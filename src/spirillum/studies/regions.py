@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import BLOCK, Indices
 
 __all__ = ["Layout", "Region", "cut", "layout_of"]

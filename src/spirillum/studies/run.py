@@ -14,8 +14,8 @@ from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
 from spirillum.studies.jobs import answered, job_of
 from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_answer, without_table
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.spec import LoadedStudy
 from spirillum.studies.work import Task, cautions, keep, kept, summed, tasks
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models

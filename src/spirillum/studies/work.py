@@ -19,8 +19,8 @@ from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
+from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.spec import LoadedStudy
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
 from spirillum.swimming.cautions import accuracy_limits

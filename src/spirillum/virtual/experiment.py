@@ -212,7 +212,7 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Rob
     """Robots by the names of their folders, and the study's first model."""
     if study is None:
         return {name: load(name) for name in PAPER_ROBOTS}, "sbt"
-    from spirillum.studies.spec import load_study
+    from spirillum.studies.loading import load_study
 
     loaded = load_study(study)
     if loaded.count > _MOST:

@@ -1,0 +1,313 @@
+"""A study with its robots: loaded, calibrated and checked together, and what its fingerprint rests on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.files import read_toml
+from spirillum.fitted.calibration_file import (
+    CalibrationFile,
+    FittedFriction,
+    calibrated_robot,
+    placement_in,
+    read_calibration,
+)
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.warnings import Fitted, fitted_of
+from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
+from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
+from spirillum.robot.problems import problems_in
+from spirillum.robot.robot import Robot
+from spirillum.studies.spec import LARGEST_STORED, Study
+from spirillum.swimming.band import left_open
+from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
+
+__all__ = ["LARGEST_STUDY", "LoadedStudy", "load_study"]
+
+LARGEST_STUDY = 5_000_000
+"""Most results (robots times models times friction readings times rates) of one study."""
+_LARGEST_WITH_INTERVALS = 10_000
+"""Most robots of a study with a posterior, each of which swims a thousand times."""
+_WHAT = "a study file (TOML, see `spirillum schema study`)"
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A checked study with its robots."""
+
+    study: Study
+    robots: tuple[Robot, ...]
+    """One robot a channel of the grid, or the listed robots."""
+    question: Mapping[str, Any]
+    """All that decides the answer, for the fingerprint and the dataset's attributes."""
+    fitted: Fitted = field(default_factory=Fitted)
+    """B_eff of tails that a calibration knows, and what it rests on."""
+    posterior: PosteriorFile | None = None
+    """Draws over which answers have intervals."""
+    cautions: tuple[str, ...] = ()
+    """What to be careful about in the choice of the models, a sentence each."""
+    placements: tuple[Placement, ...] = ()
+    """Where each of `robots` lies by a calibration; none where the study says it."""
+
+    def placement_of(self, number: int) -> Placement:
+        """Where one of `robots` lies."""
+        return self.placements[number] if self.placements else self.study.placement
+
+    @property
+    def friction(self) -> tuple[FittedFriction, ...]:
+        """B_eff of tails that a calibration knows."""
+        return self.fitted.friction
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the question."""
+        text = json.dumps(self.question, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        grid = self.study.grid
+        return len(self.robots) * (1 if grid is None else len(grid.wavelengths) * len(grid.amplitudes))
+
+    def robot_at(self, index: int) -> Robot:
+        """The robot at an index in the flat order of the study."""
+        grid = self.study.grid
+        if grid is None:
+            return self.robots[index]
+        robot, tail = divmod(index, len(grid.wavelengths) * len(grid.amplitudes))
+        wavelength, amplitude = divmod(tail, len(grid.amplitudes))
+        own = self.robots[robot]
+        changed = {"wavelength": grid.wavelengths[wavelength], "amplitude": grid.amplitudes[amplitude]}
+        return own.model_copy(update={"tail": own.tail.model_copy(update=changed)})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the channels, or of the robots."""
+        if self.study.grid is not None:
+            return tuple(self.study.grid.channels)
+        return tuple(robot.name for robot in self.robots)
+
+
+def load_study(
+    source: str | Path | Mapping[str, Any],
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    models: Sequence[str] | None = None,
+    band: bool | None = None,
+    predicted: bool | None = None,
+    calibration: str | Path | None = None,
+    posterior: str | Path | None = None,
+    largest: int = LARGEST_STUDY,
+) -> LoadedStudy:
+    """Load a study and its robots.
+
+    Args:
+        source: study file or the same tables as a mapping;
+        overrides: dotted robot fields, applied to every robot.
+        models: hydrodynamic models instead of the study's; None: the study's.
+        band: whether to compute bands, instead of what the study says; None: what it says.
+        predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
+        calibration: calibration file, applied to every robot.
+        posterior: file of a calibration's posterior: its middle is applied to every robot.
+        largest: most results that it may ask for.
+
+    Raises:
+        InputError: if the study or one of its robots is wrong.
+    """
+    instead = {"models": None if models is None else list(models), "band": band, "predicted": predicted}
+    study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
+    if study.size > largest:
+        store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
+        raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
+    entries = list(_entries_of(study))
+    robots = tuple(_robot(entry, folder, {**(overrides or {}), **varied}) for entry, varied in entries)
+    robots = _named_apart(robots, [varied for _, varied in entries])
+    _check_drives(study, [entry for entry, _ in entries], robots, name)
+    if study.predicted and not (calibration is None and posterior is None):
+        raise InputError(
+            f"{name}: predicted together with a calibration or posterior; allowed: one of them, for what is predicted "
+            "is predicted with nothing fitted"
+        )
+    fitted, drawn = _fitted(study, calibration, posterior)
+    robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
+    _check_varied(study, overrides or {}, name)
+    study, cautions = _with_models(study, robots, calibration, drawn)
+    try:
+        check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+    placements = _fitted_places(study, robots, fitted, str(calibration))
+    known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
+    question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
+    if known.friction:
+        question["friction"] = [item.model_dump() for item in known.friction]
+    if placements:
+        question["placements"] = [place.model_dump() for place in placements]
+    if drawn:
+        question["posterior"] = {"source": drawn.source, "sha256": drawn.sha256}
+    loaded = LoadedStudy(study, robots, question, known, drawn, cautions, placements)
+    if drawn and loaded.count > _LARGEST_WITH_INTERVALS:
+        raise InputError(f"{name}: {loaded.count} robots with a posterior; allowed: at most {_LARGEST_WITH_INTERVALS}")
+    return loaded
+
+
+def _read(source: str | Path | Mapping[str, Any], instead: Mapping[str, Any]) -> tuple[Study, str, Path]:
+    """A checked study, its name in sentences, and the folder from which its robots are looked for.
+
+    Args:
+        source: study file or the same tables as a mapping.
+        instead: fields that replace those of the study.
+
+    Raises:
+        InputError: if the study cannot be read or is wrong.
+    """
+    folder = Path()
+    if isinstance(source, Mapping):
+        table, name = dict(source), "the study"
+    else:
+        table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
+    study = problems_in(Study, {**table, **instead})
+    if isinstance(study, list):
+        more = f" (and {len(study) - 1} more)" if len(study) > 1 else ""
+        raise InputError(f"{name}: {study[0]}{more}", [f"{name}: {problem}" for problem in study])
+    return study, name, folder
+
+
+def _entries_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Source and varied fields of every robot that is to be loaded."""
+    sources = list(study.grid.channels.values()) if study.grid else study.robots or []
+    for source in sources:
+        for values in product(*study.vary.values()):
+            yield source, dict(zip(study.vary, values, strict=True))
+
+
+def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]]) -> tuple[Robot, ...]:
+    """The robots with what is varied in their names; the robot's own name only where there are several."""
+    several = len({robot.name for robot in robots}) > 1
+    named = []
+    for robot, fields in zip(robots, varied, strict=True):
+        words = [f"{path.rpartition('.')[2]} {value}" for path, value in fields.items()]
+        name = ", ".join([robot.name, *words] if several or not words else words)
+        named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
+    return tuple(named)
+
+
+def _fitted(
+    study: Study, calibration: str | Path | None, posterior: str | Path | None
+) -> tuple[CalibrationFile | None, PosteriorFile | None]:
+    if calibration is not None and posterior is not None:
+        raise InputError("posterior together with a calibration; allowed: one of them")
+    file = None if calibration is None else read_calibration(calibration)
+    models = () if AUTO in study.models else study.models
+    drawn = None if posterior is None else read_posterior(posterior, *models)
+    if drawn is not None and drawn.places_robots:
+        raise InputError(
+            f"{drawn.source} has a place of its own for the robots of each channel, and a study one for all; allowed: "
+            "`predict` of each robot with it, or the study without"
+        )
+    return file, drawn
+
+
+_VARIED = ("tail.wavelength", "tail.amplitude")
+"""Fields of a robot that a grid sets."""
+
+
+def _check_varied(study: Study, overrides: Mapping[str, Any], name: str) -> None:
+    """Refuse to set what the grid varies.
+
+    Raises:
+        InputError: if that is asked for.
+    """
+    twice = [path for path in study.vary if path in overrides]
+    if twice:
+        raise InputError(f"{twice[0]} is set and varied by vary of {name}, which would win; allowed: one of them")
+    both = [path for path in _VARIED if path in overrides] if study.grid is not None else []
+    if both:
+        own = f"grid.{both[0].removeprefix('tail.')}s"
+        raise InputError(
+            f"{both[0]} is set and varied by {own} of {name}, which would win; allowed: other fields, or another {own}"
+        )
+
+
+def _fitted_places(
+    study: Study, robots: Sequence[Robot], file: CalibrationFile | None, source: str
+) -> tuple[Placement, ...]:
+    """Where a calibration places each robot, as `predict` takes it; none where the study says it, or no model asks.
+
+    Raises:
+        InputError: for a fitted place or dry friction that the study cannot take.
+    """
+    if file is None or not any(SWIMMER_MODELS[model].placed for model in study.models):
+        return ()
+    if file.contact.friction_coefficient:
+        raise InputError(
+            f"{source} has a friction_coefficient, and a study knows no dry friction; allowed: `predict` of each robot "
+            "with it"
+        )
+    if study.placement.is_given:
+        return ()
+    found = [placement_in(file, robot) for robot in robots]
+    if not any(found):
+        return ()
+    placements = tuple(place or Placement() for place in found)
+    walled = next(SWIMMER_MODELS[model] for model in study.models if SWIMMER_MODELS[model].placed)
+    if study.band and not all(left_open(place, walled) for place in placements):
+        raise InputError(f"band = true, but {source} says where the robots lie; allowed: the study without a band")
+    return placements
+
+
+def _with_models(
+    study: Study, robots: Sequence[Robot], calibration: str | Path | None, posterior: PosteriorFile | None
+) -> tuple[Study, tuple[str, ...]]:
+    """The study with one model for all robots in place of `auto`, and what to be careful about in it."""
+    if AUTO not in study.models:
+        return study, ()
+    loaded = LoadedStudy(study, tuple(robots), {})
+    for index in range(loaded.count):  # until the first robot without a table: one model answers for all
+        choice = choose_model(
+            AUTO,
+            loaded.robot_at(index),
+            placement=study.placement,
+            calibration=calibration,
+            posterior=posterior,
+            tables_only=True,
+        )
+        if choice.fitted or choice.model != WALLED:
+            break
+    models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
+    cautions = (choice.caution,) if choice.caution else ()
+    return study.model_copy(update={"models": tuple(models)}), cautions
+
+
+def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:
+    """The robot with what a calibration or the middle of a posterior says."""
+    if posterior is not None:
+        return posterior.central(robot)
+    return robot if file is None else calibrated_robot(robot, file)
+
+
+def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:
+    """Every robot needs a drive to swim by, and a joint that turns where motor rates are assumed."""
+    for source, robot in zip(sources, robots, strict=True):
+        if robot.drive is None:
+            raise InputError(f"{name}: robot {source} has no [drive]; allowed: robots with a drive, by which they swim")
+        if study.assumed_motor_rates and robot.drive.joint == "fixed":
+            raise InputError(
+                f"{name}: robot {source} has drive.joint = 'fixed', but the study names assumed_motor_rates; "
+                "allowed: 'revolute', or no assumed_motor_rates"
+            )
+
+
+def _robot(entry: str, folder: Path, overrides: Mapping[str, Any]) -> Robot:
+    """A robot of the study; a file stands relative to the study's folder."""
+    beside = folder / entry
+    return load(beside if Path(entry).suffix and not Path(entry).is_absolute() else entry, **overrides)
