@@ -11,6 +11,8 @@ from docutils.statemachine import StringList
 from latex2mathml.converter import convert
 from pydantic import BaseModel
 from sphinx.application import Sphinx
+from sphinx.domains.python import ObjectEntry, PythonDomain
+from sphinx.environment import BuildEnvironment
 from sphinx.util.docutils import SphinxDirective
 
 _NAME = re.compile(r"`(spirillum(?:\.\w+){2,})`")
@@ -87,8 +89,33 @@ class Room(SphinxDirective):
         return section.children
 
 
+class IndexedPythonDomain(PythonDomain):
+    """Remembers what was found for a name: Sphinx compares it with the end of every name of the project, each time."""
+
+    _remembered: ClassVar[dict[tuple[str, str | None, int], list[tuple[str, ObjectEntry]]]] = {}
+
+    def find_obj(
+        self,
+        env: BuildEnvironment,
+        modname: str | None,
+        classname: str | None,
+        name: str,
+        type: str | None,  # noqa: A002 - Sphinx calls it so
+        searchmode: int = 0,
+    ) -> list[tuple[str, ObjectEntry]]:
+        """Objects of a name; what lies nearer than anywhere in the project is not remembered."""
+        nearer = (f"{modname}.{classname}.{name}", f"{modname}.{name}")
+        if searchmode == 0 or any(place in self.objects for place in nearer):
+            return super().find_obj(env, modname, classname, name, type, searchmode)
+        key = (name, type, len(self.objects))
+        if key not in self._remembered:
+            self._remembered[key] = super().find_obj(env, None, None, name, type, searchmode)
+        return list(self._remembered[key])
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directive, the hooks and the formulas, which every browser draws by itself (MathML)."""
+    app.add_domain(IndexedPythonDomain, override=True)
     app.add_directive("room", Room)
     app.add_html_math_renderer("mathml", (_inline_formula, None), (_formula, None))
     app.connect("source-read", _linked_names)

@@ -143,7 +143,14 @@ def test_figures_are_ours_in_a_session_with_other_settings(tmp_path: Path) -> No
         assert mpl.rcParams["text.usetex"]
 
 
-def test_without_a_home_nothing_is_kept_and_nothing_made(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "commands",
+    [
+        ("predict biorob2012-wide --model tube --no-band", "calibrate o.csv biorob2012-wide --method paper"),
+        pytest.param(("rank-models o.csv biorob2012-wide --model sbt --model rft",), marks=pytest.mark.slow),
+    ],
+)
+def test_without_a_home_nothing_is_kept_and_nothing_made(tmp_path: Path, commands: tuple[str, ...]) -> None:
     script = (
         "import pwd\n"
         "def unknown(*_): raise KeyError('no such user')\n"
@@ -160,11 +167,6 @@ def test_without_a_home_nothing_is_kept_and_nothing_made(tmp_path: Path) -> None
     (tmp_path / "o.csv").write_text(
         "channel_diameter_mm,wavelength_mm,amplitude_mm,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"
         "40,20,2.5,1.1,1.2,-0.4\n40,25,2.5,1.2,1.2,-0.4\n40,30,2.5,1.25,1.2,-0.4\n"
-    )
-    commands = (  # one process: without a home nothing compiled is kept either
-        "predict biorob2012-wide --model tube --no-band",
-        "calibrate o.csv biorob2012-wide --method paper",
-        "rank-models o.csv biorob2012-wide --model sbt --model rft",
     )
     found = subprocess.run(
         [sys.executable, "-c", script, *commands], cwd=tmp_path, env=kept, capture_output=True, text=True, check=False
