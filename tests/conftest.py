@@ -23,28 +23,24 @@ settings.register_profile("spirillum", deadline=None, derandomize=True, database
 settings.load_profile("spirillum")
 
 
-_LONGEST = (
+_FIRST = (
     "test_documentation.py",
     "test_tube_flow_against_stokes_equations.py",
     "test_follow_from_film_to_track.py",
-    "test_flow_figure_against_its_field.py",
-    "test_flow_command.py",
-    "test_tube_pitched_and_wired.py",
+    "test_interaction_reciprocity_and_limits.py",
+    "test_hostile_inputs_get_a_sentence.py",
+    "test_motion_in_the_tube_against_truths.py",
     "test_examples_run.py",
+    "test_slender_through_public_names.py",
+    "test_tube_pitched_and_wired.py",
+    "test_tube_yawed.py",
 )
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest tests first, so that all workers end at about the same time."""
-    rank = {name: place for place, name in enumerate(_LONGEST)}
+    """The longest tests first: workers end at about the same time, and do not compile the same loops side by side."""
+    rank = {name: place for place, name in enumerate(_FIRST)}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """One line where the tests of the page were left out for want of a browser."""
-    reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
-    if left := [reason for reason in reasons if reason.endswith(LEFT_OUT)]:
-        terminalreporter.write_line(f"{left[0].removeprefix('Skipped: ')} ({len(left)})", yellow=True)
 
 
 @pytest.fixture(scope="session", autouse=True)
