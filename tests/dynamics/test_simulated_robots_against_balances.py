@@ -45,7 +45,7 @@ def test_lying_robot_swims_between_held_and_free() -> None:
     assert free.forward_velocity < float(run["mean_forward_velocity"]) < held.forward_velocity
     assert float(run["mean_tail_rotation_rate"]) == pytest.approx(held.tail_rotation_rate, rel=5e-3)
     assert float(run["mean_body_rotation_rate"]) == pytest.approx(held.body_rotation_rate, rel=1e-2)
-    assert "first form" in run.attrs["warnings"]
+    assert "motion in a channel without its walls" in run.attrs["warnings"]
 
 
 def test_series_are_named_as_in_a_prediction() -> None:

@@ -200,7 +200,7 @@ def _free_run(
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
-    said = [*steady.warnings, *_first_form(steady, links, weight=weight)]
+    said = [*steady.warnings, *_left_out(steady, links, weight=weight)]
     if all(switch.duty == 0 for switch in switches):
         said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
     more = {}
@@ -251,12 +251,12 @@ def _check_held(
         raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
 
 
-def _first_form(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:
+def _left_out(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:
     """What this form of a free motion leaves out, a sentence each."""
     found = []
     if steady.robot.channel is not None:
         found.append(
-            "a first form of motion in a channel: the fluid is unbounded but for films between robot and wall, which "
+            "motion in a channel without its walls: the fluid is unbounded but for films between robot and wall, which "
             "resist what nears the wall and nothing that slides along it"
         )
     if weight and not links.weight.any():
