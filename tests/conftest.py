@@ -43,6 +43,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line where the tests of the page were left out for want of a browser."""
+    reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
+    if left := [reason for reason in reasons if reason.endswith(LEFT_OUT)]:
+        terminalreporter.write_line(f"{left[0].removeprefix('Skipped: ')} ({len(left)})", yellow=True)
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """No answer comes from another run; within a run the workers share what one of them has solved."""
