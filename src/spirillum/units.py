@@ -271,7 +271,8 @@ def parse_option(name: str, value: str | float, kind: Kind) -> float:
     """Read an option of a function or command: text with its unit, or a float in SI.
 
     Raises:
-        InputError: as `parse_quantity`; the sentence starts with the option's name.
+        InputError: if there is no unit, one of another kind, or a number out of range; the sentence starts with the
+            option's name.
     """
     given: Any = value  # numbers of other libraries are real numbers too
     if not isinstance(given, bool) and isinstance(given, Real):

@@ -129,7 +129,13 @@ class Forward:
         return found
 
     def printed_turning(self, draws: Draws, motor_rate: Samples, tail_share: Samples) -> Samples:
-        """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates; arguments as `friction`."""
+        """Omega/omega by (19) as printed, E_x Omega = -K_m I, at given motor rates, (draws, robots).
+
+        Args:
+            draws: parameters.
+            motor_rate: omega_m, rad/s.
+            tail_share: observed omega/omega_m of each robot; NaN: as the model turns the body.
+        """
         s = self.balance(draws)
         torque, tail, _ = self._at_motor_rate(kinematics(s).turning, draws, motor_rate, tail_share)
         found: Samples = s.body_rate_as_printed(torque, tail) / tail

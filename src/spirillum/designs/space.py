@@ -129,7 +129,7 @@ def variable_of(robot: Robot, path: str, given: str | Sequence[object], option: 
         option: named in sentences.
 
     Raises:
-        InputError: as `space_of`.
+        InputError: for a field that is no number of the robot, or a range that is none.
     """
     if path == TURNS:
         low, high = range_of(f"{option} {path}", given, "1")

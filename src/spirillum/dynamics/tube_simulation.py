@@ -85,7 +85,16 @@ def links_in_tube(
     *,
     weight: bool,
 ) -> tuple[TubeRobot, StartPlace]:
-    """What a robot's rates in its tube follow from, and where it is laid down; arguments as `run_in_tube`."""
+    """What a robot's rates in its tube follow from, and where it is laid down.
+
+    Args:
+        steady: the steady prediction of the robot.
+        table: of the robot in its tube.
+        placed: where it is laid down, as far as that is given.
+        asked: of the motion in the tube: friction, contact, azimuth.
+        roughness: height of the asperities of the wall, m; None: the usual one.
+        weight: whether it has a weight.
+    """
     turn = 2.0 * np.pi / turning_rate(steady)
     around = _around(steady.robot, placed, asked, roughness)
     links = tube_robot(steady, table.packed, around, turn=turn, weight=weight)

@@ -140,8 +140,8 @@ class Flow(Shown):
             points: (n, 3), m.
 
         Raises:
-            InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), or
-                as `inside`.
+            InputError: if one of them lies inside a solid or outside the tube (the sentence names point and part), is
+                not finite, or has another shape.
         """
         return self.fields(points)[0]
 
@@ -152,15 +152,18 @@ class Flow(Shown):
             points: (n, 3), m.
 
         Raises:
-            InputError: as `velocity`.
+            InputError: if one of them lies inside a solid or outside the tube, is not finite, or has another shape.
         """
         return self.fields(points)[1]
 
     def fields(self, points: Samples) -> tuple[Samples, Samples]:
         """Velocity (n, 3) and pressure (n,) together, which costs as much as one of them.
 
+        Args:
+            points: (n, 3), m.
+
         Raises:
-            InputError: as `velocity`.
+            InputError: if one of them lies inside a solid or outside the tube, is not finite, or has another shape.
         """
         velocity, pressure = self.field.fields(_checked(points))
         if self.frame == "body":
@@ -319,8 +322,8 @@ def seat_in_tube(
     Args:
         robot: the robot.
         model: `slender`, `tube` or `auto`.
-        placement: as `flow`.
-        resolution: as `flow`.
+        placement: where in the channel the robot lies.
+        resolution: of the models; None: the robot's own.
 
     Raises:
         InputError: for wrong input, or a robot outside the domain of `tube`.

@@ -52,7 +52,7 @@ class FluidField(ABC):
             points: (n, 3), m.
 
         Raises:
-            InputError: as `fields`.
+            InputError: if one of them lies inside a solid or outside the tube.
         """
         return self.fields(points)[0]
 
@@ -63,7 +63,7 @@ class FluidField(ABC):
             points: (n, 3), m.
 
         Raises:
-            InputError: as `fields`.
+            InputError: if one of them lies inside a solid or outside the tube.
         """
         return self.fields(points)[1]
 

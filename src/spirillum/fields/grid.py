@@ -77,7 +77,13 @@ def plane_grid(
 
 
 def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> Grid:
-    """A grid in a box around the robot; arguments as for `plane_grid`.
+    """A grid in a box around the robot.
+
+    Args:
+        robot: what it surrounds.
+        margin: how far it reaches beyond the robot, m; None: a default.
+        resolution: points along the longest side.
+        seat: the robot's place in a tube, beyond whose glass there is no grid.
 
     Raises:
         InputError: if the grid would be too small or too large.

@@ -232,7 +232,7 @@ class _Reflection:
         return cls(seat.radius, (k, orders), _classes(columns, seat.radius), cut, middle, reach, steps, amplitudes)
 
     def field(self, placed: Samples) -> Samples:
-        """As `kernels.field` has it, at points about the tube's axis and in its axes, (n, 4)."""
+        """Velocity and pressure at points about the tube's axis, in its axes, (n, 4)."""
         from spirillum.kernels.tube_field import add_waves
 
         field = np.zeros((len(placed), 4))

@@ -107,11 +107,11 @@ def loaded_netcdf(path: str | Path, what: str, largest: int = LARGEST_NETCDF, gr
     Args:
         path: the file.
         what: what it should be, for the sentence of an error.
-        largest: as `open_netcdf`.
+        largest: of the file, and of all its arrays together, bytes.
         group: the group that holds it.
 
     Raises:
-        InputError: as `open_netcdf`.
+        InputError: if it is no such file, is damaged, or too large.
     """
     with open_netcdf(path, what, largest) as file:
         return group_of(file, group)

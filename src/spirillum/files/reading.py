@@ -72,7 +72,7 @@ def checked_file(path: str | Path, what: str, largest: int) -> Path:
     """A user's file that a library is to open by its name.
 
     Raises:
-        InputError: as `opened`.
+        InputError: if it is not there, no regular file, closed to you, or too large.
     """
     with opened(path, what, largest) as stream:
         stream.read(1)
@@ -83,7 +83,7 @@ def read_bytes(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> byte
     """All of a user's file, at most `largest` bytes even if it grows while it is read.
 
     Raises:
-        InputError: as `opened`.
+        InputError: if it is not there, no regular file, closed to you, or too large.
     """
     with opened(path, what, largest) as stream:
         try:
@@ -104,7 +104,7 @@ def read_text(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> str:
         largest: largest size, bytes.
 
     Raises:
-        InputError: as `opened`; or if it is empty, or not UTF-8 text.
+        InputError: if it cannot be read, is too large or empty, or not UTF-8 text.
     """
     try:
         text = read_bytes(path, what, largest).decode("utf-8-sig")
@@ -119,7 +119,7 @@ def read_json(path: str | Path, what: str, largest: int = LARGEST_TEXT) -> Any:
     """What a JSON file holds.
 
     Raises:
-        InputError: as `read_text`; or if it is not JSON, or nested too deeply.
+        InputError: if it cannot be read, is too large, not JSON, or nested too deeply.
     """
     text = read_text(path, what, largest)
     with suppress(ValueError, RecursionError):
@@ -147,7 +147,7 @@ def read_toml(path: str | Path, what: str) -> dict[str, Any]:
     """Tables of a user's TOML file.
 
     Raises:
-        InputError: as `read_text` and `parse_toml`.
+        InputError: if it cannot be read, is too large, or not TOML; the sentence names file and line.
     """
     return parse_toml(read_text(path, what), str(path), what)
 

@@ -98,7 +98,7 @@ def check_replaceable(path: Path, replace: Replace = "own", begins: bytes = b"")
     Args:
         path: where a file is to be written.
         replace: what it may replace.
-        begins: as `is_own`.
+        begins: what a file of this kind begins with, see `is_own`.
 
     Raises:
         InputError: if something is there that is no regular file, is an input, or may not be replaced.
@@ -159,12 +159,16 @@ def whole_file(path: Path, *, replace: Replace = "own", begins: bytes = b"", syn
 def whole_files(
     paths: Collection[Path] | Mapping[Path, bytes], *, replace: Replace = "own", sync: bool = True
 ) -> Iterator[dict[Path, Path]]:
-    """As `whole_file`, for files that belong together: all are made before the first takes its place.
+    """Give temporary paths of files that belong together; all are made before the first takes its place.
 
     Args:
         paths: the files in the order in which they take their places; perhaps with what they begin with.
         replace: what they may replace.
         sync: wait until the disk has them.
+
+    Raises:
+        InputError: if a folder cannot be written to, or something is there that may not be replaced.
+        OSError: if there is no space.
     """
     begins = dict(paths) if isinstance(paths, Mapping) else dict.fromkeys(paths, b"")
     places = {path: check_replaceable(path, replace, start) for path, start in begins.items()}
@@ -268,7 +272,7 @@ def netcdf_target(path: str | Path) -> Path:
     """The path of a NetCDF file to write, checked before any work is done.
 
     Raises:
-        InputError: as `output_target`.
+        InputError: if it does not end in `.nc`, may not be replaced, or its folder is not there or closed to you.
     """
     return output_target(path, {".nc": "a NetCDF file"}, "run.nc")
 

@@ -250,7 +250,7 @@ def calibrated_placement(robot: Robot, path: str | Path) -> Placement | None:
     """Where a calibration file places a robot in its channel; None where it says nothing of that channel.
 
     Raises:
-        InputError: as `read_calibration`.
+        InputError: if the file cannot be read or a field is wrong.
     """
     return placement_in(read_calibration(path), robot)
 
@@ -259,7 +259,7 @@ def calibrated_contact(path: str | Path | None) -> FittedContact:
     """Roughness and dry friction of a calibration file; nothing without one.
 
     Raises:
-        InputError: as `read_calibration`.
+        InputError: if the file cannot be read or a field is wrong.
     """
     return FittedContact() if path is None else read_calibration(path).contact
 

@@ -287,7 +287,12 @@ def _stale_mass(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str,
 
 
 def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, ...]:
-    """Warn of what is older than the size of the body that it belongs to; arguments as `_stale_mass`."""
+    """Warn of what is older than the size of the body that it belongs to.
+
+    Args:
+        table: the final raw tables.
+        changes: fields that each layer changed (a file over its preset, then the overrides).
+    """
     found = []
     for field, whose in _SIZED.items():
         section, name = field.split(".")

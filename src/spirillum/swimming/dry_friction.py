@@ -140,7 +140,8 @@ def swim_on_floor(
         asked: what else `swim` is asked.
 
     Raises:
-        InputError: as `swim`, and for dry friction under robots whose joint is fixed or whose weight is not known.
+        InputError: for what `swim` refuses, and for dry friction under robots whose joint is fixed or whose weight is
+            not known.
     """
     mu = np.zeros(1) if coefficient is None else np.atleast_1d(np.asarray(coefficient, dtype=float))
     free = swim(batch, model, **asked)

@@ -93,7 +93,7 @@ def drawn_kinematics(robot: Robot, model: SwimmerModel, posterior: PosteriorFile
         posterior: its draws.
 
     Raises:
-        InputError: as `intervals_of`.
+        InputError: for draws of the place of a robot without a table.
     """
     draws = posterior.of(robot, np.random.default_rng(1))
     size = posterior.count

@@ -166,7 +166,13 @@ _MOST_WORKERS = 64
 def table_for(
     batch: RobotBatch, *, workers: int = 1, progress: Callable[[str, int, int], None] | None = None
 ) -> TubeTable:
-    """The table of the first robot of a batch in its tube; arguments as `prepare`."""
+    """The table of the first robot of a batch in its tube.
+
+    Args:
+        batch: robots with a channel.
+        workers: number of processes.
+        progress: told what is being solved, how many places are done, and of how many.
+    """
     return prepared_tables([_asked(batch)], workers=workers, progress=progress)[0]
 
 
