@@ -179,12 +179,24 @@ def test_dropped_film_is_measured_as_on_the_command_line(tab: Any, trial: Any, t
     assert found["forward_velocity"].value == pytest.approx(trial.rates["forward_velocity"], rel=5e-3)
     tab.until("document.getElementById('annotated').readyState >= 2")  # the browser shows the annotated film
     assert tab.value("document.getElementById('annotated').videoWidth") == 320
+
+    tab.page.click("[data-beside=trial-1]")  # film and simulated robot on one slider
+    tab.until("spirillum.replay?.video?.readyState >= 2 && spirillum.replay.drawn.length == 3")
+    middle = tab.value("Math.floor(spirillum.replay.run.time.length / 2)")
+    tab.value(f"spirillum.replay.seek({middle})")
+    tab.until("Math.abs(spirillum.replay.video.currentTime - spirillum.replay.time) < 0.02")
     tab.page.click("#tab-swim")
 
 
 def test_two_robots_start_together(tab: Any) -> None:
     tab.page.click("#tab-compare")
     tab.until("spirillum.lanes.length == 2 && spirillum.frame.lanes.length == 2")
+    tab.until("spirillum.frame.lanes.every(lane => lane.ready)")
+    tab.page.click("#study-paper")
+    tab.page.click(".tail[data-tail='0 2']")
+    tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'tail.wavelength' && knob.value == 10)")
+    tab.page.keyboard.press("Control+z")
+    tab.until("spirillum.scene.lanes[0].knobs.some(knob => knob.field == 'tail.wavelength' && knob.value == 25)")
     tab.until("spirillum.frame.lanes.every(lane => lane.ready)")
     tab.command(do="duty", lane=1, value=0.5)
     tab.command(do="step")

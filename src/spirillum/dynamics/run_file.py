@@ -18,7 +18,7 @@ from spirillum.units import Kind
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["open_run", "robot_of"]
+__all__ = ["open_run", "robot_of", "robot_of_settings"]
 
 _WHAT = "a run written by `spirillum simulate`"
 
@@ -50,12 +50,25 @@ def robot_of(dataset: xr.Dataset) -> Robot:
         raise InputError(
             f"the run's attribute 'settings' is not JSON ({str(error)[:100]}); allowed: {_WHAT}"
         ) from error
+    return robot_of_settings(table, "the run's")
+
+
+def robot_of_settings(table: Any, whose: str) -> Robot:
+    """A robot from its settings in a dataset, SI numbers, checked like a robot file.
+
+    Args:
+        table: the settings.
+        whose: the dataset, for messages: ``the run's``.
+
+    Raises:
+        InputError: if they describe no robot.
+    """
     if not isinstance(table, dict):
-        raise InputError(f"the run's attribute 'settings' is no table; allowed: {_WHAT}")
+        raise InputError(f"{whose} attribute 'settings' is no table; allowed: one with a robot")
     robot = problems_in(Robot, _with_units(Robot, table))
     if isinstance(robot, Robot):
         return robot
-    raise InputError(f"the run's settings: {robot[0]}", [f"the run's settings: {problem}" for problem in robot])
+    raise InputError(f"{whose} settings: {robot[0]}", [f"{whose} settings: {problem}" for problem in robot])
 
 
 def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:

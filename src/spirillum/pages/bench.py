@@ -15,7 +15,7 @@ from spirillum.errors import InputError
 from spirillum.pages.desk import ROBOT_FILE, Desk
 from spirillum.pages.films import Films
 from spirillum.pages.job import Job
-from spirillum.pages.plain_names import plain
+from spirillum.pages.plain_names import plain, plain_names
 from spirillum.pages.setup_form import form_list
 
 __all__ = ["Bench"]
@@ -57,6 +57,23 @@ class Bench:
             if problems:
                 raise InputError(problems[0])
             self._start("measure", {"films": films, "setup": str(self.desk.written())})
+
+    def beside(self, name: str) -> dict[str, Any]:
+        """A measured trial beside the simulated robot; see `spirillum.pages.beside`.
+
+        Raises:
+            InputError: if there is no such trial, or its robot cannot be simulated.
+        """
+        from spirillum.dynamics.run_file import open_run
+        from spirillum.pages.beside import trial_beside_its_run
+
+        with self._lock:
+            trials = self._results.get("measure", {}).get("trials", [])
+            folder = self._folders.get("measure", self._folder)
+        if name not in [trial["name"] for trial in trials]:
+            raise InputError(f"trial {name[:40]!r}; allowed: one that was measured")
+        with plain_names(self._folder):
+            return trial_beside_its_run(open_run(folder / f"{name}.nc"), f"{name}.annotated.mp4")
 
     def calibrate(self, model: str, method: str) -> None:
         """Begin to calibrate with what was measured.

@@ -41,6 +41,7 @@ class _Doors:
             "look": lambda message: bench.desk.look(_text(message, "film")),
             "propose": lambda message: bench.desk.propose(_text(message, "film")),
             "measure": lambda _message: bench.measure(),
+            "beside": lambda message: bench.beside(_text(message, "trial")),
             "calibrate": lambda message: bench.calibrate(_text(message, "model"), _text(message, "method")),
             "stop": lambda _message: bench.stop(),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -124,6 +124,17 @@ class Lane:
         if name != "own" and name not in preset_names():
             raise InputError(f"preset {name[:60]!r}; allowed: {', '.join(preset_names())}")
         self._become(Settings(own if name == "own" else name), "")
+
+    def swap(self, source: Robot, overrides: Mapping[str, str]) -> None:
+        """Another robot, with other values of some fields.
+
+        Raises:
+            InputError: where a field is wrong.
+        """
+        preset = source.name in preset_names() and load(source.name) == source
+        chosen = source.name if preset else source  # a preset can be named on the command line
+        self._become(replace(self.settings, source=chosen, overrides=dict(overrides)), "")
+        self.duty = self.robot.drive.duty if self.robot.drive is not None else 1.0
 
     def undo(self, *, forward: bool = False) -> None:
         """Go one change back, or forward again."""

@@ -22,6 +22,7 @@ from spirillum.pages.bench_routes import bench_routes
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.keep import MODULES, asset, command_line, python_lines, replay_page, robot_file
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
+from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
 from spirillum.pages.theatre import Theatre
 
 __all__ = ["application"]
@@ -37,6 +38,7 @@ _OWN = (
     "knobs.js",
     "numbers.js",
     "measure.js",
+    "study.js",
     "pointing.js",
     "icon.svg",
     *MODULES,
@@ -192,7 +194,8 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
         *bench_routes(house.bench, house.theatre),
         Route("/flow", _flow(house.theatre)),
         Route("/first-run", _first(first_run)),
-        Route("/replay", _replayed, methods=["POST"]),
+        Route("/replay", _sent(replay_of_upload, LARGEST_RUN), methods=["POST"]),
+        Route("/study", _study(house.theatre), methods=["POST"]),
         WebSocketRoute("/live", house.connect),
     ]
     return _Guarded(Starlette(routes=routes, lifespan=house.open), guard)
@@ -301,15 +304,31 @@ def _first(run: dict[str, Any] | None) -> Handler:
     return serve
 
 
-async def _replayed(request: Request) -> Response:
-    """A run's file is dropped on the page, and comes back as what it replays."""
-    content = bytearray()
-    async for piece in request.stream():
-        content += piece
-        if len(content) > LARGEST_RUN:
-            return PlainTextResponse(f"the file is too large; allowed: {LARGEST_RUN >> 20} MB", status_code=413)
-    try:
-        found = await asyncio.to_thread(replay_of_upload, bytes(content))
-    except InputError as error:
-        return PlainTextResponse(str(error), status_code=400)
-    return JSONResponse(found)
+def _study(theatre: Theatre) -> Handler:
+    """A study's dataset is dropped on the page, or with nothing in it the paper's is computed; its picture."""
+
+    def picture(content: bytes) -> dict[str, Any]:
+        from spirillum.results.study import study
+
+        found = sent_study(content) if content else StudyPicture(study())
+        theatre.show_study(found)
+        return found.told()
+
+    return _sent(picture, LARGEST_STUDY_SENT)
+
+
+def _sent(read: Callable[[bytes], Any], largest: int) -> Handler:
+    """A file is sent, and comes back as what is read from it."""
+
+    async def serve(request: Request) -> Response:
+        content = bytearray()
+        async for piece in request.stream():
+            content += piece
+            if len(content) > largest:
+                return PlainTextResponse(f"the file is too large; allowed: {largest >> 20} MB", status_code=413)
+        try:
+            return JSONResponse(await asyncio.to_thread(read, bytes(content)))
+        except InputError as error:
+            return PlainTextResponse(str(error), status_code=400)
+
+    return serve

@@ -15,6 +15,7 @@ from spirillum.pages.knobs import Settings
 from spirillum.pages.lane import Built, Lane, build
 from spirillum.pages.numbers import prediction_answer, quantity_list
 from spirillum.pages.preparing import Preparing
+from spirillum.pages.study_picture import StudyPicture
 from spirillum.robot.load import preset_names
 from spirillum.robot.robot import Robot
 
@@ -52,6 +53,7 @@ class Theatre:
         self._built: queue.Queue[tuple[int, int, Built | None, dict[str, Any] | None, str]] = queue.Queue()
         self._lanes = [Lane.of(self._own)]
         self._preparing: Preparing | None = None
+        self._study: StudyPicture | None = None
         self._playing, self._pace, self._looked_at = True, 1.0, False
         self._ending = threading.Event()
         self._asked: list[tuple[int, int]] = []
@@ -113,6 +115,10 @@ class Theatre:
                 return None
             lane = self._lanes[index]
             return lane, lane.recording.data()
+
+    def show_study(self, study: StudyPicture) -> None:
+        """Let its tails be pointed at."""
+        self._study = study
 
     def flow(self, index: int) -> dict[str, Any] | None:
         """The plane of the flow around a robot; None if there is none."""
@@ -202,6 +208,11 @@ class Theatre:
         lane.preset(text_of(command, "value"), self._own)
         drive = lane.robot.drive
         lane.duty = drive.duty if drive is not None else 1.0
+
+    def _tail(self, lane: Lane, command: Mapping[str, Any]) -> None:
+        if self._study is None:
+            raise InputError("tail: no study is shown; allowed: a study first")
+        lane.swap(*self._study.tail(command))
 
     def _undo(self, lane: Lane, _command: Mapping[str, Any]) -> None:
         lane.undo()
@@ -368,6 +379,7 @@ class Theatre:
 _ACTIONS: dict[str, Callable[[Theatre, Lane, Mapping[str, Any]], None]] = {
     "set": Theatre._set,  # noqa: SLF001 - its own
     "preset": Theatre._preset,  # noqa: SLF001
+    "tail": Theatre._tail,  # noqa: SLF001
     "undo": Theatre._undo,  # noqa: SLF001
     "redo": Theatre._redo,  # noqa: SLF001
     "restart": Theatre._restart,  # noqa: SLF001

@@ -14,7 +14,7 @@ export class Knobs {
 
   show(lane, index, scene) {
     this.lane = index;
-    const form = JSON.stringify([index, lane.knobs.map((knob) => [knob.field, knob.low, knob.high, knob.unit]), lane.models, lane.drive, scene.presets]);
+    const form = JSON.stringify([index, lane.knobs.map((knob) => [knob.field, knob.low, knob.high, knob.unit]), lane.models, lane.drive, scene.presets, lane.source]);
     if (form !== this.form) this.build(lane, scene, form);
     if (lane.generation !== this.generation) Object.values(this.rows).forEach((row) => row.clear());
     this.generation = lane.generation;
@@ -42,9 +42,9 @@ export class Knobs {
   build(lane, scene, form) {
     this.form = form;
     this.rows = {};
-    const names = [...(scene.own === "own" ? ["own"] : []), ...scene.presets];
+    const names = [...(scene.own === "own" || lane.source === "own" ? ["own"] : []), ...scene.presets];
     this.preset = element("select", { id: "preset", onchange: () => this.send({ do: "preset", value: this.preset.value, lane: this.lane }) },
-      ...names.map((name) => element("option", { value: name, text: name === "own" ? "the robot it was started with" : name })));
+      ...names.map((name) => element("option", { value: name, text: name === "own" ? scene.own === "own" ? "the robot it was started with" : "the study\u2019s robot" : name })));
     const words = { auto: "auto: what knows most", tube: "tube: with walls", slender: "slender: no walls", rft: "rft: the paper\u2019s simplest" };
     this.model = element("select", { id: "model", onchange: () => this.set("run.model", this.model.value) },
       ...lane.models.map((name) => element("option", { value: name, text: words[name] })));

@@ -8,6 +8,7 @@ import { Plot } from "./plots.js";
 import { showReplay } from "./replay.js";
 import { Section, sectionWords } from "./section.js";
 import { Stage } from "./stage.js";
+import { Study } from "./study.js";
 
 const PLOTS = ["forward_velocity", "tail_rotation_rate", "motor_current"];
 const PLOTS_OTHERWISE = ["forward_velocity", "tail_rotation_rate", "body_rotation_rate"];
@@ -20,6 +21,7 @@ const state = { scene: null, lanes: [], past: null, chosen: 0, tab: "swim", sock
 
 const knobs = new Knobs($("knobs"), (command) => send(command));
 const numbers = new Numbers($("numbers"));
+state.study = new Study($("study"), (command) => send({ ...command, lane: state.chosen }));
 
 // The wire
 
@@ -221,13 +223,13 @@ function setScene(scene) {
   $("play").setAttribute("aria-label", scene.playing ? "Pause" : "Play");
   const pace = scene.pace;
   $("pace").textContent = `${pace >= 1 ? pace : `1/${Math.round(1 / pace)}`}\u00d7`;
-  select(scene.lanes.length > 1 ? "compare" : state.tab === "compare" ? "swim" : state.tab);
+  if (!$("live").hidden) select(scene.lanes.length > 1 ? "compare" : "swim");
 }
 
 function showPanel() {
   const { scene, chosen } = state;
   const lane = scene.lanes[chosen];
-  $("which").hidden = scene.lanes.length < 2;
+  $("which").hidden = $("study").hidden = scene.lanes.length < 2;
   $("which").replaceChildren(...scene.lanes.map((one, k) => element("button", {
     role: "tab", "aria-selected": String(k === chosen), text: `${"AB"[k]} \u00b7 ${one.robot}`,
     onclick: () => { state.chosen = k; showPanel(); },
@@ -267,7 +269,7 @@ function open(tab) {
   if (tab === "compare" && state.lanes.length < 2) send({ do: "compare", value: true });
   if (tab === "swim" && state.lanes.length > 1) send({ do: "compare", value: false });
   if (tab === "replay" && !state.replay) askForRun();
-  if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen);
+  if (tab === "measure") state.measure ??= new Measure($("measure"), () => state.chosen, begin);
   if (tab !== "compare" || state.lanes.length > 1) select(tab);
 }
 

@@ -13,8 +13,8 @@ const WAIT = 350; // ms from a change to its check
 const POLL = 400; // ms between two questions for progress
 
 export class Measure {
-  constructor(holder, lane) {
-    Object.assign(this, { holder, lane, names: {}, film: "", time: 0, pointing: "", points: [], strips: [], said: {}, rows: {}, edits: 0, told: 0 });
+  constructor(holder, lane, replay) {
+    Object.assign(this, { holder, lane, replay, names: {}, film: "", time: 0, pointing: "", points: [], strips: [], said: {}, rows: {}, edits: 0, told: 0 });
     this.build();
     this.ask("state");
   }
@@ -353,7 +353,7 @@ export class Measure {
     this.results.replaceChildren(
       element("h2", {}, "Results", element("span", { class: "tag", text: measure.robot })),
       ...tables.flatMap(([title, rows, trial]) => [
-        element("h3", {}, title, trial ? element("button", { class: "plain calm", text: "See it", "data-film": trial.film, onclick: () => this.play(trial.film) }) : null), table(rows),
+        element("h3", {}, title, trial ? element("button", { class: "plain calm", text: "See it", "data-film": trial.film, onclick: () => this.play(trial.film) }) : null, trial ? element("button", { class: "plain calm", text: "Beside a simulation", "data-beside": trial.name, onclick: () => this.beside(trial.name) }) : null), table(rows),
       ]),
       element("p", { class: "under told", text: "Low and high: 95 % interval." }),
       ...warnings(measure.warnings),
@@ -374,6 +374,16 @@ export class Measure {
       element("p", { class: "files" }, ...found.files.map(kept))] : [];
     return element("section", { class: "said", id: "calibration" }, element("h3", { text: "Calibrate the model with it" }),
       element("div", { class: "step-row" }, model, method, go), this.lines.calibration, ...shown);
+  }
+
+  // The trial on one time slider with the simulated robot, in Replay.
+  beside(trial) {
+    this.tell("work", "The robot is simulated \u2026");
+    this.attempt("work", async () => {
+      const run = await this.act("beside", { trial });
+      this.video.pause();
+      this.replay({ ...run, film: { ...run.film, url: `/bench/file?name=${encodeURIComponent(run.film.name)}` } });
+    });
   }
 
   play(film) {

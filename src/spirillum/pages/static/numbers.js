@@ -15,6 +15,7 @@ export class Numbers {
     if (told === this.built) return;
     this.built = told;
     const numbers = lane.numbers;
+    this.holder.classList.toggle("stale", !lane.swims_by); // those of the robot before
     this.quantities = quantities;
     this.cells = {};
     const body = element("tbody");

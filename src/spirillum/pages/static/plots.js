@@ -6,7 +6,7 @@ const MOST = 2400;
 
 export class Plot {
   constructor(canvas, name, quantity) {
-    Object.assign(this, { canvas, name, quantity, time: [], values: [], cursor: null, span: 20, band: null });
+    Object.assign(this, { canvas, name, quantity, time: [], values: [], cursor: null, span: 20, band: null, other: null });
   }
 
   clear() {
@@ -46,6 +46,11 @@ export class Plot {
     if (band && Number.isFinite(low)) {
       low = Math.min(low, band.value * factor);
       high = Math.max(high, band.value * factor);
+    }
+    for (const value of this.other?.values ?? []) {
+      if (value === null) continue;
+      low = Math.min(low, value * factor);
+      high = Math.max(high, value * factor);
     }
     if (!Number.isFinite(low)) [low, high] = [0, 1];
     [low, high] = rounded(low, high);
@@ -90,20 +95,26 @@ export class Plot {
       context.stroke();
       context.setLineDash([]);
     }
-    context.beginPath();
-    let pen = false;
-    for (let k = 0; k < time.length; k++) {
-      if (time[k] < start - 1 || values[k] === null) {
-        pen = false;
-        continue;
+    const line = (times, column, colour, dashes) => {
+      context.beginPath();
+      let pen = false;
+      for (let k = 0; k < times.length; k++) {
+        if (times[k] < start - 1 || column[k] === null) {
+          pen = false;
+          continue;
+        }
+        context[pen ? "lineTo" : "moveTo"](x(times[k]), y(column[k] * factor));
+        pen = true;
       }
-      context[pen ? "lineTo" : "moveTo"](x(time[k]), y(values[k] * factor));
-      pen = true;
-    }
-    context.lineWidth = 1.8;
-    context.lineJoin = "round";
-    context.strokeStyle = colourOf("--accent");
-    context.stroke();
+      context.setLineDash(dashes);
+      context.lineWidth = 1.8;
+      context.lineJoin = "round";
+      context.strokeStyle = colourOf(colour);
+      context.stroke();
+      context.setLineDash([]);
+    };
+    if (this.other) line(this.other.time, this.other.values, "--ink", [5, 4]);
+    line(time, values, "--accent", []);
     context.restore();
     if (this.cursor !== null) {
       context.fillStyle = colourOf("--ink");

@@ -33,18 +33,27 @@ class Replay {
     this.paceWord = element("output", { text: "1\u00d7" });
     const section = element("canvas", { role: "img", "aria-label": "Cross-section of the tube" });
     this.sectionWords = element("p", { class: "under" });
-    this.drawn = PLOTS.filter((name) => run.values[name]).map((name) => new Plot(element("canvas", { role: "img", "aria-label": `${quantities[name].label} over time` }), name, quantities[name]));
-    for (const plot of this.drawn) plot.load(run.time, run.values[plot.name]);
+    this.drawn = (data.compared ?? []).map((one) => {
+      const plot = new Plot(element("canvas", { role: "img", "aria-label": `${one.label} over time, simulated and tracked` }), one.label, one);
+      plot.load(one.run.time, one.run.values);
+      plot.other = one.tracked;
+      return plot;
+    });
+    if (!data.compared) this.drawn = PLOTS.filter((name) => run.values[name]).map((name) => new Plot(element("canvas", { role: "img", "aria-label": `${quantities[name].label} over time` }), name, quantities[name]));
+    if (!data.compared) for (const plot of this.drawn) plot.load(run.time, run.values[plot.name]);
+    const panes = element("div", { class: "panes" }, this.filmPane(data, Boolean(leave)), stage);
     const slower = (step) => () => {
       const k = Math.min(PACES.length - 1, Math.max(0, PACES.indexOf(this.pace) + step));
       this.pace = PACES[k];
       this.paceWord.textContent = `${this.pace}\u00d7`;
     };
     holder.replaceChildren(element("section", { class: "theatre" },
-      element("div", { class: "lanes" }, element("article", { class: "lane" }, stage,
+      element("div", { class: "lanes" }, element("article", { class: "lane" }, panes,
         element("div", { class: "transport" }, this.button, this.slider, this.clock,
           element("button", { class: "quiet", text: "\u2212", "aria-label": "Slower", onclick: slower(-1) }), this.paceWord,
           element("button", { class: "quiet", text: "+", "aria-label": "Faster", onclick: slower(1) }),
+          leave ? element("label", { class: "quiet wordy file", for: "beside-film", text: "Add film" }) : null,
+          leave ? this.filmInput() : null,
           leave ? element("button", { class: "quiet wordy", text: "Another run", onclick: leave }) : null),
         element("div", { class: "strip" }, element("figure", { class: "card section" }, section, this.sectionWords),
           element("div", { class: "plots" }, ...this.drawn.map((plot) => element("figure", { class: "card plot" }, plot.canvas))))))));
@@ -60,6 +69,46 @@ class Replay {
     this.seek(0);
     this.play(true);
     requestAnimationFrame((at) => this.tick(at));
+  }
+
+  // The film beside the run: that of a trial, or one of one's own, which stays in this browser.
+  filmPane(data, live) {
+    if (!live && !data.film) return null;
+    const pane = element("div", { class: "film-pane", hidden: !data.film });
+    this.video = element("video", { playsinline: true, "aria-label": "The film" });
+    this.video.muted = true;
+    this.start = element("input", { type: "text", id: "film-start", value: "0", inputmode: "decimal", autocomplete: "off", "aria-label": "Time of the film at which the run begins, s" });
+    this.start.addEventListener("change", () => this.seek(this.sample));
+    pane.append(this.video, element("label", { class: "film-start" }, "the run begins in the film at", element("span", { class: "field" }, this.start, element("span", { class: "unit", text: "s" })),
+      data.compared ? element("span", { text: "dashed: tracked in the film" }) : null));
+    this.pane = pane;
+    if (data.film) {
+      this.video.src = data.film.url;
+      this.start.value = String(data.film.start);
+    }
+    return pane;
+  }
+
+  filmInput() {
+    const input = element("input", { type: "file", id: "beside-film", accept: "video/*", onchange: () => input.files[0] && this.addFilm(input.files[0]) });
+    return input;
+  }
+
+  addFilm(file) {
+    if (this.url) URL.revokeObjectURL(this.url);
+    this.video.src = this.url = URL.createObjectURL(file);
+    this.pane.hidden = false;
+    this.video.addEventListener("loadeddata", () => this.follow(), { once: true });
+  }
+
+  // The film goes where the run is; while both play it is only put right where it has drifted.
+  follow() {
+    if (!this.video?.src || this.video.readyState < 1) return;
+    const wanted = Math.min(Math.max(this.time - this.first + (Number.parseFloat(this.start.value.replace(",", ".")) || 0), 0), this.video.duration || 0);
+    const playing = this.playing && this.pace <= 4 && wanted < this.video.duration - 0.05;
+    if (playing !== !this.video.paused) (playing ? this.video.play().catch(() => null) : this.video.pause());
+    if (playing) this.video.playbackRate = Math.max(this.pace, 0.0625);
+    if (Math.abs(this.video.currentTime - wanted) > (playing ? 0.15 : 0.01) && !this.video.seeking) this.video.currentTime = wanted;
   }
 
   toggle() {
@@ -98,6 +147,7 @@ class Replay {
 
   end() {
     this.going = false;
+    if (this.url) URL.revokeObjectURL(this.url);
   }
 
   tick(at) {
@@ -110,6 +160,7 @@ class Replay {
       if (Number(this.slider.value) !== this.sample) this.showAt(Number(this.slider.value));
       if (this.time >= this.last) this.play(false);
     }
+    this.follow();
     this.stage.tick(at);
     if (this.stale && this.stage.canvas.clientWidth > 0) this.write();
     requestAnimationFrame((next) => this.tick(next));
