@@ -16,7 +16,7 @@ from spirillum.view.figures.posterior import posterior_figure, profile_figure
 from spirillum.view.figures.rows import draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import spread
-from spirillum.view.figures.style import COLOURS, Scale, label_of_model, look_of_model, plain, styled
+from spirillum.view.figures.style import COLOURS, PATCH, Scale, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -213,10 +213,10 @@ def residual_figure(found: Calibrated) -> Figure:
     with styled():
         handles = [Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label="95 % interval of the mean")]
         if found.discrepancy:
-            patch = Line2D([], [], color=COLOURS["orange"], alpha=0.35, linewidth=7.0, label="discrepancy, two sigma")
+            patch = Line2D([], [], color=COLOURS["orange"], alpha=0.35, **PATCH, label="discrepancy, two sigma")
             handles.append(patch)
         sheet = Sheet(
-            "What the fitted model leaves",
+            "Residuals of the fitted model",
             _source(found),
             width=width_of(1, 6.4),
             heights=[1.5] * len(names),

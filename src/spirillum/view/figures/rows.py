@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from spirillum.arrays import Values
 from spirillum.units import Hz
 from spirillum.view.figures.study_view import StudyView, spread
-from spirillum.view.figures.style import COLOURS, Look, Scale, label_of_model, look_of_model
+from spirillum.view.figures.style import COLOURS, PATCH, Look, Scale, label_of_model, look_of_model
 
 __all__ = [
     "Row",
@@ -282,9 +282,7 @@ def model_handles(shown: StudyView, *, own_drive: bool) -> list[Line2D]:
 def band_handles(shown: StudyView) -> list[Line2D]:
     """Legend entries for the models that have a band."""
     return [
-        Line2D(
-            [], [], color=look_of_model(name).colour, alpha=_SHADE, linewidth=7.0, label=f"{label_of_model(name)}: band"
-        )
+        Line2D([], [], color=look_of_model(name).colour, alpha=_SHADE, **PATCH, label=f"{label_of_model(name)}: band")
         for name in shown.banded
     ]
 

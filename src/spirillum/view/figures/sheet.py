@@ -140,7 +140,8 @@ def _wrap(text: Text) -> None:
 
     wanted = text.get_text()
     space = width("n n") - width("nn")
-    widths = {word: width(word) for word in set(wanted.split())}
+    # Not `split()`: a space that does not break holds a word together.
+    widths = {word: width(word) for word in set(wanted.replace("\n", " ").split(" ")) if word}
     lines = []
     for line in wanted.split("\n"):
         words: list[str] = []
