@@ -5,6 +5,7 @@ import pytest
 
 from spirillum.errors import InputError
 from spirillum.measurement.clicks import (
+    across,
     length_per_pixel_between,
     nose_side,
     spacing_between,
@@ -60,8 +61,19 @@ def test_scale_at_the_axis_follows_similar_triangles() -> None:
 def test_nose_and_rear_say_the_direction() -> None:
     assert nose_side((200.0, 80.0), (100.0, 90.0)) == "right"
     assert nose_side((100.0, 90.0), (200.0, 80.0)) == "left"
-    with pytest.raises(InputError, match="quarter"):
-        nose_side((100.0, 90.0), (110.0, 200.0))
+    assert nose_side((100.0, 90.0), (110.0, 200.0)) == "up"
+    assert nose_side((100.0, 200.0), (110.0, 90.0)) == "down"
+    with pytest.raises(InputError, match="pixels apart"):
+        nose_side((100.0, 90.0), (110.0, 92.0))
+
+
+@pytest.mark.parametrize(("direction", "turn"), [("right", 0), ("down", 1), ("left", 2), ("up", 3)])
+def test_stripes_keep_their_order_when_the_picture_is_turned(direction: str, turn: int) -> None:
+    """Pixels count downwards: a quarter turn clockwise takes (u, v) to (-v, u)."""
+    points = [(50.0, v) for v in (10.0, 20.0, 30.0)]
+    for _ in range(turn):
+        points = [(-v, u) for u, v in points]
+    assert across(points[::-1], direction) == points
 
 
 @pytest.mark.parametrize("lamp", [0.6, 1.0])
@@ -75,17 +87,16 @@ def test_colours_are_named_under_a_dim_lamp(lamp: float) -> None:
 
 
 def test_stripes_in_view_say_the_order_of_all() -> None:
-    assert stripes_in_order(["blue", "red", "yellow"], "right", RING)[0] == ()
-    assert stripes_in_order(["yellow", "red", "blue"], "left", RING)[0] == ()
-    turned, words = stripes_in_order(["yellow", "red", "blue"], "right", RING)
+    assert stripes_in_order(["blue", "red", "yellow"], RING)[0] == ()
+    turned, words = stripes_in_order(["yellow", "red", "blue"], RING)
     assert turned == RING[::-1]
     assert "opposite" in words
     other = ["red", "green", "yellow", "blue"]
-    assert stripes_in_order(other, "right", RING)[0] == tuple(other * 2)
-    assert stripes_in_order(["cyan", "black", "cyan"], "right", RING)[0] == ("cyan", "black") * 4
+    assert stripes_in_order(other, RING)[0] == tuple(other * 2)
+    assert stripes_in_order(["cyan", "black", "cyan"], RING)[0] == ("cyan", "black") * 4
     for wrong, sentence in ((["red", "green"], "first comes again"), (["red"], "fewer than two")):
         with pytest.raises(InputError, match=sentence):
-            stripes_in_order(wrong, "right", RING)
+            stripes_in_order(wrong, RING)
 
 
 def test_fields_are_their_file_and_back() -> None:

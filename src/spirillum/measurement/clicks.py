@@ -14,7 +14,7 @@ from spirillum.robot.parts import StripeColour
 from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.track.colours import colours_named
 
-__all__ = ["length_per_pixel_between", "nose_side", "spacing_between", "stripe_names", "stripes_in_order"]
+__all__ = ["across", "length_per_pixel_between", "nose_side", "spacing_between", "stripe_names", "stripes_in_order"]
 
 _SURE = 0.25
 """Largest distance of the number of spacings between two clicks from a whole number."""
@@ -97,22 +97,32 @@ def length_per_pixel_between(
 
 
 def nose_side(nose: tuple[float, float], rear: tuple[float, float]) -> str:
-    """`right` or `left`: where in the picture the nose points.
+    """`right`, `left`, `up` or `down`: where in the picture the nose points, to an eighth of a turn.
 
     Args:
         nose: pixel (u, v) of the nose.
         rear: pixel of the body's rear end.
 
     Raises:
-        InputError: if the body does not lie along the rows of the picture.
+        InputError: if the clicks are too close to each other.
     """
-    along, across = nose[0] - rear[0], nose[1] - rear[1]
-    if abs(along) < 2.0 * abs(across) or abs(along) < _SHORTEST:
-        raise InputError(
-            "nose and rear do not lie beside each other along the rows of the picture; allowed: a body along the rows: "
-            "turn the film by a quarter where it is not"
-        )
-    return "right" if along > 0 else "left"
+    along, down = nose[0] - rear[0], nose[1] - rear[1]
+    if max(abs(along), abs(down)) < _SHORTEST:
+        raise InputError(f"nose and rear are {max(abs(along), abs(down)):.0f} pixels apart; allowed: {_SHORTEST:.0f}")
+    if abs(along) >= abs(down):
+        return "right" if along > 0 else "left"
+    return "down" if down > 0 else "up"
+
+
+def across(points: Sequence[tuple[float, float]], direction: str) -> list[tuple[float, float]]:
+    """Points in the order in which stripes follow each other: from the left of a robot that looks along to its right.
+
+    Args:
+        points: pixels (u, v).
+        direction: where the nose points.
+    """
+    right = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}[direction]
+    return sorted(points, key=lambda point: right[0] * point[0] + right[1] * point[1])
 
 
 def stripe_names(image: np.ndarray, clicks: Sequence[tuple[float, float]], allowed: Sequence[str] = ()) -> list[str]:
@@ -132,14 +142,13 @@ def stripe_names(image: np.ndarray, clicks: Sequence[tuple[float, float]], allow
     return colours_named(np.array(found), list(dict.fromkeys(allowed)) or list(get_args(StripeColour)))
 
 
-def stripes_in_order(clicked: Sequence[str], direction: str, stated: Sequence[str]) -> tuple[tuple[str, ...], str]:
+def stripes_in_order(seen: Sequence[str], stated: Sequence[str]) -> tuple[tuple[str, ...], str]:
     """Order of all stripes from those that are in view.
 
-    With the nose to the right the stripes follow each other downwards in the picture, whichever side is seen.
+    Whichever side of the body is seen, they follow each other as `across` puts their places.
 
     Args:
-        clicked: names from the upper edge of the body to the lower.
-        direction: where the nose points, `right` or `left`.
+        seen: names in that order.
         stated: stripes of the robot file in their order.
 
     Returns:
@@ -148,12 +157,11 @@ def stripes_in_order(clicked: Sequence[str], direction: str, stated: Sequence[st
     Raises:
         InputError: if the clicks do not say it.
     """
-    seen = list(clicked if direction == "right" else reversed(clicked))
     seen = [name for k, name in enumerate(seen) if k == 0 or name != seen[k - 1]]
     if not stated:
         raise InputError("the robot file has no seal.stripes; allowed: a robot file that names them")
     if len(set(seen)) < 2:
-        raise InputError("fewer than two colours were clicked; allowed: two at least, from the upper edge to the lower")
+        raise InputError("fewer than two colours were clicked; allowed: two at least, across the body")
     if set(seen) <= set(stated):
         forward, backward = _follows(seen, stated), _follows(seen, stated[::-1])
         if forward and backward:

@@ -136,8 +136,8 @@ class Desk:
         """Fill in a field by pointing at the picture; what came of it, in a sentence.
 
         Args:
-            what: `ruler` (two marks, and the length between them), `body` (nose and rear end), or `stripes` (from
-                the upper edge of the body to the lower).
+            what: `ruler` (two marks, and the length between them), `body` (nose and rear end), or `stripes` (across
+                the body).
             name: the film.
             time: of the frame, s.
             points: pixels (u, v).
@@ -146,13 +146,14 @@ class Desk:
         Raises:
             InputError: if the clicks do not say it.
         """
-        from spirillum.measurement.clicks import nose_side, stripe_names, stripes_in_order
+        from spirillum.measurement.clicks import across, nose_side, stripe_names, stripes_in_order
 
         if what == "stripes":
             robot = self._robot()
             stated = robot.seal.stripes if robot.seal else ()
-            seen = stripe_names(self._films.frame(name, time), points, stated)
-            stripes, sentence = stripes_in_order(seen, self._fields.get("robot.direction", "right"), stated)
+            places = across(points, self._fields.get("robot.direction", "right"))
+            seen = stripe_names(self._films.frame(name, time), places, stated)
+            stripes, sentence = stripes_in_order(seen, stated)
             self._put("robot.stripes", list(stripes))
             return f"{', '.join(seen)}: {sentence}"
         if len(points) != 2:

@@ -32,7 +32,14 @@ class Entry:
 
 
 FORM: tuple[Entry, ...] = (
-    Entry("robot.direction", "Nose points", "Picture", "", "Where in the picture the nose points.", ("right", "left")),
+    Entry(
+        "robot.direction",
+        "Nose points",
+        "Picture",
+        "",
+        "Where in the picture the nose points.",
+        ("right", "left", "up", "down"),
+    ),
     Entry(
         "robot.stripes",
         "Stripes",

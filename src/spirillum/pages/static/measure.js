@@ -7,7 +7,7 @@ import { Pointing } from "./pointing.js";
 const POINTED = {
   ruler: { name: "Ruler", count: 2, words: "Click two marks of the ruler, far apart, and say what length lies between them." },
   body: { name: "Body", count: 2, words: "Click the nose, then the rear end of the body." },
-  stripes: { name: "Stripes", count: 0, words: "Click the stripes from the upper edge of the body to the lower, each once; then take them." },
+  stripes: { name: "Stripes", count: 0, words: "Click every stripe that is seen across the body, once each; then take them." },
 };
 const WAIT = 350; // ms from a change to its check
 const POLL = 400; // ms between two questions for progress
@@ -397,6 +397,10 @@ export class Measure {
   }
 }
 
+function minus(text) {
+  return text.replace("-", "\u2212");
+}
+
 function kept(name) {
   return element("a", { class: "plain calm", href: `/bench/file?name=${encodeURIComponent(name)}&take=1`, download: name, text: name });
 }
@@ -410,5 +414,5 @@ function table(rows) {
   const head = element("thead", {}, element("tr", {}, ...["", "value", "low", "high"].map((text) => element("th", { scope: "col", text }))));
   return element("table", { class: "found" }, head, element("tbody", {}, ...rows.map((row) => element("tr", { title: row.reason, "data-measured": row.name, "data-si": row.si },
     element("th", { scope: "row" }, capital(row.label), element("small", { text: row.unit ? ` ${row.unit}` : "" })),
-    element("td", { class: "now", text: row.value === "-" ? "\u2013" : row.value }), element("td", { class: "range", text: row.low === "-" ? "" : row.low }), element("td", { class: "range", text: row.high === "-" ? "" : row.high })))));
+    element("td", { class: "now", text: row.value === "-" ? "\u2013" : minus(row.value) }), ...[row.low, row.high].map((end) => element("td", { class: "range", text: end === "-" ? "" : minus(end) }))))));
 }

@@ -67,7 +67,7 @@ export class Study {
         this.words.textContent = `${words}; it swims`;
       },
     });
-    button.style.background = `color-mix(in srgb, var(--accent) ${Math.round(10 + 60 * share)}%, var(--card))`;
+    button.style.background = `color-mix(in srgb, var(--accent) ${Math.round(8 + 37 * share)}%, var(--card))`;
     return button;
   }
 }
