@@ -62,6 +62,20 @@ def test_a_scale_off_by_a_twentieth_widens_the_interval_beyond_its_error(film, c
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
+@pytest.mark.parametrize("factor", [0.8, 1.25])
+def test_a_wrong_spacing_of_the_ruler_is_named(film, factor):
+    flat, tracked = film
+    track = tracked(markers_spacing=f'"{2.0 * factor} mm"')
+    flag = flags(track)["size-does-not-fit"]
+    assert "forward_velocity" in flag.spoils
+    assert f"in place of {2.0 * factor:.3g} mm would fit" in flag.sentence
+    named = float(flag.sentence.partition("markers.spacing = ")[2].split(" ")[0])
+    assert named == pytest.approx(2.0, rel=0.04)  # a pixel or so of a body of 70
+    assert slope(track.time, track.tail_phase) == pytest.approx(flat.tail_rate, rel=2e-3)
+    withheld = any("body_rotation_rate" in flag.spoils for flag in track.flags)  # stripes may seem uneven by the scale
+    assert withheld or slope(track.time, track.body_angle) == pytest.approx(flat.body_rate, rel=0.02)
+
+
 def test_a_stated_uncertainty_of_depth_explains_it(film):
     flat, tracked = film
     found = tracked(robot_axis_height='"25 mm"', robot_axis_height_uncertainty='"10 mm"')

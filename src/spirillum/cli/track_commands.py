@@ -100,7 +100,9 @@ def _end(result: Tracked) -> None:
     if result.trial is not None:
         rates = [result.trial.quantities[name] for name in RATE_NAMES]
         if all(rate.value != rate.value for rate in rates):
-            raise InputError(f"{result.source}: no rate could be given: {rates[0].reason}")
+            slow = result.pace == "real" and result.dropped > result.tracked
+            hint = "; most frames passed while the robot was learnt: --pace fast looks at all of them" if slow else ""
+            raise InputError(f"{result.source}: no rate could be given: {rates[0].reason}{hint}")
 
 
 def _size(word: str) -> tuple[int, int]:

@@ -72,7 +72,7 @@ class Following:
         self.readings = Readings(_LOOKED_BACK)
         self.camera = CameraWatch(learnt.known.start, ruled=ruled)
         start = learnt.known.start
-        self.scale, size_flags = checked_scale(learnt.sight.scale, start.body, learnt.known.size)
+        self.scale, size_flags = checked_scale(learnt.sight.scale, start.body, learnt.known.size, setup.markers.spacing)
         self.roll, rolled = (0.0, ()) if ruled else self._roll()
         self.always = (*learnt.sight.flags, *size_flags, *rolled, *_synthetic(video))
         self.moved: tuple[Flag, ...] = ()

@@ -189,13 +189,20 @@ class _Log:
                 "frames are lost, or the rate is another than stated; all rates are wrong by that factor"
             )
 
+    def _hint(self) -> str:
+        """What helps a film that has ended while the robot was still learnt."""
+        if self.source.kind != "film" or self.pace == "fast":
+            return ""
+        return "; a film this short is tracked with --pace fast, which waits for the learning"
+
     def answer(self) -> Tracked:
         """The answer."""
         trial = None
         try:
             trial = self.tracker.summary()
         except InputError as error:
-            self.stopped = f"{self.stopped}; {error}" if self.stopped else str(error)
+            said = f"{error}{self._hint()}"
+            self.stopped = f"{self.stopped}; {said}" if self.stopped else said
         return Tracked(
             source=self.source.name,
             pace=self.pace,

@@ -165,7 +165,7 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     frames = samples_of(video, setup.start, setup.end)
     learnt = learnt_from(video, frames, setup, robot, folder)
     start, known = learnt.known.start, learnt.known
-    scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size)
+    scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing)
     moved = camera_flags(frames, start, ruled=setup.markers.spacing is not None)
     seen = {
         "name": video.name,

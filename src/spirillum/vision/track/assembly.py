@@ -28,6 +28,13 @@ from spirillum.vision.video.frames import Video
 
 __all__ = ["track_of"]
 
+_DOUBTFUL_STRIPES = Flag(
+    "stripes-do-not-fit",
+    "the stripes seem uneven on a body that is not as large as it should be: the wrong scale may be the reason; the "
+    "body's rotation is not given: correct spacing, heights or robot file first",
+    ("body_rotation_rate",),
+)
+
 
 def track_of(
     video: Video,
@@ -70,7 +77,9 @@ def track_of(
     even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
-    scale, size_flags = checked_scale(sight.scale, body, known.size)
+    scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
+    if even.flags and any(flag.spoils for flag in size_flags):
+        roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))

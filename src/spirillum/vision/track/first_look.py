@@ -160,6 +160,8 @@ def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
         InputError: if it is clear on none.
     """
     times = np.array([frame.time for frame in about.frames])
+    if not about.frames:
+        raise InputError(f"{name}: no robot like '{body.robot.name}' can be followed in it; {_ALLOWED}")
     found = body.learn([frame.image for frame in about.frames], about.poses, times)
     good = [(frame, one) for frame, one in zip(about.frames, found, strict=True) if one.known]
     if not good:

@@ -15,13 +15,16 @@ from spirillum.vision.camera.optics import BodyPose
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
-from spirillum.vision.track.constants import IDENTITY, SIZE
+from spirillum.vision.track.constants import FIRST_LOOK, IDENTITY, SIZE
 from spirillum.vision.track.first_look import Start, first_look
 from spirillum.vision.track.size import LENGTHS, best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.track.tail import TailWave
 from spirillum.vision.track.warnings import EVERYTHING
 from spirillum.vision.video.frames import Frame
+
+_SIZES = (1.0, 0.3, 3.3)
+"""Apparent sizes over the stated one, about which from half to twice is looked through, one after the other."""
 
 __all__ = ["Identified", "identified_at", "identify"]
 
@@ -36,6 +39,12 @@ class Identified(NamedTuple):
     """Apparent size over the size of the robot file at the stated scale."""
     robot: bool
     """Whether stripes or tail match the robot; both have to where size or contrast are unexpected."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether the tail is where it should be, and as the file says: at a wrong scale chance shows a body alone."""
+        wire = self.wire
+        return wire.readable > IDENTITY.sure_share and not any(flag.spoils for flag in wire.flags)
 
     @property
     def flags(self) -> tuple[Flag, ...]:
@@ -77,16 +86,20 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     found: Identified | InputError
     try:
         found = identified_at(name, setup, stated, frames, still, 1.0)
-        if found.robot:
+        if found.robot and found.whole:
             return found
     except InputError as error:
         found = error
-    size = best_other_size(stated, [frame.image for frame in frames], still)
-    if size is not None:
-        with suppress(InputError):
-            other = identified_at(name, setup, resized(stated, size), frames, still, size)
-            if other.robot:
-                return other
+    half = not isinstance(found, InputError) and found.robot  # its tail does not fit: another size has to fit wholly
+    images = [frame.image for frame in frames]
+    for about in _SIZES[:1] if half else _SIZES:
+        least = FIRST_LOOK.clearness if half else SIZE.clearness
+        size = best_other_size(resized(stated, about), images, still, least)
+        if size is not None:
+            with suppress(InputError):
+                other = identified_at(name, setup, resized(stated, about * size), frames, still, about * size)
+                if other.robot and (other.whole or not half):
+                    return other
     if isinstance(found, InputError):
         raise found
     return found

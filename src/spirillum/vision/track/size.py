@@ -54,13 +54,16 @@ def _resemblance(found: Sequence[Sequence[Candidate]]) -> float:
     return clearness(found) * float(np.median([some[0].score if some else 0.0 for some in found]))
 
 
-def best_other_size(body: BodyFinder, images: Sequence[np.ndarray], still: Samples) -> float | None:
+def best_other_size(
+    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, least: float = SIZE.clearness
+) -> float | None:
     """The size, from half to twice the stated one, at which an object resembles the robot most.
 
     Args:
         body: the robot's body at the stated scale.
         images: some frames, 8-bit RGB, (h, w, 3) each.
         still: static background of the frames, (h, w, 3).
+        least: clearness from which on a detection counts.
 
     Returns:
         The size over the stated one; None if no detection is clear.
@@ -73,7 +76,7 @@ def best_other_size(body: BodyFinder, images: Sequence[np.ndarray], still: Sampl
 
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
         tried = list(pool.map(at, _SIZES))
-    resemblance = [_resemblance(places) if clearness(places) > SIZE.clearness else 0.0 for places in tried]
+    resemblance = [_resemblance(places) if clearness(places) > least else 0.0 for places in tried]
     best = int(np.argmax(resemblance))
     return float(_SIZES[best]) if resemblance[best] > 0.0 else None
 
@@ -147,13 +150,16 @@ def _blurred(steep: Samples) -> Samples:
     return np.asarray(around @ (bell / bell.sum()))
 
 
-def checked_scale(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, tuple[Flag, ...]]:
+def checked_scale(
+    scale: Scale, body: BodyFinder, size: float, spacing: float | None = None
+) -> tuple[Scale, tuple[Flag, ...]]:
     """The scale with its apparent size, a larger uncertainty and a flag where the size contradicts it.
 
     Args:
         scale: the scale by the ruler.
         body: the body.
         size: its apparent size over that of the robot file.
+        spacing: of the ruler's lines as the setup states it, m; None without a ruler.
     """
     scale = replace(scale, apparent_size=size)
     half = 0.5 * body.robot.body.length / scale.length_per_pixel
@@ -163,8 +169,14 @@ def checked_scale(scale: Scale, body: BodyFinder, size: float) -> tuple[Scale, t
     how = f"{100 * abs(size - 1.0):.1f} % {'larger' if size > 1.0 else 'smaller'} than its file says"
     if off > SIZE.largest_difference:
         how = f"{size:.3g} times as large as its file says"
+    would = (
+        ""
+        if spacing is None
+        else f" (about markers.spacing = {1e3 * spacing / size:.3g} mm in place of {1e3 * spacing:.3g} mm would fit)"
+    )
     sentence = (
-        f"the body looks {how} at this scale: spacing, heights or index of the setup, or the robot's size, are wrong; "
+        f"the body looks {how} at this scale: spacing, heights or index of the setup, or the robot's size, are wrong"
+        f"{would}; "
     )
     if off > SIZE.largest_difference:
         return scale, (Flag("size-does-not-fit", sentence + "no length and no speed is given", LENGTHS),)

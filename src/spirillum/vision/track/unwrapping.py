@@ -266,7 +266,7 @@ def no_stripe_passes(motion: Motion, robot: Robot) -> tuple[Flag, ...]:
     sentence = (
         f"the body turns by less than {np.degrees(UNWRAPPING.seen_to_pass):.0f} degrees while its tail makes "
         f"{turns:.1f} turns: no stripe was seen to pass, and shades of the lamp may be taken for stripes; the body's "
-        "rotation is not given: check that the seal has the stripes of the robot file"
+        "rotation is not given: check that the seal has the stripes of the robot file, and that the body is not stuck"
     )
     return (Flag("stripes-do-not-pass", sentence, _RATES["body"]),)
 
