@@ -52,7 +52,6 @@ COMMANDS: dict[str, list[str]] = {
     ],
     "design": ["design", WIDE, "--model", "rft", "--maximise", "forward_velocity", *_VARY, "-o", "out.toml"],
     "store": ["study", "s.toml", "--store", "out.zarr"],
-    "track": ["track", "a.mp4", "--setup", "a.setup.toml", "--pace", "fast"],
     "new": ["robot", "new", "out.toml"],
 }
 _ROWS = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"
@@ -173,7 +172,7 @@ class Faults:
         half = {path: data for path, data in files_of(folder).items() if path in whole and ".spirillum" not in path}
         ours = {path for path, data in half.items() if whole[path] != data and path.endswith((".nc", ".toml", ".csv"))}
         wrong += [f"half or other files: {sorted(ours)}"] if ours else []
-        if name == "new" and (folder / "out.toml").exists():
+        if name in ("new", "design") and (folder / "out.toml").exists():
             (folder / "out.toml").unlink()  # a file for users to edit is never replaced
         wrong += [f"again: {word}" for word in wrong_words(ended(started(COMMANDS[name], folder)), (0,))]
         after = files_of(folder)
