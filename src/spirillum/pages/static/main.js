@@ -159,7 +159,7 @@ class Lane {
   flowWords() {
     if (this.flow?.failed) return `The flow: ${this.flow.failed}.`;
     if (this.flow && !this.flow.done) return `Flow on the plane of the axis: ${this.flow.what} \u2026`;
-    if (!this.plane) return this.forcesOn && this.numbers && !this.numbers.forces.some((force) => force.axis === "x") ? "Drag and thrust come with the flow" : "";
+    if (!this.plane) return this.forcesOn && state.lanes.length === 1 && this.numbers && !this.numbers.forces.some((force) => force.axis === "x") ? "Drag and thrust come with the flow" : "";
     const speed = this.quantities.forward_velocity;
     return `Flow of steady swimming (${this.plane.model}), tail at ${Math.round((180 / Math.PI) * this.plane.phase)}\u00b0; full colour: ${inUnit(this.plane.fastest, speed, 2)} ${unitText(speed.unit)}`;
   }

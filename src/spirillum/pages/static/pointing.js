@@ -2,7 +2,7 @@
 
 import { colourOf, element, fitted } from "./format.js";
 
-const MAGNIFIED = 6, LENS = 58; // of the magnifier: enlargement, radius in pixels of the screen
+const LENS = 64; // radius of the magnifier, pixels of the screen
 
 export class Pointing {
   constructor(holder, added) {
@@ -89,7 +89,8 @@ export class Pointing {
   magnify(context, [x, y], width, scale) {
     const right = x + 2.6 * LENS < width;
     const centre = [right ? x + 1.5 * LENS : x - 1.5 * LENS, Math.max(y - LENS, LENS + 4)];
-    const part = LENS / (scale * MAGNIFIED), [u, v] = this.cursor;
+    const enlarged = Math.max(2 * scale, Math.min(9, 6 * scale)); // pixels of the screen for one of the film
+    const part = LENS / enlarged, [u, v] = this.cursor;
     context.save();
     context.beginPath();
     context.arc(...centre, LENS, 0, 2 * Math.PI);

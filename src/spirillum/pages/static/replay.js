@@ -132,6 +132,7 @@ class Replay {
   showAt(sample) {
     const { run } = this;
     this.sample = sample;
+    this.slider.value = String(sample);
     this.shown = {
       time: run.time[sample], position: run.position[sample], attitude: run.attitude[sample], tail_phase: run.tail_phase[sample],
       values: Object.fromEntries(Object.entries(run.values).map(([name, column]) => [name, column[sample]])),
