@@ -369,8 +369,10 @@ export class Measure {
   calibration(measure, found) {
     const select = (id, values) => element("select", { id, "aria-label": capital(id.split("-")[1]) }, ...values.map((value) => element("option", { value, text: value })));
     const model = select("calibrated-model", this.state.models), method = select("calibrated-method", this.state.methods);
+    if (found) [model.value, method.value] = [found.model, found.method];
     const go = element("button", { class: "plain calm", id: "calibrate-go", text: "Calibrate", disabled: !measure.files.includes("observations.csv"), onclick: () => this.attempt("calibration", () => this.ask("calibrate", { model: model.value, method: method.value })) });
-    const shown = found ? [element("h3", { text: `Model ${found.model}, ${found.method}` }), table(found.rows), ...(found.statement ? [element("p", { class: "under", text: found.statement })] : []), ...warnings(found.warnings),
+    const shown = found ? [element("h3", { text: `Model ${found.model}, ${found.method}` }), table(found.rows), ...(found.statement ? [element("p", { class: "under told", text: `${capital(found.statement)}.` })] : []), ...warnings(found.warnings),
+      ...found.figures.filter((name) => /observed-/.test(name)).map((name) => element("img", { class: "drawn", src: `/bench/file?name=${encodeURIComponent(name)}`, alt: "Observed against predicted" })),
       element("p", { class: "files" }, ...found.files.map(kept))] : [];
     return element("section", { class: "said", id: "calibration" }, element("h3", { text: "Calibrate the model with it" }),
       element("div", { class: "step-row" }, model, method, go), this.lines.calibration, ...shown);
