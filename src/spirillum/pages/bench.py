@@ -29,7 +29,8 @@ class Bench:
 
     def __init__(self) -> None:
         """An empty bench."""
-        self._folder = Path(tempfile.mkdtemp(prefix="spirillum-page-"))
+        self._kept = tempfile.TemporaryDirectory(prefix="spirillum-page-", ignore_cleanup_errors=True)
+        self._folder = Path(self._kept.name)  # goes with the process, also where it ends before it has served
         self._lock = threading.RLock()
         self.films = Films(self._folder)
         self.desk = Desk(self._folder, self.films)
@@ -41,7 +42,7 @@ class Bench:
     def close(self) -> None:
         """Stop what runs, and remove all files."""
         self.stop()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._kept.cleanup()
 
     def measure(self) -> None:
         """Begin to measure all films.
