@@ -170,10 +170,11 @@ def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
         dataset: the study.
         store: its folder.
     """
+    sizes = {**dataset["outside"].sizes, **dataset.sizes}  # in the order of the results
     content = {
         "title": dataset.attrs["title"],
         "folder": str(store),
-        "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
+        "dimensions": {str(name): int(size) for name, size in sizes.items()},
         "results": int(np.prod(dataset["outside"].shape)),
         "unanswered": int(dataset.attrs["unanswered"]),
         "observations": dataset.attrs["observations"],
