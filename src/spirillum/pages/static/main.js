@@ -249,7 +249,7 @@ function setFrame(frame) {
     state.told = performance.now();
     numbers.now(first.values);
   }
-  if (frame.behind > BEHIND) $("behind").textContent = "slower than asked";
+  if (frame.playing && frame.behind > BEHIND) $("behind").textContent = "slower than asked";
   else if ($("behind").textContent === "slower than asked") $("behind").textContent = "";
 }
 
