@@ -1,10 +1,12 @@
 """The ranking of a study: the fastest first, bands at the same places, units that fit the robots."""
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import spirillum as sp
 from spirillum.results.study_report import write_report
@@ -74,3 +76,30 @@ def test_robots_without_a_motor_are_ranked_by_power_and_equal_ones_are_called_so
     assert all(item.alike for item in found.best)
     assert found.message == "fastest: ecoli, 18.94 um/s" or found.message.endswith("um/s")
     assert found.walls is False
+
+
+def test_the_order_of_a_datasets_dimensions_changes_no_ranking() -> None:
+    dataset = sp.study(GRID)
+    shape = (*dataset["forward_velocity"].shape, 3)
+    dataset["forward_velocity_at_place"] = (
+        (*dataset["forward_velocity"].dims, "place"),
+        np.random.default_rng(1).random(shape),
+    )
+    turned = dataset.transpose("amplitude", "place", "wavelength", "channel", ...)
+    assert repr(ranking_of(turned)) == repr(ranking_of(dataset))
+    assert str(turned).splitlines()[:8] == str(dataset).splitlines()[:8]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda study: study.isel(model=[0, 0]),
+        lambda study: study.isel(model=slice(0, 0)),
+        lambda study: study.drop_vars("model"),
+        lambda study: study.stack(tail=("wavelength", "amplitude")),
+        lambda study: xr.concat([study, study], dim="again"),
+        lambda study: study.assign(forward_velocity=np.nan * study["forward_velocity"]),
+    ],
+)
+def test_a_study_that_was_changed_prints_what_it_can(changed: Callable[[xr.Dataset], xr.Dataset]) -> None:
+    assert str(changed(sp.study({**GRID, "models": ["rft"]})))

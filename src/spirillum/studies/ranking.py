@@ -179,8 +179,15 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
     Args:
         dataset: any dataset.
     """
-    robots = {"robot"} if "robot" in dataset.dims else {"channel", "wavelength", "amplitude"}
-    return {"model", "friction", *robots} <= set(dataset.dims) and {*RANKED} <= set(dataset.data_vars)
+    chosen, indexes = ("model", "friction"), dataset.indexes
+    named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
+    over = {*chosen, *_robot_dims(dataset)}
+    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED)
+
+
+def _robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Dimensions over which the robots go, in the flat order of the study."""
+    return ("robot",) if "robot" in dataset.dims else ("channel", "wavelength", "amplitude")
 
 
 def ranking_of(dataset: xr.Dataset) -> StudyRanking:
@@ -208,7 +215,7 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
         )
         for index in order
     }
-    best = tuple(_best(chosen, name, values[name], ranked) for name in known if np.isfinite(values[name]).any())
+    best = tuple(_best(chosen, name, values[name], ranked) for name in known if np.isfinite(values[name][order]).any())
     left_out = walled and not SWIMMER_MODELS[model].placed
     return StudyRanking(model, reading, left_out, kind if ranked else "", tuple(ranked.values()), best)
 
@@ -243,7 +250,7 @@ def _names(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _flat(chosen: xr.Dataset, name: str, names: list[str]) -> Values:
-    found: Values = np.asarray(chosen[name].values, dtype=float).reshape(len(names))
+    found: Values = chosen[name].transpose(*_robot_dims(chosen)).values.astype(float).reshape(len(names))
     return found
 
 
@@ -272,7 +279,7 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     places = chosen.get(f"{name}_at_place")
     if places is None:
         return Best(word, name, ranked[winner], 0, 0, spread)
-    there = sign * np.asarray(places.values, dtype=float).reshape(values.size, -1)
+    there = sign * places.transpose(*_robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(np.argmax(there, axis=0) == winner)) if there.shape[1] else 0
     return Best(word, name, ranked[winner], wins, there.shape[1], spread)
