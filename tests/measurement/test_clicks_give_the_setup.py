@@ -113,3 +113,9 @@ def test_fields_are_their_file_and_back() -> None:
     assert setup_fields(setup_file(fields), "the file") == fields
     assert setup_problems(fields) == []
     assert setup_problems({"camera.height": "210 apples", "tank.index": "x"})[0].startswith("camera.height")
+
+
+def test_no_clicks_name_no_stripes() -> None:
+    seen = stripe_names(np.zeros((9, 9, 3), np.uint8), [], RING)
+    with pytest.raises(InputError, match="fewer than two colours"):
+        stripes_in_order(seen, RING)

@@ -1,5 +1,6 @@
 """What is sent to the bench: refused where it is no film, kept under the page's own names, and removed with it."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,8 @@ def test_room_ends_with_what_is_kept(bench: Bench, monkeypatch: pytest.MonkeyPat
         {"camera.checkerboard.images": "/etc"},
         {"camera.height": ["210 mm"]},
         {"camera.height": "9" * 500},
+        {"camera.height": "\ud800"},
+        {"robot.stripes": "red\0"},
     ],
 )
 def test_no_field_names_a_file(bench: Bench, fields: dict[str, Any]) -> None:
@@ -101,6 +104,23 @@ def test_wrong_numbers_get_a_sentence_with_their_field(bench: Bench) -> None:
     assert any(one.startswith("robot.axis_height") for one in problems)
     with pytest.raises(InputError, match="no film"):
         bench.measure()
+
+
+@pytest.mark.parametrize("value", ["nan", "-inf", "1e400", float("nan")])
+@pytest.mark.parametrize("field", ["tank.index", "tank.index_uncertainty", "camera.frames_per_second"])
+def test_numbers_that_json_has_not_are_told_by_their_field(bench: Bench, field: str, value: Any) -> None:
+    bench.desk.set_fields({**WHOLE, "tank.surface": "60 mm", field: value})
+    assert [one for one in bench.desk.checked()["problems"] if one.startswith(field)]
+    json.dumps(bench.state(), allow_nan=False)
+
+
+def test_places_are_counted_when_they_are_given(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(films_module, "_MOST_FILMS", 2)
+    bench.films.room_for("mp4").unlink()
+    bench.films.room_for("mp4")
+    bench.films.room_for("mp4")
+    with pytest.raises(InputError, match="2 films are here already"):
+        bench.films.room_for("mp4")
 
 
 def test_decimal_commas_are_numbers() -> None:

@@ -1,5 +1,6 @@
 """Another page, another host, no key, too much: refused, by a server as it runs."""
 
+import asyncio
 import json
 import signal
 from http.client import HTTPConnection
@@ -10,6 +11,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from spirillum.errors import InputError
+from spirillum.pages import server
+from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.knobs import Settings
 
@@ -140,3 +143,50 @@ def test_rate_lets_a_burst_through_and_then_no_more() -> None:
 def test_only_knobs_can_be_turned() -> None:
     with pytest.raises(InputError, match="is no knob"):
         Settings("biorob2012-wide").changed("extends", "biorob2012-narrow")
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("click", {"what": "ruler", "points": [[10**400, 1], [2, 3]], "time": 0}),
+        ("click", {"what": "body", "points": [["nan", 1], [1e300, 3]], "time": 0}),
+        ("click", {"what": "stripes", "points": [], "time": float("inf")}),
+        ("text", {"text": "extends = 'biorob2012-wide'\ndescription = '\ud800'"}),
+        ("look", {"film": "\ud800"}),
+        ("measure", {}),
+        ("robot", {"lane": [[10**400]]}),
+    ],
+)
+def test_what_the_bench_cannot_take_gets_a_sentence(
+    served: Any, cookie: str, path: str, message: dict[str, Any]
+) -> None:
+    body = json.dumps(message).encode()
+    found = _answer(served, f"/bench/{path}", "POST", body, Cookie=cookie, Origin=served.base)
+    assert found.status == 400
+    assert b"allowed: " in found.content
+
+
+@pytest.mark.parametrize("path", ["/bench/film?kind=mp4", "/bench/state", "/replay", "/study"])
+def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("av")
+    pytest.importorskip("cv2")
+    bench = Bench()
+    monkeypatch.setattr(server, "Bench", lambda: bench)
+    guard = Guard("127.0.0.1", 1)
+    where, _, query = path.partition("?")
+    named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "cookie": f"{guard.cookie}={guard.key}"}
+    headers = [(name.encode(), value.encode()) for name, value in named.items()]
+    scope = {"type": "http", "method": "POST", "path": where, "query_string": query.encode(), "headers": headers}
+    comes = iter([{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}])
+    sent: list[Any] = []
+
+    async def receive() -> Any:
+        return next(comes)
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    asyncio.run(server.application("biorob2012-wide", guard)(scope, receive, send))
+    assert sent[0]["status"] == 400
+    assert not list(bench._folder.iterdir())
+    bench.close()

@@ -133,6 +133,8 @@ def stripe_names(image: np.ndarray, clicks: Sequence[tuple[float, float]], allow
         clicks: pixels (u, v).
         allowed: names to choose from; empty: all that there are.
     """
+    if not clicks:
+        return []
     height, width = image.shape[:2]
     found = []
     for u, v in clicks:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages.bench import Bench
 from spirillum.pages.films import LARGEST_ALL, LARGEST_FILM
@@ -21,6 +22,8 @@ from spirillum.pages.theatre import Theatre
 __all__ = ["bench_routes"]
 
 _MOST_POINTS = 40
+_FARTHEST = 1e6
+"""Largest pixel, or time in s, that is pointed at."""
 _SHOWN = {"mp4": "video/mp4", "png": "image/png"}
 """Kinds of results that the page shows; the others are taken away."""
 _Handler = Callable[[Request], Awaitable[Response]]
@@ -128,13 +131,13 @@ async def _received(request: Request, bench: Bench) -> str:
         InputError: if there is no room for it, or it is none.
     """
     path: Path = await asyncio.to_thread(bench.films.room_for, request.query_params.get("kind", ""))
-    left = await asyncio.to_thread(bench.films.room_left)
     try:
-        with path.open("xb") as stream:
+        left = await asyncio.to_thread(bench.films.room_left)
+        with path.open("wb") as stream:
             async for piece in _limited(request, left):
                 await asyncio.to_thread(stream.write, piece)
         return await asyncio.to_thread(bench.films.add, path)
-    except (InputError, ClientDisconnect, OSError):
+    except BaseException:
         path.unlink(missing_ok=True)
         raise
 
@@ -188,16 +191,19 @@ def _message(content: bytes) -> Mapping[str, Any]:
 
 def _text(message: Mapping[str, Any], name: str) -> str:
     value = message.get(name, "")
-    if not isinstance(value, str):
-        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):  # halves of letters
+        raise InputError(f"{name} = {clipped(value, 40)}; allowed: text")
     return value
 
 
 def _number(value: Any) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{str(value)[:40]!r} is no number; allowed: one") from error
+    with suppress(TypeError, ValueError, OverflowError):
+        number = float(value)
+        if abs(number) <= _FARTHEST:
+            return number
+    raise InputError(
+        f"{clipped(value, 40)} is no pixel or time; allowed: a number from {-_FARTHEST:g} to {_FARTHEST:g}"
+    )
 
 
 def _attached(name: str) -> dict[str, str]:

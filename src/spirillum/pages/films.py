@@ -51,7 +51,7 @@ class Films:
         self._count = 0
 
     def room_for(self, kind: str) -> Path:
-        """A place for a film that is sent.
+        """A place for a film that is sent: an empty file, so that others that are sent at once are counted.
 
         Args:
             kind: ending of its name, without the dot.
@@ -66,10 +66,12 @@ class Films:
         if f".{kind}" not in FILMS:
             raise InputError(f"a file of kind {kind[:20]!r}; allowed: {', '.join(FILMS)}")
         with self._lock:
-            if len(self._films) >= _MOST_FILMS:
+            if len(list(self._folder.glob("trial-*"))) >= _MOST_FILMS:
                 raise InputError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
             self._count += 1
-            return self._folder / f"trial-{self._count}.{kind}"
+            path = self._folder / f"trial-{self._count}.{kind}"
+            path.touch()
+            return path
 
     def room_left(self) -> int:
         """Bytes that a film may have now."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from starlette.applications import Starlette
 from starlette.datastructures import Headers
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -198,7 +198,13 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
         Route("/study", _study(house.theatre), methods=["POST"]),
         WebSocketRoute("/live", house.connect),
     ]
-    return _Guarded(Starlette(routes=routes, lifespan=house.open), guard)
+    left = {ClientDisconnect: _left}
+    return _Guarded(Starlette(routes=routes, lifespan=house.open, exception_handlers=left), guard)
+
+
+async def _left(_request: Request, _error: Exception) -> Response:
+    """A client that leaves while it sends is told nothing, and neither is the terminal."""
+    return Response(status_code=400)
 
 
 async def _tell(socket: WebSocket, client: _Client, theatre: Theatre) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 
 __all__ = ["FORM", "form_fields", "form_list"]
 
@@ -136,9 +138,10 @@ def form_fields(given: Mapping[str, Any], robots: tuple[str, ...]) -> dict[str, 
             raise InputError(f"{str(name)[:60]} is no field of this form; allowed: {', '.join(sorted(_KNOWN))}")
         if isinstance(value, list) and name == "robot.stripes":
             value = ", ".join(map(str, value))  # noqa: PLW2901
-        if isinstance(value, bool) or not isinstance(value, (str, int, float)) or len(str(value)) > _LONGEST:
-            raise InputError(f"{name} = {str(value)[:60]!r}; allowed: a text of at most {_LONGEST} characters")
-        text = str(value).strip()
+        known = isinstance(value, (str, int, float)) and not isinstance(value, bool)
+        text = str(value).strip() if known else clipped(value)
+        if not known or len(text) > _LONGEST or not text.isprintable():
+            raise InputError(f"{name} = {text[:60]!r}; allowed: a text of at most {_LONGEST} printable characters")
         if name == "robot.file" and text not in robots:
             raise InputError(f"robot.file = {text[:60]!r}; allowed: {', '.join(robots)}")
         if text:
@@ -150,8 +153,8 @@ def _typed(name: str, text: str) -> Any:
     if name == "robot.stripes":
         return [part.strip() for part in text.split(",") if part.strip()]
     if name in _NUMBERS:
-        try:
-            return float(text.replace(",", "."))
-        except ValueError:
-            return text
+        with suppress(ValueError):
+            number = float(text.replace(",", "."))
+            if math.isfinite(number):  # JSON has no others; as text its field refuses it
+                return number
     return text
