@@ -75,7 +75,10 @@ def checked_file(path: str | Path, what: str, largest: int) -> Path:
         InputError: if it is not there, no regular file, closed to you, or too large.
     """
     with opened(path, what, largest) as stream:
-        stream.read(1)
+        try:
+            stream.read(1)
+        except OSError as error:
+            raise _refused(Path(path), error, what) from error
     return Path(path)
 
 

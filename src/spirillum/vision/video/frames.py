@@ -255,11 +255,11 @@ def open_video(path: str | Path, frames_per_second: float | None = None) -> Vide
     try:
         if path.is_dir():
             return _folder(path, frames_per_second)
+        with opened(path, _WHAT, sys.maxsize) as stream:
+            if not stream.read(1):
+                raise InputError(f"{path} is empty; allowed: {_WHAT}")
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); allowed: {_WHAT}") from error
-    with opened(path, _WHAT, sys.maxsize) as stream:
-        if not stream.read(1):
-            raise InputError(f"{path} is empty; allowed: {_WHAT}")
     return _film(path, frames_per_second)
 
 
