@@ -123,6 +123,13 @@ def test_ten_millimetres_of_depth_are_seven_per_cent_of_scale(tmp_path: Path, se
     assert apparent_distance(0.0, 0.21, 0.06, 1.4) == pytest.approx(0.15 + 0.06 / 1.4)
 
 
+def test_a_share_of_the_least_number_is_none(tmp_path: Path, setup_text: str) -> None:
+    """Least number above 0 that a computer has: its step would be 0."""
+    path = tmp_path / "setup.toml"
+    path.write_text(setup_text.replace('_uncertainty = "1 mm"', '_uncertainty = "1e-320 mm"'))
+    assert depth_shares(load_setup(path)[0])["robot.axis_height"] == 0.0
+
+
 def test_shares_of_a_refracting_surface(setup_file: Path) -> None:
     shares = depth_shares(load_setup(setup_file)[0])
     axis, ruler = (0.15 + (0.06 - z) / 1.4 for z in (0.0115, 0.0))

@@ -59,7 +59,6 @@ def depth_shares(setup: Setup) -> dict[str, float]:
     found = {}
     for name, error in uncertain.items():
         if error > 0:
-            step = _STEP * error
-            slope = (_scale(setup, name, step) - _scale(setup, name, -step)) / (2.0 * step)
-            found[name] = abs(slope * error / scale)
+            change = _scale(setup, name, _STEP * error) - _scale(setup, name, -_STEP * error)
+            found[name] = abs(change / (2.0 * _STEP * scale))
     return found
