@@ -65,7 +65,10 @@ def test_without_a_band_nothing_of_it_is_there(leaning: Any, question: dict[str,
     dataset = sp.study(question)
     assert not [name for name in dataset.data_vars if str(name).endswith(("_low", "_high", "_at_place"))]
     assert "place" not in dataset.dims
-    assert dataset.attrs["fingerprint"] != sp.study({**question, "band": True}).attrs["fingerprint"]
+    assert "gap and pitch are not given: model 'walled' answers at one place" in dataset.attrs["warnings"]
+    whole = sp.study({**question, "band": True})
+    assert "answers at one place" not in whole.attrs["warnings"]
+    assert dataset.attrs["fingerprint"] != whole.attrs["fingerprint"]
 
 
 def test_models_and_band_override_the_file(leaning: Any, question: dict[str, object]) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.crews import Crew, shared_out
+from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
@@ -17,6 +18,7 @@ from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_a
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.work import Task, cautions, keep, kept, summed, tasks
+from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
 from spirillum.version import own_version
@@ -111,6 +113,7 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
     asked = [find_swimmer_model(name) for name in loaded.study.models]
+    warnings += _without_band(loaded, asked)
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
     warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
@@ -120,6 +123,21 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     return warnings + uneven_models(loaded.robots, models, factors)
+
+
+def _without_band(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:
+    """What answers at one place of several lack; nothing with a band, or where all places are known."""
+    if loaded.study.band:
+        return []
+    placements = loaded.placements or (loaded.study.placement,)
+    found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
+    if not found:
+        return []
+    walled = next(iter(found.values()))
+    return [
+        f"{' and '.join(found)} are not given: model '{walled}' answers at one place, and others change speeds and "
+        "perhaps their order; --band computes those, too, in seconds with tables, else in many minutes"
+    ]
 
 
 def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:

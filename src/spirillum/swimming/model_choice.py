@@ -54,6 +54,7 @@ def choose_model(
     posterior: PosteriorFile | None = None,
     tables_only: bool = False,
     motion: str = "held",
+    other_way: str = f"so does the first run with --model {WALLED}",
 ) -> ModelChoice:
     """The model that is asked for, or with `auto` the one that knows most about the robot.
 
@@ -65,6 +66,7 @@ def choose_model(
         posterior: posterior whose values are used; None without one.
         tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
         motion: of a steady state, `held` or `free`; the free one in a tube takes a table, too.
+        other_way: how else to come to an answer with walls than by `spirillum prepare`, a clause for the caution.
 
     Raises:
         InputError: for an unknown model, or a calibration that was fitted with several.
@@ -76,14 +78,16 @@ def choose_model(
         return fitted
     if robot.channel is None:
         return ModelChoice(UNBOUNDED, "the robot has no channel")
-    why = _why_without_walls(robot, placement or Placement(), tables_only=tables_only, motion=motion)
+    why = _why_without_walls(
+        robot, placement or Placement(), tables_only=tables_only, motion=motion, other_way=other_way
+    )
     if not why:
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
     caution = f"the channel's walls are left out, which makes a robot faster than it is (model '{UNBOUNDED}'): {why}"
     return ModelChoice(UNBOUNDED, why.partition(":")[0], caution)
 
 
-def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool, motion: str) -> str:
+def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool, motion: str, other_way: str) -> str:
     """Why a robot in a channel is answered for without its walls; empty where it is not."""
     batch = RobotBatch.of(robot, placement)
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
@@ -91,8 +95,7 @@ def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool,
         return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
     if (tables_only or motion == "free") and not has_table(batch):
         return (
-            f"the robot has no table for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and so does the "
-            f"first run with --model {WALLED}"
+            f"the robot has no table for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
         )
     return ""
 
