@@ -129,7 +129,7 @@ def test_a_measured_robot_is_predicted_at_its_own_mean(fitted: Any) -> None:
         answer = own.to_dict()
         assert answer["forward_velocity"]["value"] == own.forward_velocity
         assert answer["interval_of"].startswith("of this robot, which was measured")
-        assert "this one was measured itself: --for measured" in new.to_dict()["interval_of"]
+        assert "this robot was measured itself: --for measured" in new.to_dict()["interval_of"]
         json.dumps(answer, allow_nan=False)
 
 

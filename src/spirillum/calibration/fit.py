@@ -16,6 +16,7 @@ from spirillum.calibration.fit_warnings import (
     check_plausible,
     common_warnings,
     factor_misfit_warnings,
+    friction_interval_warnings,
     friction_warnings,
     misfit_warnings,
     narrow_channel_warnings,
@@ -246,6 +247,7 @@ def _of_the_fit(problem: Problem, fit: LeastSquares, report: Identifiability, re
         *report.warnings,
         *prior_warnings(problem, fit.z),
         *friction_warnings(problem, fit.z, reading),
+        *friction_interval_warnings(problem),
     ]
 
 

@@ -22,6 +22,7 @@ __all__ = [
     "check_plausible",
     "common_warnings",
     "factor_misfit_warnings",
+    "friction_interval_warnings",
     "friction_warnings",
     "misfit_warnings",
     "narrow_channel_warnings",
@@ -196,6 +197,17 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
         f"friction reading 'paper': with (19) as printed the body turns at {np.median(known):.2g} times its observed "
         f"rate (median of the tails, {known.min():.2g} to {known.max():.2g}) where the motor turns as observed: B_eff "
         "of this reading does not give the observed rates back, for the factors follow from (15) without (19)"
+    ]
+
+
+def friction_interval_warnings(problem: Problem) -> list[str]:
+    """What the intervals of B_eff leave out: the error of a motor rate, which only repeated trials tell."""
+    rate = problem.experiment.motor_rate
+    if "friction" not in problem.free or not rate.seen.any() or rate.freedom.sum() > 0:
+        return []
+    return [
+        "the motor rate has no repeated trials, so that its error is not known and not in the intervals of B_eff, "
+        "which are too narrow"
     ]
 
 

@@ -170,5 +170,5 @@ def _friction_tables(found: Calibrated) -> list[str]:
 
 def _comment(item: Estimate) -> str:
     words = [f"comes out as {item.value:.4g}"] if item.value < 0 else []
-    words += [f"{item.low:.4g} to {item.high:.4g}"] if math.isfinite(item.low) else []
+    words += [f"{item.low:.6g} to {item.high:.6g}"] if math.isfinite(item.low) else []
     return f"  # {', '.join(words)}" if words else ""

@@ -372,8 +372,8 @@ def _interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: Po
     if posterior.measured(robot) is None:
         return "of a tail like those that were fitted, which the model may miss by as much as these"
     return (
-        "of a tail like those that were fitted, which the model may miss by as much as these; this one was measured "
-        "itself: --for measured"
+        "of a tail like those that were fitted, which the model may miss by as much as these; this robot was measured "
+        "itself: --for measured gives the interval of its own mean"
     )
 
 

@@ -149,7 +149,8 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             columns=columns,
             notes=[
                 "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
-                "no limit there. The model's discrepancy is held; the wider intervals of the table do not hold it.",
+                "no limit there. The model's discrepancy is held at its fitted value here; in the table's intervals it "
+                "varies.",
             ],
         )
         every = list(sheet.panels.flat)
