@@ -1,6 +1,6 @@
 """Measured against truth: degraded (or clean) films of the virtual camera, with random speeds, rates and places.
 
-    python benchmarks/measuring_virtual_trials.py 100 [--clean] [--keep FOLDER] [--duration 60] [--slow]
+    python benchmarks/measuring_virtual_trials.py 100 [--clean | --glare-fixed] [--keep FOLDER] [--duration 60] [--slow]
 
 Synthetic throughout. Prints errors and whether the 95 % intervals hold the truth, and how much faster than real time
 `measure` was. A hundred trials take an hour of one core, most of it for drawing the films.
@@ -17,6 +17,8 @@ import numpy as np
 import spirillum as sp
 
 QUANTITIES = ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")
+STYLES = {"clean": "clean", "degraded": "degraded", "glare-fixed": {"preset": "degraded", "glare_moves": False}}
+"""Degradations by the names of their films."""
 SLOW_SPEED, SLOW_BODY = 0.2, 0.02
 """mm/s and Hz below which a trial is slow."""
 
@@ -38,9 +40,9 @@ def is_slow(number: int) -> bool:
     return speed < SLOW_SPEED or body < SLOW_BODY
 
 
-def rendered(folder: Path, number: int, preset: str, duration: float) -> Path:
+def rendered(folder: Path, number: int, style: str, duration: float) -> Path:
     """A film with random truth, and its setup and truth beside it; one that is there is kept."""
-    film = folder / f"{preset}-{number:03d}.mp4"
+    film = folder / f"{style}-{number:03d}.mp4"
     if film.with_suffix(".truth.json").exists():
         return film
     rng, speed, tail, body = drawn(number)
@@ -61,7 +63,7 @@ def rendered(folder: Path, number: int, preset: str, duration: float) -> Path:
         motion={"forward_velocity": f"{speed} mm/s", "tail_rate": f"{tail} Hz", "body_rate": f"{-body} Hz"},
         trial=trial,
         camera=camera,
-        degradation=preset,
+        degradation=STYLES[style],
         seed=number,
     )
     return film
@@ -71,7 +73,15 @@ def main() -> None:
     """Render, measure, compare."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("trials", type=int)
-    parser.add_argument("--clean", action="store_true")
+    style = parser.add_mutually_exclusive_group()
+    style.add_argument("--clean", dest="style", action="store_const", const="clean", default="degraded")
+    style.add_argument(
+        "--glare-fixed",
+        dest="style",
+        action="store_const",
+        const="glare-fixed",
+        help="degraded, with glare that stands still in the lab instead of moving with the body",
+    )
     parser.add_argument("--keep", type=Path, help="folder for the films")
     parser.add_argument("--duration", type=float, default=20.0, help="of a film, s")
     parser.add_argument("--slow", action="store_true", help="only trials of slow robots")
@@ -84,7 +94,7 @@ def main() -> None:
         folder = asked.keep or Path(temporary)
         folder.mkdir(parents=True, exist_ok=True)
         for number in numbers:
-            film = rendered(folder, number, "clean" if asked.clean else "degraded", asked.duration)
+            film = rendered(folder, number, asked.style, asked.duration)
             start = time.perf_counter()
             measured = sp.measure([film], film.with_suffix(".setup.toml"), annotated=False)
             spent += time.perf_counter() - start
