@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from typing import Any
 
@@ -14,7 +14,7 @@ from rich.markup import escape
 from spirillum.answer import as_json
 from spirillum.cli.tables.parts import Answer
 
-__all__ = ["patience", "progress_bar", "show", "with_files"]
+__all__ = ["at_work", "patience", "progress_bar", "show", "with_files"]
 
 _NARROWEST = 80
 
@@ -62,17 +62,18 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     return {**content, **files, "warnings": answer["warnings"]}
 
 
-@contextmanager
-def patience(model: str, *, quiet: bool) -> Iterator[None]:
-    """A sign of life on standard error while a model solves; its first run on a machine compiles for some seconds."""
+def patience(model: str, *, quiet: bool) -> AbstractContextManager[object]:
+    """A sign of life while a model solves; its first run on a machine compiles for some seconds."""
     from spirillum.fluid.registry import MODELS
 
+    quick = model not in MODELS or MODELS[model].closed_form
+    return at_work("solving for the flow (the first time, compiling takes some seconds)", quiet=quiet or quick)
+
+
+def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
+    """A sign of life on standard error that says what is done; none for `--json` and where nobody watches."""
     console = Console(stderr=True)
-    if quiet or not console.is_terminal or model not in MODELS or MODELS[model].closed_form:
-        yield
-        return
-    with console.status("solving for the flow (the first time, compiling takes some seconds)"):
-        yield
+    return nullcontext() if quiet or not console.is_terminal else console.status(what)
 
 
 @contextmanager

@@ -47,12 +47,13 @@ def propose(
 ) -> None:
     """Look at a film and write a setup file: what the film tells is filled in, the rest is marked.
 
-    Example: `spirillum setup propose trial-1.mp4 --spacing 2mm -o setup.toml`
+    Example: `spirillum setup propose trial-1.mp4 my-robot.toml --spacing 2mm -o setup.toml`
     """
     from spirillum.cli import renderer
     from spirillum.measurement.proposal import propose_setup
 
-    found = propose_setup(film, robot, output, spacing=spacing, fps=fps, overwrite=force)
+    with renderer.at_work(f"looking at {film.name} (without the right ROBOT this can take a minute)", quiet=json):
+        found = propose_setup(film, robot, output, spacing=spacing, fps=fps, overwrite=force)
     renderer.show(found.to_dict(), json=json)
 
 
