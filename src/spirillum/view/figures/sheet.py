@@ -138,7 +138,7 @@ def _wrap(text: Text) -> None:
         text.set_text(word)
         return text.get_window_extent().width
 
-    wanted = text.get_text()
+    wanted = text.get_text().replace(" · ", "\N{NO-BREAK SPACE}· ")  # no line begins with a point
     space = width("n n") - width("nn")
     # Not `split()`: a space that does not break holds a word together.
     widths = {word: width(word) for word in set(wanted.replace("\n", " ").split(" ")) if word}
