@@ -6,7 +6,9 @@ import signal
 from http.client import HTTPConnection
 from typing import Any
 
+import numpy as np
 import pytest
+import xarray as xr
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -15,6 +17,7 @@ from spirillum.pages import server
 from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.knobs import Settings
+from spirillum.pages.study_picture import StudyPicture
 
 
 def _answer(served: Any, path: str, method: str = "GET", body: bytes | None = None, **headers: str) -> Any:
@@ -190,3 +193,14 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     assert sent[0]["status"] == 400
     assert not list(bench._folder.iterdir())
     bench.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("wavelength", np.nan), ("amplitude", np.inf), ("wavelength", "x"), ("forward_velocity", "x")]
+)
+def test_a_study_without_numbers_gets_a_sentence(name: str, value: Any) -> None:
+    dims = ("wavelength", "amplitude", "model", "channel")
+    study = xr.Dataset({"forward_velocity": (dims, np.ones((1, 1, 1, 1)))}, {dim: [1.0] for dim in dims})
+    study[name] = (study[name].dims, np.full(study[name].shape, value))
+    with pytest.raises(InputError, match="are no numbers; allowed: a study's dataset"):
+        StudyPicture(study)

@@ -51,6 +51,11 @@ class StudyPicture:
         if set(speed.dims) != set(needed):
             raise InputError(f"this study goes over {', '.join(map(str, speed.dims))}; allowed: {_WHAT}")
         self._speed = speed.transpose(*needed)
+        numbers = [self._speed, *(self._speed[name] for name in ("wavelength", "amplitude"))]
+        if any(item.dtype.kind not in "fiu" for item in numbers) or not all(
+            np.isfinite(item).all() for item in numbers[1:]
+        ):
+            raise InputError(f"speeds, wavelengths or amplitudes of this dataset are no numbers; allowed: {_WHAT}")
         if self._speed.sizes["wavelength"] * self._speed.sizes["amplitude"] > _MOST_TAILS:
             raise InputError(f"this study has more than {_MOST_TAILS} tails; allowed: fewer, to point at one")
         self._robots = _robots(dataset)
