@@ -78,6 +78,7 @@ def test_a_robot_that_is_gone_is_said_to_be_lost(filmed, pictures, flat_pictures
     assert gone.to_dict()["position"]["value"] == [None, None]
 
 
+@pytest.mark.slow
 def test_a_picture_without_the_robot_is_learnt_from_anew(filmed, flat_pictures):
     tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn=0.1)
     empty = flat_pictures.Flat(start=(1.0, 0.0), noise=4.0).draw(0.0)

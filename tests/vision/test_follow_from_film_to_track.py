@@ -88,6 +88,7 @@ def test_a_robot_that_leaves_is_kept_as_far_as_it_was_seen(flat_pictures, tmp_pa
     assert slope(found.time[whole], found.position[whole, 0]) == pytest.approx(0.02, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_nose_on_the_other_side_gives_no_numbers(flat_pictures, tmp_path):
     found = track(flat_pictures.Flat(frames=4), tmp_path, robot_direction='"left"')
     flag = next(flag for flag in found.flags if "forward_velocity" in flag.spoils)
@@ -122,6 +123,7 @@ def test_two_robots_give_no_numbers(flat_pictures, tmp_path):
     assert "forward_velocity" in flag.spoils
 
 
+@pytest.mark.slow
 def test_what_has_neither_stripes_nor_tail_of_the_robot_gives_no_numbers(flat_pictures, tmp_path):
     plain = {"stripes": ("white", "black") * 4, "wire": flat_pictures.Flat.floor}
     found = track(flat_pictures.Flat(frames=4, fps=2.0, **plain), tmp_path)

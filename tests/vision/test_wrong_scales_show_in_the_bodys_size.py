@@ -62,7 +62,7 @@ def test_a_scale_off_by_a_twentieth_widens_the_interval_beyond_its_error(film, c
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
-@pytest.mark.parametrize("factor", [0.8, 1.25])
+@pytest.mark.parametrize("factor", [0.8, pytest.param(1.25, marks=pytest.mark.slow)])
 def test_a_wrong_spacing_of_the_ruler_is_named(film, factor):
     flat, tracked = film
     track = tracked(markers_spacing=f'"{2.0 * factor} mm"')
@@ -83,7 +83,7 @@ def test_a_stated_uncertainty_of_depth_explains_it(film):
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
-@pytest.mark.parametrize(("spacing", "size"), [("4 mm", 2.0), ("1 mm", 0.5)])
+@pytest.mark.parametrize(("spacing", "size"), [pytest.param("4 mm", 2.0, marks=pytest.mark.slow), ("1 mm", 0.5)])
 def test_a_scale_off_by_two_gives_rates_and_no_speed(film, spacing, size):
     flat, tracked = film
     found = tracked(markers_spacing=f'"{spacing}"')
