@@ -1,5 +1,7 @@
 """Clicks in a picture against what was planted there: spacing, scale, direction, order of the stripes."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from spirillum.measurement.clicks import (
     stripes_in_order,
 )
 from spirillum.measurement.setup_fields import setup_fields, setup_file, setup_problems
+from spirillum.measurement.setup_template import setup_text, toml_value
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.vision.camera.ruler import lines_in
 
@@ -119,3 +122,9 @@ def test_no_clicks_name_no_stripes() -> None:
     seen = stripe_names(np.zeros((9, 9, 3), np.uint8), [], RING)
     with pytest.raises(InputError, match="fewer than two colours"):
         stripes_in_order(seen, RING)
+
+
+@pytest.mark.parametrize("value", ['my "best" robot.toml', "back\\slash.toml", "Rührer.toml", ["red", "blue"], 0.25])
+def test_values_of_a_setup_file_are_read_back(value):
+    text = setup_text({"robot.file": (toml_value(value), "as asked for")})
+    assert tomllib.loads(text)["robot"]["file"] == value

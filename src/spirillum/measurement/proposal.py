@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.answer import envelope
 from spirillum.errors import InputError
 from spirillum.files import new_file, output_target
-from spirillum.measurement.setup_template import KNOWN, setup_text
+from spirillum.measurement.setup_template import KNOWN, setup_text, toml_value
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
@@ -148,7 +148,7 @@ def propose_setup(
     findings = tuple(_findings(video, seen_there, loaded, name, apart, timed=timed, given=robot is not None))
     found = {finding.field: _toml(finding) for finding in findings if finding.field and finding.value is not None}
     if seen_there.known is not None or robot is not None:
-        found["robot.file"] = f'"{stated}"', "as asked for" if robot is not None else _doubt(findings, "walls")
+        found["robot.file"] = toml_value(stated), "as asked for" if robot is not None else _doubt(findings, "walls")
     found |= _scale_lines(seen_there, loaded, apart)
     ruled = "markers.length_per_pixel" not in found
     open_fields = {
@@ -293,10 +293,7 @@ def _walls(found: Scouted, robot: Robot) -> Finding:
 def _toml(finding: Finding) -> tuple[str, str]:
     """A finding's value as it stands in the file, and the comment beside it."""
     value = finding.value
-    if isinstance(value, list):
-        text = "[" + ", ".join(f'"{item}"' for item in value) + "]"
-    else:
-        text = f'"{value}"' if isinstance(value, str) else f"{value:.9g}"
+    text = f"{value:.9g}" if isinstance(value, float) else toml_value(value)
     return text, f"found in the film, {finding.confidence}"
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from spirillum.files import parse_toml
-from spirillum.measurement.setup_template import setup_text
+from spirillum.measurement.setup_template import setup_text, toml_value
 from spirillum.robot.problems import problems_in
 from spirillum.vision.setup import WHAT, Setup
 
@@ -23,7 +22,7 @@ def setup_file(fields: Fields) -> str:
     Args:
         fields: what is known.
     """
-    return setup_text({name: (json.dumps(value, ensure_ascii=False), "") for name, value in fields.items()})
+    return setup_text({name: (toml_value(value), "") for name, value in fields.items()})
 
 
 def setup_problems(fields: Fields) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from spirillum.vision.track.learning import learnt_from
 from spirillum.vision.track.size import checked_scale
 from spirillum.vision.track.steadiness import camera_flags
 
-__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_text"]
+__all__ = ["KNOWN", "OPEN", "new_setup_file", "setup_answer", "setup_text", "toml_value"]
 
 _HEAD = """\
 # A setup: what is known of camera, tank, ruler and robot. Heights count from the reference plane: the tank's floor
@@ -82,6 +83,11 @@ KNOWN = {
     "robot.axis_height": "height of the robot's axis above the reference plane",
 }
 """Fields that only the experimenter knows."""
+
+
+def toml_value(value: str | float | list[str]) -> str:
+    """A text, number or list of texts as it stands in TOML: quoted as in JSON, whose escapes TOML shares."""
+    return json.dumps(value, ensure_ascii=False)
 
 
 def setup_text(found: Mapping[str, tuple[str, str]] | None = None, open_fields: Collection[str] = ()) -> str:
