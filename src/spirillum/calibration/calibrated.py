@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
@@ -13,6 +13,7 @@ from spirillum.calibration.estimate import LEVEL, Estimate
 from spirillum.calibration.experiment import Experiment, Quantity
 from spirillum.calibration.identifiability import Identifiability
 from spirillum.calibration.least_squares import LeastSquares
+from spirillum.calibration.methods import Method
 from spirillum.calibration.paper_method import PaperFit
 from spirillum.calibration.posterior import FEWEST_EFFECTIVE, LARGEST_RHAT, Posterior
 from spirillum.calibration.problem import Problem
@@ -33,7 +34,7 @@ class Calibrated(Shown):
     """What a calibration found."""
 
     problem: Problem
-    method: Literal["posterior", "least-squares", "paper"]
+    method: Method
     reading: str
     """Reading of the friction under which B_eff follows from (18)."""
     values: dict[str, Estimate]

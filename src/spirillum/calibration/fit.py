@@ -26,6 +26,7 @@ from spirillum.calibration.fit_warnings import (
 from spirillum.calibration.friction_sensitivity import friction_sensitivity, friction_statement
 from spirillum.calibration.identifiability import Identifiability, check_identifiable, identified
 from spirillum.calibration.least_squares import LeastSquares, drawn_fit, least_squares_fit
+from spirillum.calibration.methods import METHODS
 from spirillum.calibration.paper_method import paper_fit
 from spirillum.calibration.parameters import assumed_uncertainties, free_names
 from spirillum.calibration.posterior import Sampling, sampled
@@ -35,9 +36,8 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 
-__all__ = ["METHODS", "RobotSource", "fit_model", "given_robots"]
+__all__ = ["RobotSource", "fit_model", "given_robots"]
 
-METHODS = ("posterior", "least-squares", "paper")
 _READINGS = ("rotor", "paper")
 _FRICTION_DRAWS = 2000
 

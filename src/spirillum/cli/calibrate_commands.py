@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from spirillum.calibration.methods import METHODS
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
@@ -22,7 +23,7 @@ _Robots = Annotated[
 
 
 def _complete_methods(incomplete: str) -> list[str]:
-    return starting(("posterior", "least-squares", "paper"), incomplete)
+    return starting(METHODS, incomplete)
 
 
 def calibrate(

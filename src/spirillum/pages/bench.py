@@ -11,17 +11,16 @@ import threading
 from pathlib import Path
 from typing import Any
 
+from spirillum.calibration.methods import METHODS
 from spirillum.errors import InputError
 from spirillum.pages.desk import ROBOT_FILE, Desk
 from spirillum.pages.films import Films
 from spirillum.pages.job import Job
 from spirillum.pages.plain_names import plain, plain_names
 from spirillum.pages.setup_form import form_list
+from spirillum.robot.options import CALIBRATED
 
 __all__ = ["Bench"]
-
-_METHODS = ("posterior", "least-squares", "paper")
-_MODELS = ("sbt", "rft", "slender")
 
 
 class Bench:
@@ -82,7 +81,7 @@ class Bench:
         Raises:
             InputError: if nothing was measured, or for another model or method.
         """
-        for word, value, allowed in (("model", model, _MODELS), ("method", method, _METHODS)):
+        for word, value, allowed in (("model", model, CALIBRATED), ("method", method, METHODS)):
             if value not in allowed:
                 raise InputError(f"{word} = {value[:40]!r}; allowed: {', '.join(allowed)}")
         with self._lock:
@@ -125,8 +124,8 @@ class Bench:
                 "check": self.desk.checked(),
                 "job": job,
                 "results": dict(self._results),
-                "models": list(_MODELS),
-                "methods": list(_METHODS),
+                "models": list(CALIBRATED),
+                "methods": list(METHODS),
             }
 
     def _progress(self) -> dict[str, Any] | None:
