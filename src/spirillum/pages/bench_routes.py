@@ -16,6 +16,7 @@ from starlette.routing import Route
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages.bench import Bench
+from spirillum.pages.commands import text_of
 from spirillum.pages.films import LARGEST_ALL, LARGEST_FILM
 from spirillum.pages.theatre import Theatre
 
@@ -36,16 +37,16 @@ class _Doors:
         self._bench, self._theatre = bench, theatre
         self.acts: dict[str, Callable[[Mapping[str, Any]], Any]] = {
             "state": lambda _message: None,
-            "text": lambda message: bench.desk.add_text(_text(message, "text")),
+            "text": lambda message: bench.desk.add_text(text_of(message, "text", "")),
             "robot": self._robot_of_swim,
-            "remove": lambda message: bench.films.remove(_text(message, "film")),
+            "remove": lambda message: bench.films.remove(text_of(message, "film", "")),
             "fields": self._fields,
             "click": self._clicked,
-            "look": lambda message: bench.desk.look(_text(message, "film")),
-            "propose": lambda message: bench.desk.propose(_text(message, "film")),
+            "look": lambda message: bench.desk.look(text_of(message, "film", "")),
+            "propose": lambda message: bench.desk.propose(text_of(message, "film", "")),
             "measure": lambda _message: bench.measure(),
-            "beside": lambda message: bench.beside(_text(message, "trial")),
-            "calibrate": lambda message: bench.calibrate(_text(message, "model"), _text(message, "method")),
+            "beside": lambda message: bench.beside(text_of(message, "trial", "")),
+            "calibrate": lambda message: bench.calibrate(text_of(message, "model", ""), text_of(message, "method", "")),
             "stop": lambda _message: bench.stop(),
         }
 
@@ -75,11 +76,11 @@ class _Doors:
         points = message.get("points")
         pairs = points if isinstance(points, list) and len(points) <= _MOST_POINTS else []
         return self._bench.desk.click(
-            _text(message, "what"),
-            _text(message, "film"),
+            text_of(message, "what", ""),
+            text_of(message, "film", ""),
             _number(message.get("time")),
             [(_number(pair[0]), _number(pair[1])) for pair in pairs if isinstance(pair, list) and len(pair) == 2],
-            _text(message, "length"),
+            text_of(message, "length", ""),
         )
 
     async def film(self, request: Request) -> Response:
@@ -187,13 +188,6 @@ def _message(content: bytes) -> Mapping[str, Any]:
     if not isinstance(found, dict):
         raise InputError("the message is no JSON object; allowed: one")
     return found
-
-
-def _text(message: Mapping[str, Any], name: str) -> str:
-    value = message.get(name, "")
-    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):  # halves of letters
-        raise InputError(f"{name} = {clipped(value, 40)}; allowed: text")
-    return value
 
 
 def _number(value: Any) -> float:

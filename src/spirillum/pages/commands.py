@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.robot.load import load
 from spirillum.robot.text import robot_text
 
@@ -24,15 +24,20 @@ def robot_tables(source: Any) -> dict[str, Any]:
     return tomllib.loads(robot_text(load(source)))
 
 
-def text_of(command: Mapping[str, Any], name: str) -> str:
-    """A text of a command.
+def text_of(command: Mapping[str, Any], name: str, unset: str | None = None) -> str:
+    """A text of a command or a message.
+
+    Args:
+        command: what a browser has sent.
+        name: of the text.
+        unset: what stands for a text that is missing; None: it may not be.
 
     Raises:
-        InputError: if it is none.
+        InputError: if it is none, or holds half a letter (a lone surrogate), which no file can keep.
     """
-    value = command.get(name)
-    if not isinstance(value, str):
-        raise InputError(f"{name} = {str(value)[:40]}; allowed: text")
+    value = command.get(name, unset)
+    if not isinstance(value, str) or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise InputError(f"{name} = {clipped(value, 40)}; allowed: text")
     return value
 
 
