@@ -13,7 +13,7 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import LoopRun, run_loop
 from spirillum.controllers.sensors import FlowPulse
 from spirillum.controllers.signals import Controller
-from spirillum.controllers.steering import MOST_TILT, Law, Replay, Steer, Steering
+from spirillum.controllers.steering import MOST_TILT, Law, Replay, Steer, Steering, pushed_for
 from spirillum.controllers.task import FEEDBACK, Brief, Task
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant, uninterrupted
@@ -128,6 +128,5 @@ def _identified(plant: Plant, rate: float) -> Steering:
     before = place(ahead, 0.0, _SETTLED * turn)
     straight, aside = place(ahead.copy(), 0.0, turn), place(ahead.copy(), MOST_TILT, turn)
     orbit = complex(np.log(straight / before)) / turn if abs(before) > 0.0 and abs(straight) > 0.0 else 0j
-    grown = np.exp(orbit * turn)
-    push = turn if abs(orbit * turn) < 1e-6 else (grown - 1.0) / orbit
-    return Steering(orbit, complex((aside - straight) / (MOST_TILT * push)), rate, plant.robot.body.length)
+    gain = (aside - straight) / (MOST_TILT * pushed_for(orbit, turn))
+    return Steering(orbit, complex(gain), rate, plant.robot.body.length)

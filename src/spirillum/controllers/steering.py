@@ -32,7 +32,7 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.signals import Command, Controller, News, Sight
 from spirillum.dynamics.turning_field import Field
 
-__all__ = ["Law", "Replay", "Steer", "Steering"]
+__all__ = ["MOST_TILT", "Law", "Replay", "Steer", "Steering", "pushed_for"]
 
 Law = Literal["position", "aim"]
 
@@ -47,6 +47,16 @@ _OBSERVED_OVER = 0.7
 _TURNS_OVER = 2.0
 """Time over which the body's turning is compared with the field's, s."""
 _SLIPS, _SLOWER = 0.9, 0.8
+
+
+def pushed_for(orbit: complex, time: float) -> complex:
+    """Time for which a constant push counts on an orbit: the integral of exp(m s) over a time, s.
+
+    Args:
+        orbit: m, 1/s.
+        time: s.
+    """
+    return time if abs(orbit * time) < 1e-6 else complex((np.exp(orbit * time) - 1.0) / orbit)
 
 
 @dataclass(frozen=True)
@@ -64,9 +74,7 @@ class Steering:
 
     def moved(self, place: complex, tilt: complex, dt: float) -> complex:
         """Place after a time, m."""
-        grown = np.exp(self.orbit * dt)
-        push = dt if abs(self.orbit * dt) < 1e-6 else (grown - 1.0) / self.orbit
-        return complex(grown * place + push * self.gain * tilt)
+        return complex(np.exp(self.orbit * dt) * place + pushed_for(self.orbit, dt) * self.gain * tilt)
 
     def tilt(self, law: Law, place: complex) -> complex:
         """The tilt that a law asks for at a place, rad."""

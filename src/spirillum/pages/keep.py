@@ -48,7 +48,7 @@ def command_line(lane: Lane) -> str:
 
 
 def python_lines(lane: Lane) -> str:
-    """The same in Python."""
+    """Lines of Python that give the numbers of a lane, by `predict` and `simulate`."""
     settings, model = lane.told(), _model(lane)
     overrides = ", ".join(f"{field!r}: {value!r}" for field, value in _overrides(settings).items())
     placed = _placed(settings, model)

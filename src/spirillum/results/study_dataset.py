@@ -21,7 +21,7 @@ class StudyDataset(xr.Dataset):  # type: ignore[no-untyped-call]
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> StudyDataset:
-        """The same values, coordinates and attributes.
+        """A study's values, coordinates and attributes in a dataset that shows its ranking.
 
         Args:
             dataset: a study.

@@ -65,7 +65,24 @@ class Anchor:
             flat: the picture, high-pass filtered, (h, w).
             start: about that, to less than half of the distance of a ruler's lines.
         """
-        return self._aligned(flat, start)
+        cv2 = required("cv2", "measuring a video", "video")
+        rows, columns, slopes, there = self._edges
+        pose = np.array(start)
+        for _ in range(_STEPS):
+            matrix = _matrix(Pose(*pose.tolist()), (flat.shape[1], flat.shape[0]))
+            at = matrix @ np.stack([columns, rows, np.ones(rows.size)])
+            at_u, at_v = at.astype(np.float32).reshape(2, -1, _ROW)
+            now = cv2.remap(flat, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE).ravel()
+            residual = now - there
+            scale = _OUTLIER * float(mad_scale(residual)) + 1e-3
+            weight = np.clip(1.0 - (residual / scale) ** 2, 0.0, None) ** 2
+            normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(3)
+            step = np.linalg.solve(normal, slopes.T @ (weight * residual))
+            step *= min(1.0, 1.0 / max(float(np.abs(step[:2]).max()), 1e-9))
+            pose -= step
+            if max(np.abs(step[:2]).max(), 0.5 * flat.shape[1] * abs(step[2])) < _STILL:
+                break
+        return Pose(*pose.tolist())
 
     def steadied(self, image: np.ndarray, pose: Pose) -> np.ndarray:
         """A picture moved to where the anchor is; beyond its borders they go on as they are.
@@ -79,26 +96,6 @@ class Anchor:
         flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
         moved = cv2.warpAffine(image, _matrix(pose, size), size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(moved)
-
-    def _aligned(self, other: Samples, start: Pose) -> Pose:
-        cv2 = required("cv2", "measuring a video", "video")
-        rows, columns, slopes, there = self._edges
-        pose = np.array(start)
-        for _ in range(_STEPS):
-            matrix = _matrix(Pose(*pose.tolist()), (other.shape[1], other.shape[0]))
-            at = matrix @ np.stack([columns, rows, np.ones(rows.size)])
-            at_u, at_v = at.astype(np.float32).reshape(2, -1, _ROW)
-            now = cv2.remap(other, at_u, at_v, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE).ravel()
-            residual = now - there
-            scale = _OUTLIER * float(mad_scale(residual)) + 1e-3
-            weight = np.clip(1.0 - (residual / scale) ** 2, 0.0, None) ** 2
-            normal = (slopes * weight[:, None]).T @ slopes + 1e-9 * np.eye(3)
-            step = np.linalg.solve(normal, slopes.T @ (weight * residual))
-            step *= min(1.0, 1.0 / max(float(np.abs(step[:2]).max()), 1e-9))
-            pose -= step
-            if max(np.abs(step[:2]).max(), 0.5 * other.shape[1] * abs(step[2])) < _STILL:
-                break
-        return Pose(*pose.tolist())
 
     @cached_property
     def _edges(self) -> tuple[np.ndarray, np.ndarray, Samples, Samples]:

@@ -158,7 +158,7 @@ class Stripes:
         return self.read_with_edges(image, pose)[0]
 
     def read_with_edges(self, image: np.ndarray, pose: BodyPose) -> tuple[tuple[float, float], Samples]:
-        """The same, and by how much the edges between stripes lie off an even pattern: see `edge_shifts`.
+        """Rotation angle of the body and its standard error, and how far the edges lie off an even pattern of stripes.
 
         Args:
             image: the picture, 8-bit RGB (h, w, 3).
