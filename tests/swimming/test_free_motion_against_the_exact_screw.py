@@ -103,17 +103,6 @@ def test_reversed_tail_retraces_the_path() -> None:
     np.testing.assert_allclose(backward.states[::-1, 3:9], forward.states[:, 3:9], atol=1e-7)
 
 
-def test_left_handed_robot_is_the_mirror_image() -> None:
-    right, left = (
-        sp.simulate(robot(**{"tail.handedness": hand}), weight=False, timing={"duration": "2 s"}, model="rft")
-        for hand in ("right", "left")
-    )
-    mirror = np.array([1.0, 1.0, -1.0])  # z -> -z takes the wire at phase 0 into its mirror image
-    np.testing.assert_allclose(left["position"], right["position"] * mirror, atol=1e-10)
-    np.testing.assert_allclose(left["angular_velocity"], -right["angular_velocity"] * mirror, atol=1e-7)
-    np.testing.assert_allclose(left["tail_angle"], -right["tail_angle"], rtol=1e-9)
-
-
 def test_unbounded_fluid_has_no_direction() -> None:
     """The same run from another attitude is the same run, turned."""
     from scipy.spatial.transform import Rotation

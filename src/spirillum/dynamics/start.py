@@ -7,7 +7,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach
 from spirillum.errors import InputError
-from spirillum.kernels.rigid_links import ATTITUDE, POSITION, STATES
+from spirillum.kernels.rigid_links import ATTITUDE, PHASE, POSITION, STATES
 from spirillum.robot.links import outlines_of
 from spirillum.robot.parts import Channel
 from spirillum.robot.placement import Placement
@@ -16,7 +16,7 @@ from spirillum.robot.seat import Seat, gap_of, largest_gap
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import show
 
-__all__ = ["reach_of", "start_state", "turning_rate"]
+__all__ = ["reach_of", "start_phase", "start_state", "turning_rate"]
 
 
 def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
@@ -33,12 +33,21 @@ def start_state(robot: Robot, placement: Placement, *, lying: bool) -> Samples:
     """
     _check(robot, placement)
     state = np.zeros(STATES)
+    state[PHASE] = start_phase(robot)
     pitch = placement.pitch or 0.0
     state[ATTITUDE], state[ATTITUDE + 2] = np.cos(0.5 * pitch), -np.sin(0.5 * pitch)
     if robot.channel is None:
         return state
     state[POSITION + 2] = -_seat(robot, placement, robot.channel, lying=lying).offset
     return state
+
+
+def start_phase(robot: Robot) -> float:
+    """Phase at which a tail is laid down, rad: a right-handed one at 0, a left-handed one as its mirror image lies.
+
+    A tail that is one piece with the body is at 0, whatever its hand.
+    """
+    return np.pi if robot.hand < 0 and robot.drive is not None and robot.drive.joint == "revolute" else 0.0
 
 
 def _check(robot: Robot, placement: Placement) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.start import turning_rate
+from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -104,6 +104,7 @@ def links_in_tube(
         pitch=placed.pitch or 0.0,
         yaw=placed.yaw,
         azimuth=asked.azimuth,
+        phase=start_phase(steady.robot),
     )
     return links, start
 
