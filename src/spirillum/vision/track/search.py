@@ -131,11 +131,11 @@ def most_likely(found: list[list[Candidate]], size: float) -> list[Candidate | N
     """The path of candidates with the best sum of scores, less a penalty on travel (Viterbi's algorithm).
 
     Args:
-        found: candidates on each frame; may be empty.
+        found: candidates on each frame; may be empty. A frame on which none has a score above 0 shows no robot.
         size: the body's length, m.
     """
     chosen: list[Candidate | None] = [None] * len(found)
-    seen = [index for index, some in enumerate(found) if some]
+    seen = [index for index, some in enumerate(found) if some and some[0].score > 0.0]
     if not seen:
         return chosen
     typical = float(np.median([found[index][0].score for index in seen]))
