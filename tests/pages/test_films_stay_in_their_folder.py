@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from spirillum.errors import InputError
 from spirillum.pages import films as films_module
 from spirillum.pages.bench import Bench
 from spirillum.pages.setup_form import form_fields
+from spirillum.pages.uploads import TooLargeError
 from spirillum.robot.load import load
 
 WHOLE = {
@@ -34,8 +36,8 @@ def bench() -> Any:
 def test_a_file_that_is_no_film_is_refused_and_removed(bench: Bench) -> None:
     for kind in ("exe", "mp4/../../x", "m3u8", ""):
         with pytest.raises(InputError, match=r"allowed: \.mp4"):
-            bench.films.room_for(kind)
-    path = bench.films.room_for("mp4")
+            bench.films.room_for(kind, 1)
+    path = bench.films.room_for("mp4", 14)
     path.write_bytes(b"no film at all")
     with pytest.raises(InputError) as refused:
         bench.films.add(path)
@@ -44,12 +46,26 @@ def test_a_file_that_is_no_film_is_refused_and_removed(bench: Bench) -> None:
     assert bench.films.told() == []
 
 
-def test_room_ends_with_what_is_kept(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(films_module, "LARGEST_ALL", 1000)
-    bench.films.room_for("mp4").write_bytes(bytes(400))
-    assert bench.films.room_left() == 600
-    monkeypatch.setattr(films_module, "LARGEST_FILM", 100)
-    assert bench.films.room_left() == 100
+def test_films_on_their_way_count_with_all_their_bytes(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(films_module, "_LARGEST_ALL", 1000)
+    coming = bench.films.room_for("mp4", 400)
+    bench.films.room_for("mp4", 600).write_bytes(bytes(600))
+    with pytest.raises(TooLargeError, match="room on the disk"):
+        bench.films.room_for("mp4", 1)
+    coming.unlink()
+    bench.films.room_for("mp4", 400)
+    monkeypatch.setattr(films_module, "_LARGEST_FILM", 100)
+    with pytest.raises(TooLargeError, match="GB a film"):
+        bench.films.room_for("mp4", 101)
+
+
+def test_the_disk_has_room_for_films_on_their_way(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    free = films_module._SPARE + 1000
+    monkeypatch.setattr(films_module.shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+    bench.films.room_for("mp4", 700).write_bytes(bytes(200))  # 500 of the free bytes are still to come
+    with pytest.raises(TooLargeError, match="room on the disk"):
+        bench.films.room_for("mp4", 501)
+    bench.films.room_for("mp4", 500)
 
 
 @pytest.mark.parametrize(
@@ -116,11 +132,11 @@ def test_numbers_that_json_has_not_are_told_by_their_field(bench: Bench, field: 
 
 def test_places_are_counted_when_they_are_given(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(films_module, "_MOST_FILMS", 2)
-    bench.films.room_for("mp4").unlink()
-    bench.films.room_for("mp4")
-    bench.films.room_for("mp4")
-    with pytest.raises(InputError, match="2 films are here already"):
-        bench.films.room_for("mp4")
+    bench.films.room_for("mp4", 1).unlink()
+    bench.films.room_for("mp4", 1)
+    bench.films.room_for("mp4", 1)
+    with pytest.raises(TooLargeError, match="2 films are here already"):
+        bench.films.room_for("mp4", 1)
 
 
 def test_decimal_commas_are_numbers() -> None:

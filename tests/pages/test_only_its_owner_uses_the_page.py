@@ -3,21 +3,25 @@
 import asyncio
 import json
 import signal
+from contextlib import AsyncExitStack
 from http.client import HTTPConnection
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from starlette.requests import Request
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from spirillum.errors import InputError
+from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages import server
 from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
 from spirillum.pages.knobs import Settings
 from spirillum.pages.study_picture import StudyPicture
+from spirillum.pages.uploads import TooLargeError, Uploads
 
 
 def _answer(served: Any, path: str, method: str = "GET", body: bytes | None = None, **headers: str) -> Any:
@@ -178,6 +182,7 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     guard = Guard("127.0.0.1", 1)
     where, _, query = path.partition("?")
     named = {"host": "127.0.0.1:1", "origin": "http://127.0.0.1:1", "cookie": f"{guard.cookie}={guard.key}"}
+    named |= {"content-length": "9"}
     headers = [(name.encode(), value.encode()) for name, value in named.items()]
     scope = {"type": "http", "method": "POST", "path": where, "query_string": query.encode(), "headers": headers}
     comes = iter([{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}])
@@ -193,6 +198,30 @@ def test_a_client_that_leaves_while_it_sends_is_no_error(path: str, monkeypatch:
     assert sent[0]["status"] == 400
     assert not list(bench._folder.iterdir())
     bench.close()
+
+
+def test_what_is_too_large_gets_a_sentence(served: Any, cookie: str) -> None:
+    found = _answer(served, "/bench/state", "POST", bytes(LARGEST_TEXT + 1), Cookie=cookie, Origin=served.base)
+    assert (found.status, found.content) == (413, b"1048577 bytes are too much; allowed: 1048576 bytes")
+
+
+def test_all_that_is_sent_at_once_has_one_budget() -> None:
+    def request(size: int) -> Request:
+        async def receive() -> Any:
+            return {"type": "http.request", "body": b"all"}
+
+        return Request({"type": "http", "headers": [(b"content-length", b"%d" % size)]}, receive)
+
+    async def at_once(*sizes: int) -> None:
+        async with AsyncExitStack() as stack:
+            for size in sizes:
+                assert await stack.enter_async_context(uploads.received(request(size), 100 << 20)) == b"all"
+
+    uploads = Uploads()
+    for sizes in ((100 << 20, 100 << 20), (64 << 20, 64 << 20, 1), (*[1 << 20] * 128, 1)):
+        with pytest.raises(TooLargeError, match="at once; allowed: 128 MB in all"):
+            asyncio.run(at_once(*sizes))
+        asyncio.run(at_once(*sizes[:-1]))  # what has been read makes room
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
 """Kills, full disks, pairs of runs and interrupts, at random from a seed.
 
-    python tests/support/faults.py kills|disks|tmpfs|pairs|interrupts SEED COUNT
+    python tests/support/faults.py kills|disks|tmpfs|pairs|interrupts SEED COUNT [COMMAND ...]
 
-runs COUNT of them and prints what broke a promise. A full disk is a limit on the size of files (`RLIMIT_FSIZE`), which
-needs no rights, or, with `tmpfs`, a small disk in memory in a name space of its own (`unshare`), where that is allowed.
+runs COUNT of them, of all commands or of those that are named, and prints what broke a promise. A full disk is a limit
+on the size of files (`RLIMIT_FSIZE`), which needs no rights, or, with `tmpfs`, a small disk in memory in a name space
+of its own (`unshare`), where that is allowed.
 """
 
 import hashlib
@@ -15,8 +16,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +34,15 @@ COMMANDS: dict[str, list[str]] = {
     "render": ["render", WIDE, "-o", "out.mp4", *_SIZE],
     "frames": ["render", WIDE, "-o", "out", *_SIZE],
     "export": ["export", WIDE, "out.urdf"],
+    "mesh": ["export", WIDE, "out.stl"],
+    "scene": ["export", WIDE, "out.glb"],
+    "unit": ["export", WIDE, "out.fmu"],
+    "recording": ["export", "run.nc", "out.mcap"],
+    "sweep": ["magnetic-sweep", "magnetic-helix", "-o", "out.nc", "--rate", "1Hz", "--turns", "4", "--plot", "out.png"],
+    "track": ["track", "b.mp4", "--setup", "b.setup.toml", "--pace", "fast", "--learn", "1s"],
+    "propose": ["setup", "propose", "a.mp4", "--spacing", "2mm", "-o", "out.toml"],
+    "setup": ["setup", "new", "out.toml"],
+    "page": ["page", "--no-browser"],
     "virtual": ["virtual-experiment", "s.toml", "-o", "out", "--trials", "2", *_SIZE],
     "join": ["observations", "join", "o.csv", "p.csv", "-o", "out.csv"],
     "compare": ["compare-models", WIDE, "--model", "sbt", "--model", "rft", "-o", "out.svg"],
@@ -55,6 +66,10 @@ COMMANDS: dict[str, list[str]] = {
     "new": ["robot", "new", "out.toml"],
 }
 _ROWS = "channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz\n"
+_EDITED = ("new", "setup", "propose", "design")
+"""Commands that write a file for users to edit, which is never replaced."""
+_PAGE = 5.0
+"""The page is open for so long, s."""
 _VARIES = re.compile(re.escape(os.fsencode(tempfile.gettempdir())) + rb"/[\w./-]+|[\d.]+ s\b")
 
 
@@ -81,16 +96,20 @@ def started(command: list[str], folder: Path, limit: int | None = None) -> subpr
         if limit is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-m", "spirillum", *command],
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        preexec_fn=limited,  # noqa: PLW1509 - this process has one thread
+        preexec_fn=limited,  # noqa: PLW1509 - this process only waits for others
         start_new_session=True,
+        env=os.environ | ({"TMPDIR": str(folder)} if command[0] == "page" else {}),
     )
+    if command[0] == "page":
+        threading.Timer(_PAGE, process.send_signal, [signal.SIGINT]).start()
+    return process
 
 
 def ended(process: subprocess.Popen[str]) -> Ended:
@@ -100,11 +119,11 @@ def ended(process: subprocess.Popen[str]) -> Ended:
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """All files with what tells them apart: numbers of NetCDF files, bytes of others."""
+    """All files and empty folders with what tells them apart: numbers of NetCDF files, bytes of others."""
     return {
-        str(path.relative_to(folder)): _content(path)
+        str(path.relative_to(folder)): _content(path) if path.is_file() else b""
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and not path.is_symlink()
+        if not path.is_symlink() and (path.is_file() or not any(path.iterdir()))
     }
 
 
@@ -138,7 +157,12 @@ class Faults:
         self._whole: dict[str, tuple[dict[str, bytes], float]] = {}
         (home / "inputs").mkdir()
         prepared(home / "inputs")
-        assert ended(started(["render", WIDE, "-o", "a.mp4", *_SIZE], home / "inputs")).code == 0
+        for command in (
+            ["render", WIDE, "-o", "a.mp4", *_SIZE],
+            ["render", WIDE, "-o", "b.mp4", "--size", "320x240", "--fps", "12", "--duration", "2.4s"],
+            ["simulate", WIDE, "-o", "run.nc", "--duration", "0.2s"],
+        ):
+            assert ended(started(command, home / "inputs")).code == 0
 
     def folder(self) -> Path:
         """A new folder with all inputs."""
@@ -155,9 +179,8 @@ class Faults:
             shutil.rmtree(folder)
         return self._whole[name]
 
-    def chosen(self) -> str:
-        """A command."""
-        names = list(COMMANDS)
+    def chosen(self, names: Sequence[str]) -> str:
+        """A command of these."""
         return names[int(self.rng.integers(len(names)))]
 
     def kill(self, name: str, number: int = signal.SIGKILL) -> list[str]:
@@ -172,8 +195,8 @@ class Faults:
         half = {path: data for path, data in files_of(folder).items() if path in whole and ".spirillum" not in path}
         ours = {path for path, data in half.items() if whole[path] != data and path.endswith((".nc", ".toml", ".csv"))}
         wrong += [f"half or other files: {sorted(ours)}"] if ours else []
-        if name in ("new", "design") and (folder / "out.toml").exists():
-            (folder / "out.toml").unlink()  # a file for users to edit is never replaced
+        if name in _EDITED and (folder / "out.toml").exists():
+            (folder / "out.toml").unlink()
         wrong += [f"again: {word}" for word in wrong_words(ended(started(COMMANDS[name], folder)), (0,))]
         after = files_of(folder)
         different = sorted(path for path in {*whole, *after} if whole.get(path) != after.get(path))
@@ -244,8 +267,8 @@ class Faults:
         return wrong
 
 
-def run(kind: str, seed: int, count: int) -> list[str]:
-    """Some faults of a kind; what broke a promise, in words."""
+def run(kind: str, seed: int, count: int, commands: Sequence[str] = ()) -> list[str]:
+    """Some faults of a kind, of some commands or of all; what broke a promise, in words."""
     found = []
     with tempfile.TemporaryDirectory() as home:
         faults = Faults(Path(home), seed)
@@ -257,7 +280,7 @@ def run(kind: str, seed: int, count: int) -> list[str]:
             "interrupts": faults.interrupt,
         }[kind]
         for number in range(count):
-            name = faults.chosen()
+            name = faults.chosen(commands or list(COMMANDS))
             wrong = one(name)
             found += [f"{kind} {number}, seed {seed}, {name}: {word}" for word in wrong]
             if wrong:
@@ -266,6 +289,6 @@ def run(kind: str, seed: int, count: int) -> list[str]:
 
 
 if __name__ == "__main__":
-    broken = run(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    broken = run(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:])
     print(f"{sys.argv[3]} {sys.argv[1]}, {len(broken)} broken promises")  # noqa: T201
     sys.exit(bool(broken))

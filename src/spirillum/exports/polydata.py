@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.files import scratch_folder
 from spirillum.formats.vtk_image import add_comment
 from spirillum.robot.mesh import RobotMesh
 
@@ -44,8 +44,8 @@ def vtp_bytes(pieces: Sequence[RobotMesh], attributes: Mapping[str, Any]) -> byt
     corners = np.ascontiguousarray(faces.ravel().astype(np.int32))
     ends = np.arange(3, corners.size + 1, 3, dtype=np.int32)
     words = {"unit": "m", "part": ["body", "rotor"], "piece": [piece.name for piece in pieces], "region": names}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "robot.vtp"
+    with scratch_folder() as folder:
+        path = folder / "robot.vtp"
         _write(path, place, corners, ends, cells)
         add_comment(path, json.dumps({**words, **attributes}, sort_keys=True))
         return path.read_bytes()

@@ -1,6 +1,7 @@
 """Files: the one way to read and the one way to write; what is promised of both is on the page `docs/promises.md`."""
 
 from spirillum.files.folders import claim_folder, results_folder
+from spirillum.files.locks import scratch_folder
 from spirillum.files.names import checked_path, file_name, is_text, text_cell
 from spirillum.files.netcdf import loaded_netcdf, netcdf_file, open_netcdf, write_dataset
 from spirillum.files.reading import (
@@ -70,6 +71,7 @@ __all__ = [
     "read_toml",
     "region_files",
     "results_folder",
+    "scratch_folder",
     "store_files",
     "store_target",
     "text_cell",

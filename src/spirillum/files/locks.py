@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-__all__ = ["LEFTOVER", "Busy", "locked", "private_folder", "sweep"]
+__all__ = ["LEFTOVER", "Busy", "locked", "private_folder", "scratch_folder", "sweep"]
 
 LEFTOVER = ".spirillum-part-"
 """Beginning of the names of hidden folders in which files are made before they take their place."""
@@ -133,6 +133,13 @@ def private_folder(parent: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(folder, ignore_errors=True)
         _release(handle)
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """A folder as `private_folder` gives it, where the system keeps temporary files."""
+    with private_folder(Path(tempfile.gettempdir())) as folder:
+        yield folder
 
 
 def sweep(parent: Path, *, again: bool = False) -> None:

@@ -6,9 +6,7 @@ tracked, and commands go through the line protocol. Frames are lost, late and cu
 
 from __future__ import annotations
 
-import tempfile
 from contextlib import ExitStack
-from pathlib import Path
 
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE
@@ -16,6 +14,7 @@ from spirillum.controllers.sensors import Senses
 from spirillum.controllers.signals import Command, Sight
 from spirillum.dynamics.plant import Moment, Plant
 from spirillum.errors import InputError
+from spirillum.files import scratch_folder
 from spirillum.interfaces.serial_remote import SerialRemote, VirtualRemote
 from spirillum.live.tracker import LiveTracker
 from spirillum.virtual.live_camera import VirtualCamera
@@ -81,7 +80,7 @@ class Bench(Senses):
         options = {"fps": lab.camera.fps}
         self._eye = VirtualCamera(plant.robot, pose, camera=options, degradation=degradation, seed=seed)
         self._shift = self._eye.x_of(pose) - float(pose.position[0])
-        folder = Path(self._left.enter_context(tempfile.TemporaryDirectory()))
+        folder = self._left.enter_context(scratch_folder())
         self._tracker = LiveTracker(self._eye.setup(folder / "bench.toml"), learn=_LEARN, name="the virtual camera")
 
     def not_ready(self, time: float) -> str:

@@ -5,14 +5,16 @@ All files lie in one temporary folder, under names that the page gives, and are 
 
 from __future__ import annotations
 
+import atexit
 import shutil
-import tempfile
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from spirillum.calibration.methods import METHODS
 from spirillum.errors import InputError
+from spirillum.files import scratch_folder
 from spirillum.pages.desk import ROBOT_FILE, Desk
 from spirillum.pages.films import Films
 from spirillum.pages.job import Job
@@ -28,8 +30,9 @@ class Bench:
 
     def __init__(self) -> None:
         """An empty bench."""
-        self._kept = tempfile.TemporaryDirectory(prefix="spirillum-page-", ignore_cleanup_errors=True)
-        self._folder = Path(self._kept.name)  # goes with the process, also where it ends before it has served
+        self._kept = ExitStack()
+        self._folder = self._kept.enter_context(scratch_folder())
+        atexit.register(self._kept.close)  # where the process ends before it has served
         self._lock = threading.RLock()
         self.films = Films(self._folder)
         self.desk = Desk(self._folder, self.films)
@@ -41,7 +44,7 @@ class Bench:
     def close(self) -> None:
         """Stop what runs, and remove all files."""
         self.stop()
-        self._kept.cleanup()
+        self._kept.close()
 
     def measure(self) -> None:
         """Begin to measure all films.

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Route
 
 from spirillum.errors import InputError, clipped
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages.bench import Bench
 from spirillum.pages.commands import text_of
-from spirillum.pages.films import LARGEST_ALL, LARGEST_FILM
 from spirillum.pages.theatre import Theatre
+from spirillum.pages.uploads import Uploads, stated_size
 
 __all__ = ["bench_routes"]
 
@@ -33,8 +33,8 @@ _Handler = Callable[[Request], Awaitable[Response]]
 class _Doors:
     """What the addresses do."""
 
-    def __init__(self, bench: Bench, theatre: Theatre) -> None:
-        self._bench, self._theatre = bench, theatre
+    def __init__(self, bench: Bench, theatre: Theatre, uploads: Uploads) -> None:
+        self._bench, self._theatre, self._uploads = bench, theatre, uploads
         self.acts: dict[str, Callable[[Mapping[str, Any]], Any]] = {
             "state": lambda _message: None,
             "text": lambda message: bench.desk.add_text(text_of(message, "text", "")),
@@ -54,10 +54,10 @@ class _Doors:
         """A handler of a message in JSON, which answers with what came of it and with the whole state."""
 
         async def handle(request: Request) -> Response:
-            message = _message(await _body(request, LARGEST_TEXT))
-            return await self._told(await asyncio.to_thread(act, message))
+            async with self._uploads.received(request, LARGEST_TEXT) as content:
+                return await self._told(await asyncio.to_thread(act, _message(content)))
 
-        return _guarded(handle)
+        return handle
 
     async def _told(self, said: Any) -> Response:
         return JSONResponse({"said": said, **await asyncio.to_thread(self._bench.state)})
@@ -109,19 +109,20 @@ class _Doors:
         return FileResponse(path, media_type="application/octet-stream", headers=_attached(path.name))
 
 
-def bench_routes(bench: Bench, theatre: Theatre) -> list[Route]:
+def bench_routes(bench: Bench, theatre: Theatre, uploads: Uploads) -> list[Route]:
     """The routes of the bench.
 
     Args:
         bench: what they lead to.
         theatre: whose robot may be measured.
+        uploads: what is sent to the page.
     """
-    doors = _Doors(bench, theatre)
+    doors = _Doors(bench, theatre, uploads)
     return [
         *[Route(f"/bench/{name}", doors.answering(act), methods=["POST"]) for name, act in doors.acts.items()],
-        Route("/bench/film", _guarded(doors.film), methods=["POST"]),
-        Route("/bench/picture", _guarded(doors.picture)),
-        Route("/bench/file", _guarded(doors.file)),
+        Route("/bench/film", doors.film, methods=["POST"]),
+        Route("/bench/picture", doors.picture),
+        Route("/bench/file", doors.file),
     ]
 
 
@@ -131,53 +132,16 @@ async def _received(request: Request, bench: Bench) -> str:
     Raises:
         InputError: if there is no room for it, or it is none.
     """
-    path: Path = await asyncio.to_thread(bench.films.room_for, request.query_params.get("kind", ""))
+    kind, size = request.query_params.get("kind", ""), stated_size(request)
+    path: Path = await asyncio.to_thread(bench.films.room_for, kind, size)
     try:
-        left = await asyncio.to_thread(bench.films.room_left)
         with path.open("wb") as stream:
-            async for piece in _limited(request, left):
+            async for piece in request.stream():
                 await asyncio.to_thread(stream.write, piece)
         return await asyncio.to_thread(bench.films.add, path)
     except BaseException:
         path.unlink(missing_ok=True)
         raise
-
-
-async def _limited(request: Request, most: int) -> AsyncIterator[bytes]:
-    """What is sent, in pieces.
-
-    Raises:
-        InputError: once it is more than so many bytes.
-    """
-    async for piece in request.stream():
-        most -= len(piece)
-        if most < 0:
-            limits = f"{LARGEST_FILM >> 30} GB a film, {LARGEST_ALL >> 30} GB in all, and room on the disk"
-            raise InputError(f"the film is too large; allowed: {limits}")
-        yield piece
-
-
-def _guarded(handle: _Handler) -> _Handler:
-    """Wrong input gets its sentence."""
-
-    async def guarded(request: Request) -> Response:
-        try:
-            return await handle(request)
-        except InputError as error:
-            return PlainTextResponse(str(error), status_code=400)
-        except OSError as error:
-            return PlainTextResponse(f"a file could not be written: {error.strerror}", status_code=507)
-
-    return guarded
-
-
-async def _body(request: Request, largest: int) -> bytes:
-    content = bytearray()
-    async for piece in request.stream():
-        content += piece
-        if len(content) > largest:
-            raise InputError(f"the message is too large; allowed: {largest >> 10} kB")
-    return bytes(content)
 
 
 def _message(content: bytes) -> Mapping[str, Any]:

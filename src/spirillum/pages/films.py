@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,17 +13,18 @@ from typing import TYPE_CHECKING, Any
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.pages.plain_names import plain_names
+from spirillum.pages.uploads import TooLargeError
 
 if TYPE_CHECKING:
     import numpy as np
 
     from spirillum.vision.video.frames import Video
 
-__all__ = ["LARGEST_ALL", "LARGEST_FILM", "Films"]
+__all__ = ["Films"]
 
-LARGEST_FILM = 4 << 30
+_LARGEST_FILM = 4 << 30
 """Bytes of one film."""
-LARGEST_ALL = 16 << 30
+_LARGEST_ALL = 16 << 30
 """Bytes of all films."""
 _MOST_FILMS = 50
 _SPARE = 512 << 20
@@ -47,17 +49,21 @@ class Films:
         """
         self._folder = folder
         self._lock = threading.RLock()
+        self._decoding = threading.Lock()  # one film at a time: a frame of many pixels takes much memory
         self._films: dict[str, _Film] = {}
+        self._stated: dict[Path, int] = {}
         self._count = 0
 
-    def room_for(self, kind: str) -> Path:
-        """A place for a film that is sent: an empty file, so that others that are sent at once are counted.
+    def room_for(self, kind: str, size: int) -> Path:
+        """A place for a film that is sent: an empty file. It counts with all its bytes as long as it is there.
 
         Args:
             kind: ending of its name, without the dot.
+            size: bytes that will be sent.
 
         Raises:
-            InputError: for another kind of file, too many films, or a full disk.
+            TooLargeError: for too large a film, too many, or a full disk.
+            InputError: for another kind of file.
         """
         from spirillum.vision.video.frames import FILMS
 
@@ -66,18 +72,28 @@ class Films:
         if f".{kind}" not in FILMS:
             raise InputError(f"a file of kind {kind[:20]!r}; allowed: {', '.join(FILMS)}")
         with self._lock:
-            if len(list(self._folder.glob("trial-*"))) >= _MOST_FILMS:
-                raise InputError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+            written = self._written()
+            self._stated = {path: self._stated[path] for path in written}
+            if len(written) >= _MOST_FILMS:
+                raise TooLargeError(f"{_MOST_FILMS} films are here already; allowed: to remove some first")
+            stated = sum(self._stated.values())
+            free = shutil.disk_usage(self._folder).free - (stated - sum(written.values())) - _SPARE
+            if size > min(_LARGEST_FILM, _LARGEST_ALL - stated, free):
+                limits = f"{_LARGEST_FILM >> 30} GB a film, {_LARGEST_ALL >> 30} GB in all, and room on the disk"
+                raise TooLargeError(f"a film of {size / (1 << 30):.3g} GB is too large; allowed: {limits}")
             self._count += 1
             path = self._folder / f"trial-{self._count}.{kind}"
             path.touch()
+            self._stated[path] = size
             return path
 
-    def room_left(self) -> int:
-        """Bytes that a film may have now."""
-        free = shutil.disk_usage(self._folder).free - _SPARE
-        used = sum(path.stat().st_size for path in self._folder.glob("trial-*"))
-        return max(0, min(LARGEST_FILM, LARGEST_ALL - used, free))
+    def _written(self) -> dict[Path, int]:
+        """The films that are here or on their way, with the bytes that have come."""
+        found = {}
+        for path in self._stated:
+            with suppress(FileNotFoundError):
+                found[path] = path.stat().st_size
+        return found
 
     def add(self, path: Path) -> str:
         """Take a film that was sent; its name.
@@ -88,7 +104,7 @@ class Films:
         from spirillum.vision.video.frames import open_video
 
         try:
-            with plain_names(self._folder):
+            with self._decoding, plain_names(self._folder):
                 video = open_video(path)
         except InputError:
             path.unlink(missing_ok=True)
@@ -154,5 +170,5 @@ class Films:
         if not (math.isfinite(time) and time >= 0.0):
             raise InputError(f"time = {time:g} s; allowed: 0 s or later")
         video = self.video(name)
-        with plain_names(self._folder):
+        with self._decoding, plain_names(self._folder):
             return video.samples([0.0, min(time, max(0.0, (video.duration or time) - 0.1))])[-1].image

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +9,7 @@ import numpy as np
 from spirillum.dynamics.poses import poses_of
 from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError
+from spirillum.files import scratch_folder
 from spirillum.pages.lane import Lane
 from spirillum.pages.numbers import SERIES
 from spirillum.pages.recording import finite, thinned
@@ -67,8 +66,8 @@ def replay_of_upload(content: bytes) -> dict[str, Any]:
     """
     if len(content) > LARGEST_RUN:
         raise InputError(f"the file has {len(content) >> 20} MB; allowed: at most {LARGEST_RUN >> 20} MB")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.nc"
+    with scratch_folder() as folder:
+        path = folder / "run.nc"
         path.write_bytes(content)
         try:
             return replay_of_run(open_run(path))

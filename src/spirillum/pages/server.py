@@ -24,6 +24,7 @@ from spirillum.pages.keep import MODULES, asset, command_line, python_lines, rep
 from spirillum.pages.replay import LARGEST_RUN, replay_of_lane, replay_of_upload
 from spirillum.pages.study_picture import LARGEST_STUDY_SENT, StudyPicture, sent_study
 from spirillum.pages.theatre import Theatre
+from spirillum.pages.uploads import TooLargeError, Uploads
 
 __all__ = ["application"]
 
@@ -186,24 +187,31 @@ def application(source: Any, guard: Guard, *, first_run: dict[str, Any] | None =
     Raises:
         InputError: if the robot cannot be loaded.
     """
-    house = _House(source, guard)
+    house, uploads = _House(source, guard), Uploads()
     routes = [
         Route("/", house.home),
         *[Route(f"/{name}", _file(name)) for name in _OWN if name != "index.html"],
         *[Route(f"/keep/{name}", _kept(name, house.theatre)) for name in _KEPT],
-        *bench_routes(house.bench, house.theatre),
+        *bench_routes(house.bench, house.theatre, uploads),
         Route("/flow", _flow(house.theatre)),
         Route("/first-run", _first(first_run)),
-        Route("/replay", _sent(replay_of_upload, LARGEST_RUN), methods=["POST"]),
-        Route("/study", _study(house.theatre), methods=["POST"]),
+        Route("/replay", _sent(replay_of_upload, LARGEST_RUN, uploads), methods=["POST"]),
+        Route("/study", _sent(_study(house.theatre), LARGEST_STUDY_SENT, uploads), methods=["POST"]),
         WebSocketRoute("/live", house.connect),
     ]
-    left = {ClientDisconnect: _left}
-    return _Guarded(Starlette(routes=routes, lifespan=house.open, exception_handlers=left), guard)
+    handlers = dict.fromkeys((InputError, OSError, ClientDisconnect), _said)
+    return _Guarded(Starlette(routes=routes, lifespan=house.open, exception_handlers=handlers), guard)
 
 
-async def _left(_request: Request, _error: Exception) -> Response:
-    """A client that leaves while it sends is told nothing, and neither is the terminal."""
+async def _said(request: Request, error: Exception) -> Response:
+    """What was wrong, in a sentence. A client that leaves while it sends is told nothing, nor is the terminal."""
+    with suppress(ClientDisconnect, RuntimeError):  # RuntimeError: all has been read
+        async for _ in request.stream():  # browsers listen to the answer when they have sent everything
+            pass
+    if isinstance(error, InputError):
+        return PlainTextResponse(str(error), status_code=413 if isinstance(error, TooLargeError) else 400)
+    if isinstance(error, OSError):
+        return PlainTextResponse(f"a file could not be written: {error.strerror}", status_code=507)
     return Response(status_code=400)
 
 
@@ -282,10 +290,7 @@ def _kept(name: str, theatre: Theatre) -> Handler:
         return Response(text, media_type=media, headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
     async def serve(request: Request) -> Response:
-        try:
-            return await asyncio.to_thread(made, request.query_params.get("lane", "0"))
-        except InputError as error:
-            return PlainTextResponse(str(error), status_code=400)
+        return await asyncio.to_thread(made, request.query_params.get("lane", "0"))
 
     return serve
 
@@ -310,7 +315,7 @@ def _first(run: dict[str, Any] | None) -> Handler:
     return serve
 
 
-def _study(theatre: Theatre) -> Handler:
+def _study(theatre: Theatre) -> Callable[[bytes], dict[str, Any]]:
     """A study's dataset is dropped on the page, or with nothing in it the paper's is computed; its picture."""
 
     def picture(content: bytes) -> dict[str, Any]:
@@ -320,21 +325,15 @@ def _study(theatre: Theatre) -> Handler:
         theatre.show_study(found)
         return found.told()
 
-    return _sent(picture, LARGEST_STUDY_SENT)
+    return picture
 
 
-def _sent(read: Callable[[bytes], Any], largest: int) -> Handler:
-    """A file is sent, and comes back as what is read from it."""
+def _sent(read: Callable[[bytes], Any], largest: int, uploads: Uploads) -> Handler:
+    """A file is sent, and comes back as what is read from it; one at a time, since small ones may declare much."""
+    one = asyncio.Lock()
 
     async def serve(request: Request) -> Response:
-        content = bytearray()
-        async for piece in request.stream():
-            content += piece
-            if len(content) > largest:
-                return PlainTextResponse(f"the file is too large; allowed: {largest >> 20} MB", status_code=413)
-        try:
-            return JSONResponse(await asyncio.to_thread(read, bytes(content)))
-        except InputError as error:
-            return PlainTextResponse(str(error), status_code=400)
+        async with uploads.received(request, largest) as content, one:
+            return JSONResponse(await asyncio.to_thread(read, content))
 
     return serve

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.dynamics.run_file import robot_of_settings
 from spirillum.errors import InputError
-from spirillum.files import loaded_netcdf
+from spirillum.files import loaded_netcdf, scratch_folder
 from spirillum.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -101,8 +99,8 @@ def sent_study(content: bytes) -> StudyPicture:
     Raises:
         InputError: if they are none.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "dataset.nc"
+    with scratch_folder() as folder:
+        path = folder / "dataset.nc"
         path.write_bytes(content)
         try:
             return StudyPicture(loaded_netcdf(path, _WHAT, LARGEST_STUDY_SENT))

@@ -9,8 +9,6 @@ import subprocess
 import sys
 import zipfile
 from importlib.resources import files
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from spirillum.dynamics.held_model import HeldModel
 from spirillum.errors import InputError
@@ -22,7 +20,7 @@ from spirillum.exports.fmu.description import (
     identifier_of,
     token_of,
 )
-from spirillum.files import MARK
+from spirillum.files import MARK, scratch_folder
 
 __all__ = ["compiler", "fmu_bytes"]
 
@@ -83,8 +81,7 @@ def fmu_bytes(held: HeldModel) -> bytes:
 
 
 def _compiled(source: bytes, header: bytes) -> bytes:
-    with TemporaryDirectory() as folder:
-        here = Path(folder)
+    with scratch_folder() as here:
         (here / SOURCE).write_bytes(source)
         (here / "robot.h").write_bytes(header)
         command = [compiler(), *_OPTIONS, "-o", "robot.library", SOURCE, "-lm"]
