@@ -46,8 +46,8 @@ def written(folder: Path, *lines: str) -> Path:
             "row 2, column tail_rate_Hz: empty, as in all rows with a speed; allowed: tail_rate_Hz or motor_rate_Hz",
         ),
         (
-            [HEADER + ",tail_rate_Hz_ci95", *(f"{row},0.1" for row in GOOD)],
-            "row 2, column tail_rate_Hz_ci95: an interval of one trial; allowed: a column trials",
+            [HEADER + ",tail_rate_Hz_ci95", *(f"{row},-0.1" for row in GOOD)],
+            "row 2, column tail_rate_Hz_ci95: '-0.1'; allowed: a number",
         ),
         ([row.replace(",", ";") for row in (HEADER, *GOOD)], "columns are separated by semicolons; allowed: commas"),
         ([row.replace(",", "\t") for row in (HEADER, *GOOD)], "columns are separated by tabs; allowed: commas"),

@@ -44,7 +44,7 @@ def test_as_many_numbers_as_means_give_wide_intervals_and_a_sentence(tmp_path: P
 def test_the_friction_says_when_nothing_tells_the_error_of_its_rate(made: Callable[..., Path], trials: int) -> None:
     path = made(**FOUR, error=0.02, trials=trials)
     found = sp.calibrate(path, WIDE, model="sbt", free=f"{BOTH},friction", method="least-squares")
-    sentence = "the motor rate has no repeated trials, so that its error is not known and not in the intervals of B_eff"
+    sentence = "the motor rate has no repeated trials and states no error"
     assert any(sentence in warning for warning in found.warnings) == (trials == 1)
 
 

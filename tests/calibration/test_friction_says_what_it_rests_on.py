@@ -98,6 +98,49 @@ def test_intervals_hold_the_truth_over_many_viscosities(made: Callable[..., Path
     assert coverage(made, 25, assume_uncertainty={"fluid.viscosity": "14%"}) > 0.88
 
 
+def _with_stated_errors(path: Path, rng: np.random.Generator, output: Path) -> Path:
+    """One trial of each tail, its three rates off by relative errors that the file states."""
+    comment, header, *rows = path.read_text().splitlines()
+    lines = [comment, f"{header},forward_velocity_mm_s_ci95,tail_rate_Hz_ci95,body_rate_Hz_ci95"]
+    for row in rows:
+        cells = row.split(",")
+        true, size = np.array(cells[5:], dtype=float), rng.uniform(0.003, 0.03, 3)
+        seen = true * (1.0 + size * rng.normal(size=3))
+        lines.append(",".join([*cells[:5], *(f"{v:.9g}" for v in (*seen, *np.abs(1.96 * size * true)))]))
+    output.write_text("\n".join(lines) + "\n")
+    return output
+
+
+def test_intervals_hold_the_truth_where_single_trials_state_their_errors(
+    made: Callable[..., Path], tmp_path: Path
+) -> None:
+    exact = made(friction=TRUTH, error=0.0, trials=1)
+    held = []
+    for seed in range(6):
+        path = _with_stated_errors(exact, np.random.default_rng(seed), tmp_path / "observations.csv")
+        found = fitted(path, PRESETS)
+        held += [item.low <= TRUTH <= item.high for item in found.friction]
+    # 95 % of 192 is 182; fewer than 172 or more than 191 would happen once in a thousand such tests.
+    assert 172 <= sum(held) <= 191
+    words = " ".join(found.warnings)
+    assert "hold its stated errors, and not how trials differ" in words
+    assert "too narrow" not in words
+
+
+def test_the_scatter_of_trials_holds_their_stated_errors(made: Callable[..., Path], tmp_path: Path) -> None:
+    """Stated errors that are small beside the scatter change nothing; large ones are what counts."""
+    path = made(**FOUR, seed=31, friction=TRUTH)
+    comment, header, *rows = path.read_text().splitlines()
+    widths = []
+    for share in ("", 1e-4, 0.2):
+        halves = [share and share * float(row.split(",")[6]) for row in rows]
+        lines = [comment, f"{header},motor_rate_Hz_ci95", *(f"{row},{h}" for row, h in zip(rows, halves, strict=True))]
+        (tmp_path / "stated.csv").write_text("\n".join(lines) + "\n")
+        widths.append(np.array([item.high - item.low for item in fitted(tmp_path / "stated.csv").friction]))
+    assert widths[1] == pytest.approx(widths[0], rel=1e-9)
+    assert np.all(widths[2] > 2.0 * widths[0])
+
+
 def test_friction_of_each_tail_leaves_nothing_to_tell_viscosity_by(made: Callable[..., Path]) -> None:
     with pytest.raises(sp.InputError, match="free = 'friction' together with 'viscosity': B_eff of each tail takes up"):
         fitted(made(**FOUR), free="body_drag,friction,viscosity")

@@ -38,6 +38,9 @@ def test_observations_are_read_back(tmp_path: Path, make_track: Make, robot: Any
     assert first.tail == (0.04, 0.025, 0.0025)
     assert (first.trial, second.trial) == ("one", "two")
     assert np.isnan(second.body_rate)
+    rate = trials[0].quantities["tail_rotation_rate"]
+    assert first.intervals[1] == pytest.approx(max(rate.high - rate.value, rate.value - rate.low), rel=1e-3)
+    assert np.isnan(second.intervals[2])
 
 
 def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robot: Any) -> None:

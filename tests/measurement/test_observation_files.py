@@ -40,6 +40,18 @@ def test_a_mean_keeps_its_own_interval(tmp_path: Path) -> None:
     assert (found.value, found.half_width, found.trials) == (pytest.approx(7e-4), pytest.approx(5e-5), 5)
 
 
+def test_one_trial_keeps_the_interval_that_it_states(tmp_path: Path) -> None:
+    path = written(
+        tmp_path,
+        "channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,body_rate_Hz,tail_rate_Hz_ci95,body_rate_Hz_ci95",
+        "30,20,1.5,1.2,-0.3,0.03,0.04",
+    )
+    found = next(iter(summarised(read_observations(path)).values()))
+    assert (found.tail_rate.half_width, found.tail_rate.trials) == (pytest.approx(0.03 * 2 * np.pi), 1)
+    # Tail and body are read one by one: errors of their difference add in squares.
+    assert found.motor_rate.half_width == pytest.approx(0.05 * 2 * np.pi)
+
+
 @pytest.mark.parametrize(
     ("lines", "words"),
     [

@@ -29,6 +29,8 @@ __all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
 
+_NORMAL = 1.959964
+"""Half width of a 95 % interval over the standard error."""
 _FLOOR = 0.1
 """Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
 
@@ -47,6 +49,36 @@ class Ratio:
     """Sum of squares of the trials' deviations from the mean, over the scale squared."""
     freedom: Samples
     """Degrees of freedom of that sum."""
+    stated: Samples
+    """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
+
+    def error_of_mean(self, error: Samples | float) -> Samples:
+        """Standard error of each mean, SI: that of a trial over the root of the number of trials.
+
+        The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their
+        sum.
+
+        Args:
+            error: relative error of one trial by the scatter, (robots,), (draws, 1) or a number; NaN where unknown.
+        """
+        found: Samples = np.fmax(error, np.nan_to_num(self.stated)) * self.scale / np.sqrt(np.maximum(self.trials, 1.0))
+        return found
+
+    def drawn_error(self, count: int, rng: np.random.Generator) -> Samples:
+        """Draws of the relative error of one trial as the scatter tells it, (count, 1); NaN without repeated trials.
+
+        Few trials leave it uncertain (chi-squared), so that a mean with it is distributed as Student's t.
+        """
+        freedom = float(self.freedom.sum())
+        if freedom == 0:
+            return np.full((1, 1), np.nan)
+        found: Samples = np.sqrt(self.squares.sum() / rng.chisquare(freedom, size=(count, 1)))
+        return found
+
+    @property
+    def explained(self) -> bool:
+        """Whether every mean has an error, stated or by the scatter of trials."""
+        return self.freedom.sum() > 0 or bool(np.all(np.isfinite(self.stated[self.seen])))
 
     @property
     def seen(self) -> np.ndarray:
@@ -245,6 +277,8 @@ class _Trials:
     trials: int
     squares: float
     freedom: float
+    stated: float = float("nan")
+    """Relative standard error of one trial, root mean square over those that state one."""
 
 
 @dataclass(frozen=True)
@@ -267,11 +301,14 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
     if len(items) == 1 and items[0].trials > 1:
         found = _of_a_mean(items[0], velocity[0], tail[0], body[0], motor[0], by_motor=by_motor)
     else:
+        halves = np.array([item.intervals for item in items]).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u, w, b, m = halves / _NORMAL / np.abs((velocity, tail, body, motor))
         found = _Seen(
-            _of_trials(velocity / (motor if by_motor else tail)),
+            _of_trials(velocity / (motor if by_motor else tail), u, m if by_motor else w),
             by_motor,
-            _of_trials(body / tail),
-            _of_trials(motor),
+            _of_trials(body / tail, b, w),
+            _of_trials(motor, m),
             _of_trials(tail).mean,
         )
     if found.advance.mean * hand <= 0:
@@ -293,12 +330,21 @@ def _check_rates(path: Path, observations: Sequence[Observation], found: Sequenc
         )
 
 
-def _of_trials(values: Samples) -> _Trials:
+def _of_trials(values: Samples, *relative: Samples) -> _Trials:
+    """Mean and scatter of trials.
+
+    Args:
+        values: one value a trial; NaN where it was not observed.
+        relative: relative standard errors of what the value is made of, trial by trial; NaN where not stated.
+    """
     known = values[np.isfinite(values)]
     if known.size == 0:
         return _Trials(values, float("nan"), 0, 0.0, 0.0)
     mean = float(known.mean())
-    return _Trials(values, mean, known.size, float(((known - mean) ** 2).sum()), known.size - 1.0)
+    variances = sum(np.square(part[np.isfinite(values)]) for part in relative)
+    stated = np.extract(np.isfinite(variances), variances)
+    error = float(np.sqrt(stated.mean())) if stated.size else float("nan")
+    return _Trials(values, mean, known.size, float(((known - mean) ** 2).sum()), known.size - 1.0, error)
 
 
 def _of_a_mean(item: Observation, velocity: float, tail: float, body: float, motor: float, *, by_motor: bool) -> _Seen:
@@ -334,6 +380,7 @@ def _ratio(found: Sequence[_Trials]) -> Ratio:
         scale=scale,
         squares=np.array([item.squares for item in found]) / scale**2,
         freedom=np.array([item.freedom for item in found]),
+        stated=np.array([item.stated for item in found]) * size / scale,
     )
 
 

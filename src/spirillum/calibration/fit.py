@@ -282,9 +282,8 @@ def _friction(
     if "friction" not in problem.free:
         return (), ()
     ratio = problem.experiment.motor_rate
-    own_error = error.get("motor_rate", ratio.pooled_error)
-    relative = np.nan_to_num(own_error) / np.sqrt(np.maximum(ratio.trials, 1.0))
-    rates = ratio.mean * (1.0 + relative * rng.normal(size=(z.shape[0], problem.experiment.size)))
+    own_error = error.get("motor_rate", ratio.drawn_error(z.shape[0], rng))
+    rates = ratio.mean + ratio.error_of_mean(own_error) * rng.normal(size=(z.shape[0], problem.experiment.size))
     middle = problem.friction(best[None], ratio.mean[None], reading)[0]
     given = _estimates(middle, problem.friction(z, rates, reading))
     if not problem.assumed:

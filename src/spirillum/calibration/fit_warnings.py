@@ -201,13 +201,15 @@ def friction_warnings(problem: Problem, z: Samples, reading: str) -> list[str]:
 
 
 def friction_interval_warnings(problem: Problem) -> list[str]:
-    """What the intervals of B_eff leave out: the error of a motor rate, which only repeated trials tell."""
+    """What the intervals of B_eff leave out without repeated trials: how trials differ, or all of the rate's error."""
     rate = problem.experiment.motor_rate
     if "friction" not in problem.free or not rate.seen.any() or rate.freedom.sum() > 0:
         return []
+    if rate.explained:
+        return ["one trial for each tail: the intervals of B_eff hold its stated errors, and not how trials differ"]
     return [
-        "the motor rate has no repeated trials, so that its error is not known and not in the intervals of B_eff, "
-        "which are too narrow"
+        "the motor rate has no repeated trials and states no error (columns tail_rate_Hz_ci95 and body_rate_Hz_ci95), "
+        "so that its error is not in the intervals of B_eff, which are too narrow"
     ]
 
 

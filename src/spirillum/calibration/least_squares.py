@@ -64,7 +64,7 @@ class LeastSquares:
     error: dict[Quantity, float]
     """Relative error of one trial; NaN without repeated trials."""
     chi2: float
-    """Sum of squared residuals with the trials' scatter alone; NaN without repeated trials."""
+    """Sum of squared residuals with the trials' errors alone; NaN where they are neither seen nor stated."""
     freedom: int
     """Observed means less free numbers."""
     left: dict[Quantity, float]
@@ -113,9 +113,8 @@ def standard_errors(
 def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
     """Square of each mean's error by its trials alone, and by what no mean is known better than."""
     ratio = problem.ratio(name)
-    trial = np.nan_to_num(error) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
     floor = max(LEAST_ERROR, problem.interpolation_error) * ratio.scale
-    found: Samples = trial**2 + floor**2
+    found: Samples = ratio.error_of_mean(error) ** 2 + floor**2
     return found
 
 
@@ -127,8 +126,8 @@ def least_squares_fit(problem: Problem) -> LeastSquares:
     """
     _check_count(problem)
     error = {name: problem.ratio(name).pooled_error for name in problem.quantities}
-    scattered = {name: bool(np.isfinite(value) and value > 0) for name, value in error.items()}
-    # Without scatter all means count alike, by their relative deviation.
+    scattered = {name: bool(error[name] > 0) or problem.ratio(name).explained for name in error}
+    # Without known errors all means count alike, by their relative deviation.
     discrepancy = {name: 0.0 if scattered[name] else 1.0 for name in problem.quantities}
     z = _best(problem, problem.start, error, discrepancy, starts=_STARTS, prior=_BREATH)
     _check_blind(problem, z)
@@ -287,8 +286,8 @@ def _squares(problem: Problem, z: Samples, error: dict[Quantity, float]) -> dict
         ratio = problem.ratio(name)
         seen = ratio.seen
         relative = (ratio.mean[seen] - values[seen]) / values[seen]
-        trial = np.nan_to_num(error[name]) * ratio.scale[seen] / values[seen]
-        found[name] = float(np.mean(relative**2)), float(np.mean(trial**2 / ratio.trials[seen]))
+        of_mean = ratio.error_of_mean(error[name])[seen] / values[seen]
+        found[name] = float(np.mean(relative**2)), float(np.mean(of_mean**2))
     return found
 
 

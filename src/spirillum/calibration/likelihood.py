@@ -5,7 +5,8 @@ For robot j and quantity q (advance, turning, motor rate) with the mean y over n
     y = f (1 + tau_q d) + sigma_q |y| e/sqrt(n),   d, e ~ N(0, 1)
 
 tau_q is the model's discrepancy: what it gets wrong from robot to robot, however many trials are made. sigma_q is the
-relative error of a trial, which the scatter of repeated trials tells. Both have half-normal priors and are integrated
+relative error of a trial, which the scatter of repeated trials tells; it is no less than what the trial itself states
+of its measurement. Both have half-normal priors and are integrated
 over with the rest. Errors of advance and turning within a robot are correlated, since both are divided by the same tail
 rate; their correlation is that of the trials.
 """
@@ -99,10 +100,10 @@ class Density:
             ratio = self.problem.ratio(name)
             s, t = sigma[name][:, None], tau[name][:, None]
             residual[name] = np.where(ratio.seen, ratio.mean - values, 0.0)
-            noise[name] = s * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+            noise[name] = ratio.error_of_mean(s)
             floor = max(LEAST_RELATIVE, self.problem.interpolation_error)
             variance[name] = noise[name] ** 2 + (t * values) ** 2 + (floor * ratio.scale) ** 2
-            trial = s**2 + LEAST_RELATIVE**2
+            trial = np.fmax(s, ratio.stated) ** 2 + LEAST_RELATIVE**2
             total += -0.5 * (ratio.freedom * np.log(trial) + ratio.squares / trial)
         for name in predicted:
             if name != "turning" or "advance" not in predicted:

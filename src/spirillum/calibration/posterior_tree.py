@@ -91,7 +91,11 @@ def _tails(found: Calibrated) -> list[dict[str, Any]]:
     tails = []
     for place, robot in enumerate(experiment.robots):
         seen = {
-            name: {key: float(getattr(problem.ratio(name), key)[place]) for key in ("mean", "trials", "scale")}
+            name: {
+                key: float(values[place])
+                for key in ("mean", "trials", "scale", "stated")
+                if np.isfinite(values := getattr(problem.ratio(name), key))[place]
+            }
             for name in problem.quantities
             if problem.ratio(name).seen[place]
         }

@@ -48,6 +48,7 @@ class _Seen(_Table):
     mean: _Number
     trials: Annotated[float, Field(gt=0, lt=1e9)]
     scale: Annotated[float, Field(gt=1e-12, lt=1e12)]
+    stated: Annotated[float, Field(ge=0, lt=1e9)] = 0.0
 
 
 _Quantity = Literal["advance", "turning", "motor_rate"]

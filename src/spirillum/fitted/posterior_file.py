@@ -71,9 +71,9 @@ class PosteriorFile:
     friction_reading: str = ""
     """Reading of the friction under which it was inferred."""
     tails: tuple[Mapping[str, Any], ...] = ()
-    """What was observed of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`),
-    `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in older
-    files."""
+    """What was observed of every robot: channel and tail, `tail_rate`, `seen` (quantity to `mean`, `trials`, `scale`,
+    `stated`), `by_motor`, `correlation` of the errors of advance and turning, `floor` of all relative errors; none in
+    older files."""
 
     def measured(self, robot: Robot) -> Mapping[str, Any] | None:
         """What was observed of a robot; None if it was not."""

@@ -57,7 +57,7 @@ class Observation:
     trials: int
     """1 for a trial, more for a mean."""
     intervals: tuple[float, float, float, float]
-    """Half widths of a mean's 95 % intervals in the same order."""
+    """Half widths of 95 % intervals in the same order: what a trial says of its own error, or of a mean over trials."""
     trial: str = ""
     """Number or name of the trial, where the file gives one."""
     motor_derived: bool = False
@@ -136,12 +136,8 @@ def _observation(row: Row) -> Observation:
     _check_trial(row)
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
-    widths = [name for name in _INTERVALS if row.text(name)]
-    if widths and trials < 2:
-        raise InputError(
-            f"{place}, column {widths[0]}: an interval of one trial; allowed: a column trials with the number of "
-            "trials (2 or more) that the mean is over, or empty"
-        )
+    if math.isnan(d) and trials == 1:  # of a trial, whose tail and body are read one by one
+        d = math.hypot(b, c)
     return Observation(
         row=row.line,
         robot=row.text("robot"),
@@ -257,7 +253,7 @@ def _observed(items: Sequence[Observation]) -> Observed:
         [item.body_rate for item in items],
         [item.motor_rate for item in items],
     ]
-    if len(items) == 1 and items[0].trials > 1:
+    if len(items) == 1:
         only = items[0]
         return Observed(*(Mean(column[0], w, only.trials) for column, w in zip(columns, only.intervals, strict=True)))
     return Observed(*(mean_with_interval(column) for column in columns))

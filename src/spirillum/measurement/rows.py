@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from spirillum.files import MARK, text_cell
 from spirillum.measurement.observations import RATES
-from spirillum.measurement.trials import Trial
+from spirillum.measurement.trials import Measured, Trial
 from spirillum.robot.robot import Robot
 
 __all__ = ["observation_rows"]
@@ -24,7 +24,7 @@ _SEEN = {
 
 
 def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str | None:
-    """Text of an observations file, a row a trial, as `spirillum calibrate` reads it.
+    """Text of an observations file, a row a trial with its own intervals, as `spirillum calibrate` reads it.
 
     Args:
         trials: the trials.
@@ -49,20 +49,28 @@ def observation_rows(trials: Sequence[Trial], robot: Robot, setup: str) -> str |
         flags = ", ".join(dict.fromkeys(flag.name for flag in trial.flags))
         text.write(f"# trial {_safe(trial.name)}: {_safe(trial.video)}{'; flags: ' + flags if flags else ''}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow((*_KEYS, *_SEEN.values()))
+    writer.writerow((*_KEYS, *_SEEN.values(), *(f"{column}_ci95" for column in _SEEN.values())))
     where = [
         _safe(robot.name),
         *(f"{1e3 * length:.9g}" for length in (robot.channel.diameter, robot.tail.wavelength, robot.tail.amplitude)),
     ]
     for trial in kept:
-        cells = [_cell(trial.quantities[name].value, RATES[column]) for name, column in _SEEN.items()]
-        writer.writerow([*where, _trial(trial.name), *cells])
+        seen = [(trial.quantities[name], RATES[column]) for name, column in _SEEN.items()]
+        cells = [_cell(item.value, factor) for item, factor in seen]
+        halves = [_half_width(item, factor) if cell else "" for (item, factor), cell in zip(seen, cells, strict=True)]
+        writer.writerow([*where, _trial(trial.name), *cells, *halves])
     return text.getvalue()
 
 
 def _cell(value: float, factor: float) -> str:
     """A value in the column's unit; empty where it was not measured."""
     return f"{value / factor:.7g}" if math.isfinite(value) and value != 0 else ""
+
+
+def _half_width(item: Measured, factor: float) -> str:
+    """The larger half of a 95 % interval in the column's unit; empty where there is none."""
+    half = max(item.high - item.value, item.value - item.low) / factor
+    return f"{half:.4g}" if math.isfinite(half) else ""
 
 
 def _trial(name: str) -> str:

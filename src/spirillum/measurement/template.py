@@ -20,7 +20,8 @@ _TEMPLATE = """\
 # forward_velocity_mm_s, tail_rate_Hz, body_rate_Hz, motor_rate_Hz: what was measured; leave empty what was not.
 #   All are signed about the swimming direction, in the lab; 1 Hz is one turn a second. A right-handed tail drives
 #   with a positive rate, the body turns against it, and the motor's rate is the tail's less the body's.
-# trials and the columns *_ci95: only for a row that is a mean over trials, with half widths of 95 % intervals.
+# trials: only for a row that is a mean over that many trials.
+# the columns *_ci95: half widths of 95 % intervals, where known: the error of this trial, or of the mean.
 """
 
 

@@ -102,7 +102,7 @@ def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, ob
 
 
 def _error_of_mean(error: Samples, seen: Mapping[str, float]) -> Samples:
-    found: Samples = error * seen["scale"] / np.sqrt(max(seen["trials"], 1.0))
+    found: Samples = np.maximum(error, seen.get("stated", 0.0)) * seen["scale"] / np.sqrt(max(seen["trials"], 1.0))
     return found
 
 

@@ -190,7 +190,7 @@ def _half_width(found: Calibrated, name: Quantity) -> Samples:
     """Half width of the 95 % interval of each observed mean."""
     ratio = found.problem.ratio(name)
     error = found.error.get(name, ratio.pooled_error)
-    half: Samples = 1.96 * np.nan_to_num(error) * ratio.scale / np.sqrt(np.maximum(ratio.trials, 1.0))
+    half: Samples = 1.96 * ratio.error_of_mean(error)
     return half
 
 
