@@ -10,6 +10,7 @@ import xarray as xr
 
 import spirillum as sp
 from spirillum.results.study_report import write_report
+from spirillum.results.study_robot import robot_picture
 from spirillum.studies.ranking import best_in_words, ranking_of
 
 GRID = {
@@ -68,6 +69,19 @@ def test_report_starts_with_the_ranking(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert page.index('id="ranking"') < page.index('id="figures"') < page.index('id="settings"')
     assert (tmp_path / "figures" / "ranking.png").stat().st_size > 5_000
+
+
+def test_the_fastest_robot_is_drawn() -> None:
+    dataset = sp.study(GRID)
+    ranking = ranking_of(dataset)
+    place = np.unravel_index(ranking.robots[0].place, (2, 2, 2))
+    picture = robot_picture(dataset, ranking)
+    assert picture is not None
+    assert ranking.robots[0].name in picture.caption
+    at = dict(zip(("channel", "wavelength", "amplitude"), place, strict=True))
+    wanted = dataset.isel(at)
+    for words in (f"{1e3 * float(wanted[name]):g} mm" for name in ("wavelength", "amplitude", "channel_diameter")):
+        assert words in picture.alternative
 
 
 def test_robots_without_a_motor_are_ranked_by_power_and_equal_ones_are_called_so() -> None:

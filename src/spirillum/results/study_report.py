@@ -65,7 +65,7 @@ def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, in
 def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     """The ranking first, then the robot and the figures of the study."""
     ranking = ranking_of(dataset)
-    robot = robot_picture(dataset)
+    robot = robot_picture(dataset, ranking)
     first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
     return {**first, **({"robot": robot} if robot else {}), **figures_of(dataset)}
 

@@ -11,6 +11,7 @@ import numpy as np
 from spirillum.robot.actuation import Drive, Motor
 from spirillum.robot.parts import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
+from spirillum.studies.ranking import StudyRanking
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.robot import robot_figure, robot_words
 
@@ -20,30 +21,29 @@ if TYPE_CHECKING:
 __all__ = ["robot_picture"]
 
 
-def robot_picture(dataset: xr.Dataset) -> Picture | None:
-    """Side view of the study's first robot; None if the dataset carries no settings of robots."""
+def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
+    """Side view of the study's fastest robot, else of its first; None if the dataset carries no settings of robots.
+
+    Args:
+        dataset: a study.
+        ranking: of its robots.
+    """
     dumps = json.loads(dataset.attrs.get("settings", "{}")).get("robots") or []
     if not dumps:
         return None
-    table = dict(dumps[0])
-    table["tail"] = {**table["tail"], **_tail_of_the_grid(dataset, table["tail"])}
+    place = ranking.robots[0].place if ranking.robots else 0
+    if "channel" in dataset.dims:  # of a grid the settings name a robot for each channel
+        grid = ("wavelength", "amplitude")
+        channel, *tail = np.unravel_index(place, [dataset.sizes[name] for name in ("channel", *grid)])
+        table = dict(dumps[int(channel)])
+        own = {name: float(dataset[name].values[at]) for name, at in zip(grid, tail, strict=True)}
+        table["tail"] = {**table["tail"], **own}
+    else:
+        table = dumps[place]
     robot = _rebuilt(table)
     words = robot_words(robot)
-    grid, count = "channel" in dataset.dims, len(dumps)
-    drawn = "Drawn is one of the study's tails" if grid else "Drawn is the study's robot"
-    if count > 1:
-        drawn = f"{drawn} in the first of {count} channels" if grid else f"Drawn is the first of {count} robots"
+    drawn = f"Drawn is the fastest: {ranking.robots[0].name}" if ranking.robots else "Drawn is the study's first robot"
     return Picture("The robot", f"{words} {drawn}.", words, lambda: robot_figure(robot))
-
-
-def _tail_of_the_grid(dataset: xr.Dataset, tail: Mapping[str, Any]) -> dict[str, float]:
-    """The robot's own tail if the grid has it, else one from the grid's middle; SI."""
-    if "channel" not in dataset.dims:
-        return {}
-    grid = {name: np.asarray(dataset[name].values, dtype=float) for name in ("wavelength", "amplitude")}
-    if all(bool(np.any(np.isclose(values, tail[name]))) for name, values in grid.items()):
-        return {}
-    return {name: float(np.sort(values)[values.size // 2]) for name, values in grid.items()}
 
 
 def _rebuilt(table: Mapping[str, Any]) -> Robot:

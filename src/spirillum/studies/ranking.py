@@ -76,6 +76,8 @@ class RankedRobot(NamedTuple):
     low: Mapping[str, float]
     """Least values of bands or lower limits of intervals; NaN without one."""
     high: Mapping[str, float]
+    place: int
+    """Its place in the flat order of the study."""
 
     def to_dict(self) -> dict[str, Any]:
         """As it stands in JSON."""
@@ -211,7 +213,7 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     order = order[np.isfinite(values["forward_velocity"][order])]
     ranked = {
         int(index): RankedRobot(
-            names[index], *({name: float(of[name][index]) for name in known} for of in (values, low, high))
+            names[index], *({name: float(of[name][index]) for name in known} for of in (values, low, high)), int(index)
         )
         for index in order
     }

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from matplotlib.figure import Figure
 
 import spirillum as sp
 
@@ -33,6 +34,18 @@ def observed_study(tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = Path(tmp_path_factory.mktemp("observed")) / "synthetic.csv"
     path.write_text(SYNTHETIC)
     return sp.study(observations=path)
+
+
+@pytest.fixture(autouse=True)
+def journal_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No figure is wider than 170 mm."""
+
+    class Checked(Figure):
+        def __init__(self, figsize: tuple[float, float]) -> None:
+            assert figsize[0] <= 170.0 / 25.4
+            super().__init__(figsize=figsize)
+
+    monkeypatch.setattr("spirillum.view.figures.style.Figure", Checked)
 
 
 @pytest.fixture

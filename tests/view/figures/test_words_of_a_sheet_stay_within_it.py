@@ -2,8 +2,8 @@
 
 import pytest
 
-from spirillum.view.figures.sheet import PAGE, Sheet
-from spirillum.view.figures.style import DPI, styled
+from spirillum.view.figures.sheet import Sheet
+from spirillum.view.figures.style import DPI, PAGE, styled
 
 
 @pytest.mark.parametrize("space", [" ", "\u00a0"])

@@ -22,7 +22,7 @@ from spirillum.view.figures.style import Scale, label_of_model, look_of_model
 __all__ = ["drop_picture"]
 
 _TITLE = "Loss of speed from the wide to the narrow channel"
-_MOST_COLUMNS = 6
+_MOST_COLUMNS = 5
 _STATED: Any = {"color": "black", "linestyle": (0, (4.0, 2.0)), "linewidth": 1.0}
 """Look of what the paper states."""
 
@@ -89,7 +89,7 @@ def _draw(shown: StudyView, evidence: Evidence, notes: list[str]) -> Figure:
             draw_curve(axes, scale(values), 100 * evidence.drop_per_motor_turn(model)[wavelength], look)
         axes.axhline(100 * GLOBAL_DROP, **_STATED)
         tail_axis(axes, scale(values))
-        axes.set_xlabel(f"wave amplitude $B_o$ ({scale.unit})")
+        axes.set_xlabel(f"amplitude $B_o$ ({scale.unit})")
         head_column(axes, shown, wavelength)
     panels[0].set_ylabel("loss at equal motor rates\n$1-U_{narrow}/U_{wide}$ (%)")
     bottom, top = panels[0].get_ylim()

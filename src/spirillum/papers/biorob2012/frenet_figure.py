@@ -16,11 +16,10 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.scene import FAINT, HALO, INK
 from spirillum.view.figures.solids import centreline_of
-from spirillum.view.figures.style import COLOURS, new_figure, styled
+from spirillum.view.figures.style import COLOURS, PAGE, new_figure, styled
 
 __all__ = ["Frames", "frenet_figure", "frenet_frames"]
 
-_WIDTH = 9.0
 _SIGHT = np.array([0.56, 0.76, -0.34])
 """Direction in which the picture is seen: from the side, from behind and from above."""
 _POINTS = 1200
@@ -98,14 +97,14 @@ def frenet_figure(robot: Robot) -> Figure:
         low, high = drawn.min(axis=0) - 0.9 * reach, drawn.max(axis=0) + 0.9 * reach
         low[1] -= 0.4 * reach
         span = high - low
-        figure = new_figure(_WIDTH, _WIDTH * float(span[1] / span[0]))
+        figure = new_figure(PAGE, PAGE * float(span[1] / span[0]))
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_axis_off()
         axis = seen(np.stack([start, wire[-1] * [1, 0, 0] - [0.6 * reach, 0, 0]]))
         axes.plot(axis[:, 0], axis[:, 1], color=FAINT, linewidth=0.9, dashes=(9, 3, 2, 3), zorder=1)
-        points = 72.0 * _WIDTH / float(span[0])
+        points = 72.0 * PAGE / float(span[0])
         _draw_wire(axes, seen(wire), (wire - middle) @ away, tail.wire_diameter / unit * points)
         for number, place in enumerate(marked.position / unit):
             vectors = (marked.tangent[number], marked.normal[number], marked.binormal[number])
@@ -124,7 +123,7 @@ def frenet_figure(robot: Robot) -> Figure:
             low[0] + 0.012 * span[0],
             low[1] + 0.03 * span[1],
             words + "$\\mathbf{b}=\\mathbf{t}\\times\\mathbf{n}$ · $xyz$: the lab, $x$ forward, $z$ up",
-            size=10,
+            size=7.5,
             color=INK,
             va="bottom",
         )
@@ -163,7 +162,7 @@ def _draw_arrow(axes: Axes, start: Samples, end: Samples, name: str, colour: str
                 (float(start[0]), float(start[1])),
                 (float(end[0]), float(end[1])),
                 arrowstyle="-|>",
-                mutation_scale=12,
+                mutation_scale=9,
                 linewidth=width,
                 color=shade,
                 shrinkA=0,
@@ -180,7 +179,7 @@ def _draw_arrow(axes: Axes, start: Samples, end: Samples, name: str, colour: str
         text,
         ha="center",
         va="center",
-        size=13,
+        size=10,
         color=colour,
         path_effects=[HALO],
         zorder=10,

@@ -16,7 +16,7 @@ from spirillum.view.figures.posterior import posterior_figure, profile_figure
 from spirillum.view.figures.rows import draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import spread
-from spirillum.view.figures.style import COLOURS, PATCH, Scale, label_of_model, look_of_model, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, label_of_model, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -218,7 +218,7 @@ def residual_figure(found: Calibrated) -> Figure:
         sheet = Sheet(
             "Residuals of the fitted model",
             _source(found),
-            width=width_of(1, 6.4),
+            width=PAGE,
             heights=[1.5] * len(names),
             columns=1,
             notes=[_fit_words(found), "Tails in each channel by wavelength, then amplitude."],
@@ -238,7 +238,7 @@ def residual_figure(found: Calibrated) -> Figure:
         shown = spread(len(order), _MOST_NAMES)
         tails = [experiment.robots[order[n]].tail for n in shown]
         names_of_tails = [f"{tail.wavelength * 1e3:g} x {tail.amplitude * 1e3:g}" for tail in tails]
-        last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=6)
+        last.set_xticks(list(shown), names_of_tails, rotation=90, fontsize=7)
         last.tick_params(labelbottom=True)
         low, high = last.get_ylim()
         last.set_ylim(low - 0.15 * (high - low), high)  # room for the names of the channels

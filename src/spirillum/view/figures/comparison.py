@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 from spirillum.swimming.comparison import ModelComparison, estimated_error
 from spirillum.swimming.prediction import Prediction
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
-from spirillum.view.figures.style import Scale, look_of_model, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import PAGE, Scale, look_of_model, plain, styled
 
 __all__ = ["comparison_figure"]
 

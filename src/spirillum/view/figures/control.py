@@ -13,7 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.control import Control
 from spirillum.units import show
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
 
 __all__ = ["control_figure"]
 
@@ -31,7 +31,7 @@ def control_figure(control: Control) -> Figure:
         sheet = Sheet(
             f"{plain(control.robot.name)}: {control.task.kind}, controller {control.controller}, seed {control.seed}",
             _subtitle(control),
-            width=7.16,
+            width=PAGE,
             heights=[1.9, 1.5, 0.8],
             columns=1,
             sharex="col",

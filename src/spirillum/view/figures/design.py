@@ -15,8 +15,8 @@ from spirillum.arrays import Samples
 from spirillum.designs.answer import Design, Profile
 from spirillum.designs.evaluation import Objective
 from spirillum.units import display_unit, in_unit
-from spirillum.view.figures.sheet import COLUMN, PAGE, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PATCH, Scale, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, PATCH, Scale, plain, styled
 
 __all__ = ["design_figure"]
 

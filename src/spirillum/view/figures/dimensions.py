@@ -35,7 +35,7 @@ def draw_dimensions(axes: Axes, s: Scene) -> None:
             )
         else:
             text = f"{s.words('D_{ch}', robot.channel.diameter)}\n(upper wall\nout of view)"
-            label(axes, x, 0.4 * s.half_height, text, ha="left", size=9)
+            label(axes, x, 0.4 * s.half_height, text, ha="left", size=7.5)
     _tail_dimensions(axes, s)
 
 
@@ -102,7 +102,7 @@ def _wire_thickness(axes: Axes, s: Scene) -> None:
         xytext=(low + 0.03 * s.total, -s.tail_top - 0.03 * s.total),
         ha="left",
         va="center",
-        size=10,
+        size=8,
         color=INK,
         zorder=13,
         arrowprops={"arrowstyle": "-", "linewidth": 0.7, "color": INK, "shrinkB": 0},

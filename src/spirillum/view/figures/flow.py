@@ -19,7 +19,7 @@ from spirillum.units import Hz
 from spirillum.view.figures.scene import HALO
 from spirillum.view.figures.section import draw_glass, draw_section
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 __all__ = ["flow_figure"]
 
-_BESIDE, _STRIP = 1.67, 1.1
+_BESIDE, _STRIP = 1.45, 1.1
 """Typical room beside a panel for its labels and colour bar; height of the pressure along a tube, inches."""
-_WIDE, _SQUARE, _TALLEST = 6.6, 3.3, 4.2
-"""Width of a panel among stacked ones and of one beside another; largest height, inches."""
+_TALLEST = 4.2
+"""Largest height of a panel, inches."""
 _SPEED_DECADES = 3.0
 """Largest range of the logarithmic colours: what is slower has the darkest one."""
 _PRESSURE_DECADES = 2.0
@@ -136,8 +136,8 @@ def _sheet(flow: Flow, view: _View, *, strip: bool) -> Sheet:
     """Panels for speed and pressure: stacked for a long plane, else side by side; one below them along a tube."""
     width, height = float(np.ptp(view.x)), float(np.ptp(view.y))
     stacked = width > 1.25 * height
-    across = min(_WIDE if stacked else _SQUARE, _TALLEST * width / height)
     columns = 1 if stacked else 2
+    across = min(PAGE / columns - _BESIDE, _TALLEST * width / height)
     return Sheet(
         f"Flow around {plain(flow.robot.name, 50)}",
         "\n".join(_conditions(flow, view)).replace("-", "−"),

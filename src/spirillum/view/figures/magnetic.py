@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 
 from spirillum.arrays import Samples
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PATCH, Scale, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr

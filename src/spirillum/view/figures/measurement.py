@@ -14,7 +14,7 @@ from spirillum.measurement.rates import Rate
 from spirillum.measurement.trials import RATE_NAMES, Trial
 from spirillum.quantities import unit_of
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain
 
 if TYPE_CHECKING:
     from spirillum.measurement.measure import Measurement
@@ -53,7 +53,7 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
 
 def trial_figure(trial: Trial) -> Figure:
     """Series of a trial with their lines, and their residuals."""
-    figure = new_figure(7.2, 5.4)
+    figure = new_figure(PAGE, 5.4)
     figure.set_layout_engine("constrained")
     panels = figure.subplots(3, 2, sharex=True, gridspec_kw={"width_ratios": (1.25, 1.0)})
     track = trial.track
@@ -109,7 +109,7 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
 
 def trials_figure(measurement: Measurement) -> Figure:
     """Speeds and rates of all trials, with the mean over them."""
-    figure = new_figure(7.2, 2.7)
+    figure = new_figure(PAGE, 2.7)
     figure.set_layout_engine("constrained")
     for axes, name in zip(figure.subplots(1, 4), RATE_NAMES, strict=True):
         items = [trial.quantities[name] for trial in measurement.trials]

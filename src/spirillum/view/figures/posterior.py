@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
-from spirillum.view.figures.style import COLOURS, Scale, look_of_model, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, look_of_model, plain, styled
 
 if TYPE_CHECKING:
     from spirillum.calibration.calibrated import Calibrated
@@ -20,15 +21,19 @@ if TYPE_CHECKING:
 
 __all__ = ["posterior_figure", "profile_figure"]
 
-_CELL = 1.25
-_MOST = 9
+_MOST = 6
+"""Numbers of the figure: more would leave no room for a pair's contours."""
+_LETTERS = 13
+"""Letters of a line below a panel."""
+_MARGIN = 1.0
+"""Room for the labels beside the cells, inches."""
 _LIMIT = 3.84
 """Misfit at the limits of a 95 % interval: chi squared of one degree of freedom."""
 _BINS = 32
 
 
 def posterior_figure(found: Calibrated) -> Figure:
-    """Marginals on the diagonal, pairs below it; what is not drawn beyond the ninth number is said."""
+    """Marginals on the diagonal, pairs below it; what is not drawn beyond the sixth number is said."""
     posterior = found.posterior
     assert posterior is not None  # noqa: S101 - drawn for a posterior only
     every = {name: values.reshape(-1) for name, values in posterior.values().items()}
@@ -45,8 +50,8 @@ def posterior_figure(found: Calibrated) -> Figure:
         sheet = Sheet(
             "Posterior of the fitted numbers",
             words,
-            width=max(1.0 + _CELL * count, 5.5),
-            heights=[_CELL - 0.1] * count,
+            width=PAGE,
+            heights=[min((PAGE - _MARGIN) / count, 2.0) - 0.1] * count,
             columns=count,
             sharey=False,
         )
@@ -83,8 +88,10 @@ def _unit(scale: Scale, between: str) -> str:
 
 
 def _label(name: str) -> str:
-    """A number's name on two lines."""
-    return name.replace("[", "\n[").replace("_", " ", 1).replace("_", "\n")
+    """A number's name in lines that fit below a panel; its channel stays together."""
+    words, bracket, channel = name.replace("_", " ").partition("[")
+    lines = wrap(words, _LETTERS)
+    return "\n".join([*lines, bracket + channel] if bracket else lines)
 
 
 def _window(values: Samples) -> tuple[float, float]:
@@ -125,7 +132,7 @@ def _pair(axes: Axes, x: Samples, y: Samples, colour: str) -> None:
 
 
 def _ticks(axes: Axes, *, left: bool, bottom: bool) -> None:
-    axes.tick_params(labelleft=left, labelbottom=bottom, labelsize=6.5, length=2.0, width=0.5)
+    axes.tick_params(labelleft=left, labelbottom=bottom, labelsize=7.0, length=2.0, width=0.5)
     axes.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
     if axes.get_yticks().size:
         axes.yaxis.set_major_locator(MaxNLocator(3, prune="both"))

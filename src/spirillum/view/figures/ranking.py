@@ -11,13 +11,13 @@ from spirillum.arrays import Values
 from spirillum.quantities import unit_of
 from spirillum.studies.ranking import ENDS, RANKED, RankedRobot, StudyRanking
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.style import COLOURS, Scale, new_figure, plain, told_apart
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain, told_apart
 
 __all__ = ["ranking_picture"]
 
 MOST = 12
 """Robots in the figure."""
-_WIDTH, _ROW, _ENDS = 6.9, 0.24, 1.0  # inches
+_ROW, _ENDS = 0.24, 1.0  # inches
 
 
 def ranking_picture(ranking: StudyRanking) -> Picture:
@@ -41,7 +41,7 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
 def _drawn(ranking: StudyRanking) -> Figure:
     robots = ranking.robots[:MOST]
     names = [name for name in ranking.quantities if any(np.isfinite(robot.values[name]) for robot in robots)]
-    figure = new_figure(_WIDTH, _ENDS + _ROW * len(robots))
+    figure = new_figure(PAGE, _ENDS + _ROW * len(robots))
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
     for panel, name in zip(panels[0], names, strict=True):
         _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike})

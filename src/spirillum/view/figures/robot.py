@@ -12,9 +12,9 @@ from matplotlib.patches import Ellipse, FancyArrowPatch, Rectangle
 from spirillum.robot.links import outlines_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.dimensions import draw_dimensions
-from spirillum.view.figures.scene import FAINT, INK, PHASE, WIDTH, Scene, label, length_words
+from spirillum.view.figures.scene import FAINT, INK, PHASE, Scene, label, length_words
 from spirillum.view.figures.solids import Metal, draw_solid, draw_wire
-from spirillum.view.figures.style import COLOURS, new_figure, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, new_figure, plain, styled
 
 __all__ = ["robot_figure", "robot_words"]
 
@@ -62,8 +62,8 @@ def robot_figure(robot: Robot) -> Figure:
     """
     with styled():
         scene = Scene.of(robot)
-        height = WIDTH * (scene.top - scene.bottom) / (scene.right - scene.left)
-        figure = new_figure(WIDTH, height)
+        height = PAGE * (scene.top - scene.bottom) / (scene.right - scene.left)
+        figure = new_figure(PAGE, height)
         axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         axes.set_xlim(scene.left, scene.right)
         axes.set_ylim(scene.bottom, scene.top)
@@ -127,7 +127,7 @@ def _turning(axes: Axes, s: Scene, x: float, reach: float, sense: float, text: s
                 end,
                 connectionstyle=curve,
                 arrowstyle="-|>",
-                mutation_scale=11,
+                mutation_scale=8,
                 linewidth=width,
                 color=colour,
                 zorder=order,
@@ -145,14 +145,14 @@ def _draw_motion(axes: Axes, s: Scene) -> None:
             (start, 0.0),
             (end, 0.0),
             arrowstyle="simple,head_length=0.55,head_width=0.6,tail_width=0.22",
-            mutation_scale=26,
+            mutation_scale=18,
             facecolor=COLOURS["blue"],
             edgecolor="white",
             linewidth=0.8,
             zorder=12,
         )
     )
-    label(axes, 0.5 * (start + end), 0.045 * s.total, "$U_x$", color=COLOURS["blue"], size=12)
+    label(axes, 0.5 * (start + end), 0.045 * s.total, "$U_x$", color=COLOURS["blue"], size=9)
     turn = s.robot.hand * sense
     radius = 0.5 * s.robot.body.diameter / s.scale.factor
     if not s.stubby:
@@ -167,7 +167,7 @@ def _draw_frame(axes: Axes, s: Scene) -> None:
         s.top - 0.012 * s.total,
         plain(s.robot.name, 60),
         va="top",
-        size=12,
+        size=9,
         weight="bold",
         color=INK,
     )
@@ -177,14 +177,14 @@ def _draw_frame(axes: Axes, s: Scene) -> None:
         "computed geometry, to scale",
         va="top",
         ha="right",
-        size=10,
+        size=7.5,
         color=FAINT,
     )
     _compass(axes, s)
     length, text = _round_length(0.16 * s.total * s.scale.factor)
     end = s.right - 0.02 * s.total
     start, z = end - length / s.scale.factor, s.bottom + 0.030 * s.total
-    axes.plot([start, end], [z, z], color=INK, linewidth=2.6, solid_capstyle="butt", zorder=12)
+    axes.plot([start, end], [z, z], color=INK, linewidth=2.0, solid_capstyle="butt", zorder=12)
     label(axes, 0.5 * (start + end), z + 0.022 * s.total, text)
 
 
@@ -203,7 +203,7 @@ def _compass(axes: Axes, s: Scene) -> None:
                 (x, z),
                 (x + dx, z + dz),
                 arrowstyle="-|>",
-                mutation_scale=8,
+                mutation_scale=6,
                 linewidth=0.9,
                 color=INK,
                 shrinkA=0,

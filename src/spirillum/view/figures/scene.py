@@ -13,12 +13,10 @@ from matplotlib.patheffects import withStroke
 from spirillum.arrays import Values
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.solids import crests
-from spirillum.view.figures.style import Scale
+from spirillum.view.figures.style import PAGE, Scale
 
-__all__ = ["FAINT", "HALO", "INK", "PHASE", "WIDTH", "Scene", "dimension_line", "label", "length_words", "thin_line"]
+__all__ = ["FAINT", "HALO", "INK", "PHASE", "Scene", "dimension_line", "label", "length_words", "thin_line"]
 
-WIDTH = 10.0
-"""Width of the picture, inches."""
 PHASE = 0.35 * np.pi
 """Phase of the tail in the picture, rad."""
 INK = "#1d2b33"
@@ -86,12 +84,12 @@ class Scene:
     @property
     def left(self) -> float:
         """Left edge of the picture."""
-        return self.tip - 0.185 * self.total - self._slack
+        return self.tip - 0.215 * self.total - self._slack
 
     @property
     def right(self) -> float:
         """Right edge of the picture."""
-        return self.nose + 0.265 * self.total + self._slack
+        return self.nose + 0.31 * self.total + self._slack
 
     @property
     def top(self) -> float:
@@ -138,7 +136,7 @@ class Scene:
     @property
     def points(self) -> float:
         """Typographic points in one drawing unit."""
-        return 72.0 * WIDTH / (self.right - self.left)
+        return 72.0 * PAGE / (self.right - self.left)
 
     def words(self, symbol: str, value: float) -> str:
         """``symbol = value unit`` of an SI length."""
@@ -150,7 +148,7 @@ def dimension_line(axes: Axes, start: tuple[float, float], end: tuple[float, flo
     """A dimension line with an arrowhead at both ends."""
     axes.add_patch(
         FancyArrowPatch(
-            start, end, arrowstyle="<|-|>", mutation_scale=7, linewidth=0.8, color=INK, shrinkA=0, shrinkB=0, zorder=12
+            start, end, arrowstyle="<|-|>", mutation_scale=5, linewidth=0.8, color=INK, shrinkA=0, shrinkB=0, zorder=12
         )
     )
 
@@ -162,7 +160,7 @@ def thin_line(axes: Axes, xs: tuple[float, float], zs: tuple[float, float]) -> N
 
 def label(axes: Axes, x: float, z: float, text: str, **more: str | float) -> None:
     """Text that stays readable on any ground."""
-    options: dict[str, str | float] = {"ha": "center", "va": "center", "size": 10, "color": INK, **more}
+    options: dict[str, str | float] = {"ha": "center", "va": "center", "size": 8, "color": INK, **more}
     axes.text(x, z, text, zorder=13, path_effects=[HALO], **options)  # type: ignore[arg-type]
 
 

@@ -11,8 +11,8 @@ from matplotlib.lines import Line2D
 
 from spirillum.dynamics.settling import Settling
 from spirillum.units import Hz
-from spirillum.view.figures.sheet import PAGE, Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
 
 __all__ = ["settling_figure"]
 

@@ -12,12 +12,9 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from spirillum.view.figures.style import DPI, lay_out, new_figure
+from spirillum.view.figures.style import DPI, PAGE, lay_out, new_figure
 
-__all__ = ["COLUMN", "PAGE", "Sheet", "add_letters", "width_of"]
-
-COLUMN, PAGE = 3.35, 6.7
-"""Width of a column and of a page of a journal, inches: 85 and 170 mm."""
+__all__ = ["Sheet", "add_letters", "width_of"]
 
 _NARROWEST = 5.2
 _MARGINS, _GAP = 0.94, 0.14
@@ -27,8 +24,8 @@ _EDGE = 0.012
 
 
 def width_of(columns: int, panel: float) -> float:
-    """Width of a sheet whose `columns` panels are about `panel` inches wide."""
-    return max(_MARGINS + columns * panel + (columns - 1) * _GAP, _NARROWEST)
+    """Width of a sheet whose `columns` panels are about `panel` inches wide, and no wider than a page."""
+    return min(max(_MARGINS + columns * panel + (columns - 1) * _GAP, _NARROWEST), PAGE)
 
 
 def add_letters(panels: Iterable[Axes]) -> None:
@@ -165,6 +162,6 @@ def _add_legend(
         legend = figure.legend(
             handles=by_rows, loc=place, ncols=columns, columnspacing=1.3, handletextpad=0.5, handlelength=2.6
         )
-        if columns == 1 or legend.get_window_extent().width <= figure.bbox.width:
+        if columns == 1 or legend.get_window_extent().width <= (1.0 - 6.0 * _EDGE) * figure.bbox.width:
             return
         legend.remove()

@@ -26,7 +26,7 @@ __all__ = ["study_figures"]
 
 PANEL = (1.72, 1.5)
 """Width and height of a panel of a grid of tails, inches."""
-MOST_COLUMNS = 6
+MOST_COLUMNS = 5
 """Wavelengths of one figure."""
 MOST_FIGURES = 4
 """Figures of the channels of one study."""
@@ -168,7 +168,7 @@ def _draw_channel(
             axes.tick_params(labelbottom=labelled)
             if labelled:
                 rate = row.across == "rates"
-                axes.set_xlabel("assumed $\\omega_m$ (Hz)" if rate else f"wave amplitude $B_o$ ({scale.unit})")
+                axes.set_xlabel("assumed $\\omega_m$ (Hz)" if rate else f"amplitude $B_o$ ({scale.unit})")
             if number == 0:
                 head_column(axes, shown, wavelength)
         _finish_row(sheet.panels[number], row)
@@ -266,7 +266,7 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
             last = number == len(channels) - 1
             axes.tick_params(labelbottom=last)
             if last:
-                axes.set_xlabel(f"wave amplitude $B_o$ ({scale.unit})")
+                axes.set_xlabel(f"amplitude $B_o$ ({scale.unit})")
             if number == 0:
                 head_column(axes, shown, wavelength)
             speed = shown.paper_speed(channel)

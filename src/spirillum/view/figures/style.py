@@ -24,7 +24,9 @@ from spirillum.units import for_people, shown_in
 
 __all__ = [
     "COLOURS",
+    "COLUMN",
     "DPI",
+    "PAGE",
     "PATCH",
     "Look",
     "Scale",
@@ -78,6 +80,8 @@ _STYLE: Any = {  # Any: the type of the keys differs between versions of matplot
     "svg.fonttype": "path",
     "svg.hashsalt": "spirillum",
 }
+COLUMN, PAGE = 3.35, 6.69
+"""Width of a column and of a page of a journal, inches: 85 and 170 mm. No figure is wider."""
 _OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")
 """Settings that say where a session shows its own figures, not how ours look."""
 PATCH: Any = {"linewidth": 7, "solid_capstyle": "butt"}

@@ -25,15 +25,15 @@ from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.cross_section import draw_cross_section
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, Scale, plain, styled
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["COLUMNS", "check_column", "trajectory_figure"]
 
-COLUMNS = {"single": 3.5, "double": 7.16}
-"""Widths of a figure that fills one or both columns of a page, inches (those of the IEEE)."""
+COLUMNS = {"single": COLUMN, "double": PAGE}
+"""Widths of a figure that fills one or both columns of a page, inches."""
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
 _MOST_EVENTS = 12
