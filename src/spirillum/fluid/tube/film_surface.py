@@ -108,28 +108,29 @@ class _Stretched(NamedTuple):
     slope: Samples
 
 
-def _stretched(unit: Samples, low: float, high: float, marks: tuple[tuple[float, float], ...]) -> _Stretched:
-    """Coordinate from `low` to `high` whose nodes gather at marks (where, over which length)."""
+def _gathered(unit: Samples, low: float, high: float, where: float, scale: float) -> _Stretched:
+    """Coordinate from `low` to `high` whose nodes gather at `where` over the length `scale`: it runs as sinh does."""
+    first, last = np.arcsinh((np.array([low, high]) - where) / scale)
+    rate = 0.5 * (last - first)
+    at = first + rate * (1.0 + unit)
+    return _Stretched(where + scale * np.sinh(at), rate * scale * np.cosh(at))
 
-    def progress(s: Samples) -> Samples:
-        return np.asarray(sum(np.arcsinh((s - where) / scale) for where, scale in marks))
 
-    def rate(s: Samples) -> Samples:
-        return np.asarray(sum(1.0 / np.hypot(s - where, scale) for where, scale in marks))
+def _gathered_twice(unit: Samples, marks: tuple[tuple[float, float], tuple[float, float]]) -> _Stretched:
+    """Coordinate whose nodes gather at both of its ends; `marks` are (where, over which length).
 
-    first, last = progress(np.array([low, high]))
-    wanted = first + 0.5 * (last - first) * (1.0 + unit)
-    below, above = np.full_like(unit, low), np.full_like(unit, high)
-    s = 0.5 * (below + above)
-    for _ in range(100):
-        error = progress(s) - wanted
-        below, above = np.where(error < 0, s, below), np.where(error > 0, s, above)
-        step = s - error / rate(s)
-        step = np.where((step > below) & (step < above), step, 0.5 * (below + above))
-        if np.max(np.abs(step - s)) < 1e-13 * (high - low):
-            break
-        s = step
-    return _Stretched(s, 0.5 * (last - first) / rate(s))
+    With a and b the distances from the marks over their lengths, asinh a + asinh b = y is a^2 + b^2 + 2 a b cosh y =
+    sinh(y)^2, a quadratic equation for the coordinate.
+    """
+    (low, c), (high, d) = marks
+    first, last = np.arcsinh((high - low) / d), np.arcsinh((high - low) / c)
+    rate = 0.5 * (last + first)
+    y = -first + rate * (1.0 + unit)
+    mixed = np.cosh(y) / (c * d)
+    square = 1.0 / c**2 + 1.0 / d**2 + 2.0 * mixed
+    middle = (low / c**2 + high / d**2 + mixed * (low + high)) / square
+    s = middle + np.sinh(y) * np.sqrt((1.0 + ((high - low) / (c * d)) ** 2 / square) / square)
+    return _Stretched(s, rate / (1.0 / np.hypot(s - low, c) + 1.0 / np.hypot(s - high, d)))
 
 
 @dataclass(frozen=True)
@@ -210,20 +211,19 @@ def _with_side(place: Place, cuts: Cuts) -> Surface:
         raise InputError(TOUCHES)
     thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
     width = float(np.sqrt(2.0 * thinnest * reduced) / a)
-    around = _stretched(cuts.around, -_HALF, _HALF, ((0.0, width),))
-    marks = tuple(
+    around = _gathered(cuts.around, -_HALF, _HALF, 0.0, width)
+    rear, front = (
         (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(lift) / gap)))
         for (x, _), gap in zip(shoulders, gaps, strict=True)
     )
-    x = _stretched(cuts.side, body.rear[0], body.front[0], marks)
+    x = _gathered_twice(cuts.side, (rear, front))
     zero, one = np.zeros_like(cuts.side), np.ones_like(cuts.side)
     parts = [_revolved(place, around, x.slope / cuts.sides, (x.at, a * one), (one, zero), (zero, one), (zero, zero))]
     for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
         if f == 0:
             continue
         low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
-        mark = (-float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
-        angle = _stretched(cuts.rounded, low, high, (mark,))
+        angle = _gathered(cuts.rounded, low, high, -float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
         sin, cos = np.sin(angle.at), np.cos(angle.at)
         outline = (joint + f * sin, a - f + f * cos)
         end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos), (cos, -sin))
@@ -300,7 +300,7 @@ def _spheroid(place: Place, cuts: Cuts) -> Surface:
         raise InputError(TOUCHES)
     bends = [(h[0, 1] + h[2, 1] - 2 * h[1, 1]) / step**2, (h[1, 0] + h[1, 2] - 2 * h[1, 1]) / step**2]
     beta, theta = (
-        _stretched(unit, -PATCH, PATCH, ((0.0, float(np.sqrt(2.0 * h[1, 1] / (max(bend, 0.0) + h[1, 1])))),))
+        _gathered(unit, -PATCH, PATCH, 0.0, float(np.sqrt(2.0 * h[1, 1] / (max(bend, 0.0) + h[1, 1]))))
         for unit, bend in zip((cuts.patch, cuts.around), bends, strict=True)
     )
     surface = patch(beta.at, theta.at)
