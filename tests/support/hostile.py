@@ -168,6 +168,24 @@ def _robot(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
     return Case("", {"x.toml": bent_text(rng, whole["robot.toml"].decode())}, list(_one(rng, commands)))
 
 
+def _robot_elsewhere(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
+    """A robot for commands that do not predict."""
+    name = str(_one(rng, ("robot.toml", "magnet.toml")))
+    commands = (
+        ["robot", "show", "x.toml"],
+        ["resistance", "x.toml", "--part", "rotor"],
+        ["export", "x.toml", "x.urdf"],
+        ["export", "x.toml", "x.stl"],
+        ["magnetic-sweep", "x.toml", "-o", "sweep.nc", "--rate", "1Hz", "--turns", "4"],
+    )
+    return Case("", {"x.toml": bent_text(rng, whole[name].decode())}, list(_one(rng, commands)))
+
+
+def _film_of_a_setup(rng: np.random.Generator, whole: dict[str, bytes]) -> Case:
+    files = {"s.toml": bent_text(rng, SETUP), "a.mp4": bent_bytes(rng, whole["film.mp4"])}
+    return Case("", files, ["setup", "check", "s.toml", "a.mp4"])
+
+
 def _study(rng: np.random.Generator, _whole: dict[str, bytes]) -> Case:
     text = STUDY if rng.integers(2) else STUDY.replace(WIDE, "r.toml")
     return Case("", {"s.toml": bent_text(rng, text), "r.toml": b'extends = "..'}, ["study", "s.toml", "-o", "out"])
@@ -351,6 +369,8 @@ def _one(rng: np.random.Generator, items: Any) -> Any:
 _Maker = Callable[[np.random.Generator, dict[str, bytes]], Case]
 _MAKERS: list[tuple[int, _Maker]] = [
     (6, _robot),
+    (2, _robot_elsewhere),
+    (1, _film_of_a_setup),
     (3, _study),
     (3, _calibration),
     (4, _observations),
@@ -418,7 +438,7 @@ def whole_files(folder: Path) -> dict[str, bytes]:
     }
     from spirillum.robot.load import preset_text
 
-    return found | {"robot.toml": preset_text(WIDE).encode()}
+    return found | {"robot.toml": preset_text(WIDE).encode(), "magnet.toml": preset_text("magnetic-helix").encode()}
 
 
 def check(case: Case, folder: Path) -> None:
