@@ -2,7 +2,11 @@
 
 import asyncio
 import json
+import os
 import signal
+import subprocess
+import sys
+import time
 from contextlib import AsyncExitStack
 from http.client import HTTPConnection
 from typing import Any
@@ -19,6 +23,7 @@ from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages import server
 from spirillum.pages.bench import Bench
 from spirillum.pages.guard import HEADERS, LARGEST_MESSAGE, Guard, MessageRate
+from spirillum.pages.job import Job
 from spirillum.pages.knobs import Settings
 from spirillum.pages.study_picture import StudyPicture
 from spirillum.pages.uploads import TooLargeError, Uploads
@@ -205,23 +210,62 @@ def test_what_is_too_large_gets_a_sentence(served: Any, cookie: str) -> None:
     assert (found.status, found.content) == (413, b"1048577 bytes are too much; allowed: 1048576 bytes")
 
 
+def _request(size: int) -> Request:
+    """A request that states a size."""
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": b"all"}
+
+    return Request({"type": "http", "headers": [(b"content-length", b"%d" % size)]}, receive)
+
+
 def test_all_that_is_sent_at_once_has_one_budget() -> None:
-    def request(size: int) -> Request:
-        async def receive() -> Any:
-            return {"type": "http.request", "body": b"all"}
-
-        return Request({"type": "http", "headers": [(b"content-length", b"%d" % size)]}, receive)
-
     async def at_once(*sizes: int) -> None:
         async with AsyncExitStack() as stack:
             for size in sizes:
-                assert await stack.enter_async_context(uploads.received(request(size), 100 << 20)) == b"all"
+                assert await stack.enter_async_context(uploads.received(_request(size), 100 << 20)) == b"all"
 
     uploads = Uploads()
     for sizes in ((100 << 20, 100 << 20), (64 << 20, 64 << 20, 1), (*[1 << 20] * 128, 1)):
         with pytest.raises(TooLargeError, match="at once; allowed: 128 MB in all"):
             asyncio.run(at_once(*sizes))
         asyncio.run(at_once(*sizes[:-1]))  # what has been read makes room
+
+
+def test_files_are_read_one_at_a_time() -> None:
+    inside, most = 0, 0
+
+    def read(content: bytes) -> int:
+        nonlocal inside, most
+        inside += 1
+        most = max(most, inside)
+        time.sleep(0.01)
+        inside -= 1
+        return len(content)
+
+    async def all_of_them() -> list[Any]:
+        handler = server._sent(read, 10, Uploads())
+        return await asyncio.gather(*[handler(_request(3)) for _ in range(5)])
+
+    assert [found.body for found in asyncio.run(all_of_them())] == [b"3"] * 5
+    assert most == 1
+
+
+def test_interrupt_of_the_terminal_is_for_the_page_and_not_for_what_it_started() -> None:
+    job = Job("spirillum.pages.preparing", {})
+    assert os.getsid(job._process.pid) == job._process.pid
+    job.stop()
+    job._thread.join()
+
+
+def test_work_ends_without_a_word_where_its_page_was_killed() -> None:
+    script = "from spirillum.pages.job import worker; worker(lambda request, tell: tell('a table', 0, 1) or {})"
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer) as nobody:
+        command = [sys.executable, "-c", script]
+        found = subprocess.run(command, input=b"{}", stdout=nobody, stderr=subprocess.PIPE, check=False)
+    assert (found.returncode, found.stderr) == (1, b"")
 
 
 @pytest.mark.parametrize(

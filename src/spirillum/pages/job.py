@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -32,7 +33,11 @@ class Job:
         self._tell = tell
         self._said: dict[str, Any] = {"what": "starting", "done_places": 0, "places": 0}
         self._process = subprocess.Popen(  # noqa: S603 - our own module, nothing from outside in the arguments
-            [sys.executable, "-m", module], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [sys.executable, "-m", module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C in the terminal is for the page, which stops it
         )
         self._thread = threading.Thread(target=self._follow, args=(json.dumps(request),), name="page: job", daemon=True)
         self._thread.start()
@@ -55,9 +60,10 @@ class Job:
         with suppress(BrokenPipeError):
             self._process.stdin.write(request)
             self._process.stdin.close()
-        for line in self._process.stdout:
-            self._said = json.loads(line)
-            self._tell()
+        with self._process.stdout as told:
+            for line in told:
+                self._said = json.loads(line)
+                self._tell()
         if self._process.wait() != 0 and "failed" not in self._said:
             self._said = {"failed": "it was left off"}
         self._tell()
@@ -71,8 +77,12 @@ def worker(work: Callable[[dict[str, Any], Callable[[str, int, int], None]], Map
     """
 
     def tell(**said: Any) -> None:
-        sys.stdout.write(json.dumps(said) + "\n")
-        sys.stdout.flush()
+        try:
+            sys.stdout.write(json.dumps(said) + "\n")
+            sys.stdout.flush()
+        except BrokenPipeError:  # the page was killed; what is not said yet goes nowhere
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(1)
 
     def progress(what: str, done: int, total: int) -> None:
         tell(what=what, done_places=done, places=total)
