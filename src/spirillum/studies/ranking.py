@@ -72,12 +72,12 @@ class RankedRobot(NamedTuple):
 
     name: str
     """Its name, or its channel and tail."""
+    place: int
+    """Its place in the flat order of the study."""
     values: Mapping[str, float]
     low: Mapping[str, float]
     """Least values of bands or lower limits of intervals; NaN without one."""
     high: Mapping[str, float]
-    place: int
-    """Its place in the flat order of the study."""
 
     def to_dict(self) -> dict[str, Any]:
         """As it stands in JSON."""
@@ -213,7 +213,7 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     order = order[np.isfinite(values["forward_velocity"][order])]
     ranked = {
         int(index): RankedRobot(
-            names[index], *({name: float(of[name][index]) for name in known} for of in (values, low, high)), int(index)
+            names[index], int(index), *({name: float(of[name][index]) for name in known} for of in (values, low, high))
         )
         for index in order
     }
