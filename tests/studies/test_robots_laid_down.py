@@ -16,7 +16,9 @@ from spirillum.studies.laid_down import (
     levels_of_readings,
     without_answer,
 )
+from spirillum.studies.ranking import ranking_of
 from spirillum.studies.spec import LaidDown
+from spirillum.view.figures.laid_down import laid_down_picture
 
 SHORT = {
     "models": ["sbt", "rft"],
@@ -68,6 +70,19 @@ def test_a_reading_is_that_of_the_run_itself(short) -> None:
     assert motor.torque_constant * float(there["motor_current_at_run"]) - load == pytest.approx(
         friction * (tail - body), rel=1e-2
     )
+
+
+def test_the_report_draws_every_reading_over_its_median(short) -> None:
+    picture = laid_down_picture(short, ranking_of(short))
+    assert picture is not None
+    axes = picture.figure().axes[0]
+    rates = np.abs(
+        short["body_rotation_rate_at_run"].isel(amplitude=0, wavelength=0).sel(channel="wide").values.ravel()
+    )
+    row = [label.get_text() for label in axes.get_yticklabels()].index("body rate")
+    drawn = [x for line in axes.get_lines() for x, y in line.get_xydata() if abs(y - row) < 0.5]
+    assert sorted(drawn) == pytest.approx(sorted(rates / np.median(rates)), rel=1e-12)
+    assert laid_down_picture(short.drop_vars("forward_velocity_at_run"), ranking_of(short)) is None
 
 
 def test_the_factor_on_the_drag_gives_the_speed_back(short) -> None:

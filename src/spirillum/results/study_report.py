@@ -17,6 +17,7 @@ from spirillum.results.page import draw_pictures, page
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_robot import robot_picture
 from spirillum.studies.ranking import StudyRanking, ranking_of
+from spirillum.view.figures.laid_down import laid_down_picture
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.ranking import ranking_picture
 
@@ -67,7 +68,9 @@ def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
     ranking = ranking_of(dataset)
     robot = robot_picture(dataset, ranking)
     first = {"ranking": ranking_picture(ranking)} if ranking.robots else {}
-    return {**first, **({"robot": robot} if robot else {}), **figures_of(dataset)}
+    laid_down = laid_down_picture(dataset, ranking)
+    drawn = {"robot": robot, "laid-down": laid_down}
+    return {**first, **{name: picture for name, picture in drawn.items() if picture}, **figures_of(dataset)}
 
 
 def _ranking_rows(ranking: StudyRanking) -> str:

@@ -1,0 +1,113 @@
+"""What the conditions of a run change: the readings of robots that were laid down and let go."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
+
+from spirillum.arrays import Values
+from spirillum.quantities import unit_of
+from spirillum.studies.ranking import StudyRanking
+from spirillum.view.figures.picture import Picture
+from spirillum.view.figures.sheet import Sheet, add_letters
+from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["laid_down_picture"]
+
+_SHOWN = {
+    "forward_velocity": "speed",
+    "tail_rotation_rate": "tail rate",
+    "body_rotation_rate": "body rate",
+    "effective_friction": "inferred $B_{eff}$",
+}
+_KINDS = (("on the film alone", "blue", "o"), ("touching the wall", "vermillion", "s"))
+_MOST = 4
+"""Robots of the figure."""
+
+
+def laid_down_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
+    """Every reading of every run over the median of its robot; None where no robot was laid down.
+
+    Args:
+        dataset: what `spirillum.study` returns.
+        ranking: of its robots.
+    """
+    if "forward_velocity_at_run" not in dataset:
+        return None
+    there = _readings(dataset, "forward_velocity")
+    robots = {robot.name: robot.place for robot in ranking.robots if np.isfinite(there[robot.place]).any()}
+    if not robots:
+        return None
+    shown = dict(list(robots.items())[:_MOST])
+    title = "What the conditions of a run change"
+    caption = (
+        "Size of each reading of runs that differ in gap, pitch, wait, roughness and dry friction, over the median of "
+        f"its robot; $B_{{eff}}$ as model {dataset['inferred_by'].values[0]} infers it. Computed: nothing is measured."
+    )
+    if len(robots) > len(shown):
+        caption += f" Shown: the {len(shown)} fastest of {len(robots)} robots."
+    alternative = f"{len(shown)} panels with readings of {', '.join(_SHOWN.values())} on a logarithmic axis. {caption}"
+    return Picture.of(title, caption, alternative, partial(_drawn, dataset, shown, title, caption))
+
+
+def _readings(dataset: xr.Dataset, name: str) -> Values:
+    """Sizes of the readings, (robots in the flat order of the study, readings)."""
+    values = dataset[f"{name}_at_run"]
+    if "inferred_by" in values.dims:
+        values = values.isel(inferred_by=0)
+    robots = [dim for dim in ("robot", "channel", "wavelength", "amplitude") if dim in values.dims]
+    found: Values = np.abs(values.transpose(*robots, "run", "window").values.astype(float))
+    return found.reshape(-1, values.sizes["run"] * values.sizes["window"])
+
+
+def _drawn(dataset: xr.Dataset, robots: dict[str, int], title: str, caption: str) -> Figure:
+    legend = [
+        Line2D([], [], color=COLOURS[colour], marker=marker, linestyle="none", markerfacecolor="none", label=label)
+        for label, colour, marker in _KINDS
+    ]
+    heights = [0.28 * len(_SHOWN)] * len(robots)
+    sheet = Sheet(title, caption, width=PAGE, heights=heights, columns=1, legend=legend, sharex="all", sharey=False)
+    panels = sheet.panels[:, 0]
+    touching = _readings(dataset, "contact_share") > 0
+    for axes, (robot, place) in zip(panels, robots.items(), strict=True):
+        for row, name in enumerate(_SHOWN):
+            _draw_row(axes, row, _readings(dataset, name)[place], touching[place], unit_of(name))
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.set_yticks(range(len(_SHOWN)), list(_SHOWN.values()))
+        axes.set_ylim(len(_SHOWN) - 0.4, -0.6)
+        axes.set_title(plain(robot, 60), loc="center", pad=3)
+    panels[-1].set_xlabel("size over the robot's median")
+    add_letters(panels)
+    return sheet.finished()
+
+
+def _draw_row(axes: Axes, row: int, values: Values, touching: np.ndarray, unit: str) -> None:
+    """Readings of one quantity, and their range in its unit at the right."""
+    known = np.isfinite(values) & (values > 0)
+    if not known.any():
+        return
+    middle = float(np.median(values[known]))
+    for (_, colour, marker), chosen, above in zip(
+        _KINDS, (known & ~touching, known & touching), (-0.13, 0.13), strict=True
+    ):
+        places = np.full(int(chosen.sum()), row + above)
+        axes.plot(
+            values[chosen] / middle, places, marker, color=COLOURS[colour], markerfacecolor="none", markersize=3.5
+        )
+    scale = Scale.of(values[known], unit)
+    low, high = (end / scale.factor for end in (values[known].min(), values[known].max()))
+    axes.text(
+        1.01, row, f"{low:.3g} to {high:.3g} {scale.unit}", transform=axes.get_yaxis_transform(), va="center", size=8
+    )
