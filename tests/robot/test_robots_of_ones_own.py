@@ -10,6 +10,17 @@ from spirillum.robot.batch import RobotBatch
 BASE = 'extends = "biorob2012-wide"\nname = "base"\n[body]\ndiameter = "16 mm"\nmass = "9 g"\n'
 
 
+def test_a_changed_robot_does_not_describe_itself_as_its_preset() -> None:
+    changed = sp.load({"extends": "biorob2012-wide", "channel": {"diameter": "30 mm"}})
+    assert changed.description == "biorob2012-wide with other channel.diameter"
+    assert sp.load({"extends": "biorob2012-wide", "name": "same"}).description == sp.load("biorob2012-wide").description
+    assert (
+        sp.load({"extends": "biorob2012-wide", "channel": "none"}).description == "biorob2012-wide with other channel"
+    )
+    own = sp.load({"extends": "biorob2012-wide", "description": "mine", "channel": {"diameter": "30 mm"}})
+    assert own.description == "mine"
+
+
 def test_a_file_extends_a_file_beside_it(tmp_path: Path) -> None:
     (tmp_path / "base.toml").write_text(BASE, encoding="utf-8")
     (tmp_path / "mine").mkdir()

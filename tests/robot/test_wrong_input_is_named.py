@@ -74,6 +74,7 @@ FIELDS: list[tuple[dict[str, Any], str, str]] = [
     ({"channel": 40}, "channel = 40", "'none', or a [channel] table"),
     # keys and tables
     ({"tail.wavelenght": "25 mm"}, "tail.wavelenght is not a known field", "(did you mean wavelength?)"),
+    ({"tail.turns": 3}, "tail.turns is not a known field", "tail.length over tail.wavelength is the number of turns"),
     ({"tial.wavelength": "25 mm"}, "tial is not a known field", "(did you mean tail?)"),
     ({"motor.resistance.constnat": "1 ohm"}, "motor.resistance.constnat", "(did you mean constant?)"),
     ({"channel.diametre": "30 mm"}, "diametre", "(did you mean diameter?)"),

@@ -19,6 +19,11 @@ def _number(value: float) -> str:
     return text if "." in text or "e" in text else f"{text}.0"
 
 
+def _length(value: float) -> str:
+    """A length in TOML: millimetres, without the rounding of the last digit."""
+    return f'"{1e3 * value:.15g} mm"'
+
+
 def _words(item: Estimate) -> str:
     ends = f" ({item.low:.5g} to {item.high:.5g})" if math.isfinite(item.low) else ""
     return f"{item.value:.5g}{ends}"
@@ -106,7 +111,7 @@ def _factor_tables(found: Calibrated) -> list[str]:
             "body_diameter": robot.body.diameter,
             "body_length": robot.body.length,
         }
-        lines += [f'{name} = "{_number(value)} m"' for name, value in sizes.items()]
+        lines += [f"{name} = {_length(value)}" for name, value in sizes.items()]
     return lines
 
 
@@ -132,7 +137,7 @@ def _placement_tables(found: Calibrated) -> list[str]:
             if item.parameter.name in _PLACE and item.channel in (None, place)
         }
         if own:
-            lines += ["", "[[placement]]", f'channel_diameter = "{_number(diameter)} m"', "", "[placement.placement]"]
+            lines += ["", "[[placement]]", f"channel_diameter = {_length(diameter)}", "", "[placement.placement]"]
             if "gap" in own:
                 lines.append(f'gap = "{_number(own["gap"])} m"')
             lines.append(f'pitch = "{_number(own.get("pitch", 0.0))} rad"')  # else it was fitted level
@@ -162,7 +167,7 @@ def _friction_tables(found: Calibrated) -> list[str]:
             "wavelength": robot.tail.wavelength,
             "amplitude": robot.tail.amplitude,
         }
-        lines += ["", "[[friction]]", *(f'{name} = "{_number(value)} m"' for name, value in sizes.items())]
+        lines += ["", "[[friction]]", *(f"{name} = {_length(value)}" for name, value in sizes.items())]
         effective = max(item.value, 0.0)
         lines.append(f'effective = "{_number(effective)} N m s/rad"' + _comment(item))
     return lines

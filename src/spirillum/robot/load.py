@@ -37,6 +37,7 @@ _WEIGHED = {
 # What belongs to a body of that size: a preset's value does not fit a robot that is scaled.
 _SIZED = {"magnetic.moment": "the magnet's", "drive.torque": "the motor's"}
 _SIZE = ("body.diameter", "body.length")
+_WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
 _MOST_LAYERS = 8
 """Robot files that lie over each other."""
@@ -202,19 +203,26 @@ def _extended(
         hint = did_you_mean(str(base), preset_names())
         allowed = f"{', '.join(preset_names())}, or a robot file (.toml) beside this one"
         raise InputError(f"{source}: extends = {str(base)[:60]!r}{hint}; allowed: {allowed}")
+    changed = _touched(table)
     if not own:
-        changed = _touched(table)
         below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
-        return _merged(below, table), [*layers, changed]
+        return _merged(_described(below, base, table), table), [*layers, changed]
     path = folder / base
     if len(above) >= _MOST_LAYERS or _resolved(path, source) in above:
         raise InputError(
             f"{source}: extends = {base[:60]!r} leads back to itself or through more than {_MOST_LAYERS} files; "
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
-    changed = _touched(table)
     below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, _resolved(path, source)))
-    return _merged(below, table), [*layers, changed]
+    return _merged(_described(below, base, table), table), [*layers, changed]
+
+
+def _described(below: dict[str, Any], base: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables below, with a description that holds for a robot with other values; its own goes on top."""
+    changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
+    if not changed:
+        return below
+    return {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
 
 
 def _resolved(path: Path, source: str) -> Path:

@@ -12,6 +12,13 @@ from spirillum.errors import InputError, clipped, did_you_mean
 
 __all__ = ["problems_in"]
 
+_OTHERWISE = {
+    "tail.turns": "tail.length over tail.wavelength is the number of turns",
+    "tail.pitch": "tail.wavelength is the pitch of the helix, a length",
+    "tail.radius": "tail.amplitude is the radius of the helix's centreline",
+    "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
+}
+"""What gives a field that a robot file has not, though the field's words know it."""
 _LONGEST_FIELD = 200
 """Characters of a field's name in a sentence, so that what is allowed has room."""
 _M = TypeVar("_M", bound=BaseModel)
@@ -56,7 +63,7 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
         ]
     if kind == "extra_forbidden":
         allowed = list(_fields_at(model, names[:-1]))
-        hint = did_you_mean(names[-1][:60], allowed)
+        hint = f": {_OTHERWISE[field]}" if field in _OTHERWISE else did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
     shown, words = clipped(problem.get("input")), _allowed(problem, field)
     hint = ""
