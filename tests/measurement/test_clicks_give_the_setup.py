@@ -79,6 +79,12 @@ def test_stripes_keep_their_order_when_the_picture_is_turned(direction: str, tur
     assert across(points[::-1], direction) == points
 
 
+@pytest.mark.parametrize("direction", ["east", "", ["right"]])
+def test_stripes_of_a_robot_that_points_nowhere_get_a_sentence(direction: str) -> None:
+    with pytest.raises(InputError, match=r"robot\.direction = .*; allowed: right, left, up, down"):
+        across([(50.0, 10.0)], direction)
+
+
 @pytest.mark.parametrize("lamp", [0.6, 1.0])
 def test_colours_are_named_under_a_dim_lamp(lamp: float) -> None:
     names = ["red", "yellow", "green", "blue"]

@@ -107,10 +107,12 @@ def test_a_film_cut_off_in_the_middle_is_kept_as_far_as_it_goes(tmp_path):
 
 
 def bad_files(folder: Path) -> dict[str, Path]:
-    made = {name: folder / f"{name}.mp4" for name in ("missing", "empty", "text", "cut", "sound", "tiny")}
+    made = {name: folder / f"{name}.mp4" for name in ("missing", "empty", "text", "cut", "unknown", "sound", "tiny")}
     made["empty"].write_bytes(b"")
     made["text"].write_text("frame by frame\n" * 100)
-    made["cut"].write_bytes(film(folder / "whole.mp4", list(range(0, 600, 20))).read_bytes()[:700])
+    whole = film(folder / "whole.mp4", list(range(0, 600, 20))).read_bytes()
+    made["cut"].write_bytes(whole[:700])
+    made["unknown"].write_bytes(whole.replace(b"avc1", b"none"))
     with wave.open(str(folder / "sound.wav"), "wb") as sound:
         sound.setparams((1, 2, 8000, 0, "NONE", ""))
         sound.writeframes(b"\0\0" * 800)
@@ -127,6 +129,7 @@ def test_what_is_no_video_gets_one_sentence(tmp_path):
         "empty": "is empty",
         "text": "cannot be read as a film",
         "cut": "cannot be read as a film",
+        "unknown": "cannot be decoded",
         "sound": "has no pictures",
         "tiny": "16 x 16 pixels",
         "folder": "holds no images",

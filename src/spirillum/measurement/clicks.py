@@ -8,7 +8,7 @@ from typing import get_args
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.measurement.depth import apparent_distance
 from spirillum.robot.parts import StripeColour
 from spirillum.vision.camera.ruler import Lines
@@ -24,6 +24,9 @@ _SHORTEST = 20.0
 """Shortest distance of two clicks that give a length per pixel, pixels."""
 _AROUND = 2
 """Pixels on each side of a click over which a colour is averaged."""
+
+_RIGHT = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}
+"""Where, in (u, v), the right-hand side of a robot lies whose nose points there."""
 
 
 def spacing_between(lines: Lines, one: tuple[float, float], other: tuple[float, float], length: float) -> float:
@@ -120,8 +123,13 @@ def across(points: Sequence[tuple[float, float]], direction: str) -> list[tuple[
     Args:
         points: pixels (u, v).
         direction: where the nose points.
+
+    Raises:
+        InputError: for another direction than those of `nose_side`.
     """
-    right = {"right": (0, 1), "left": (0, -1), "up": (1, 0), "down": (-1, 0)}[direction]
+    right = _RIGHT.get(str(direction))
+    if right is None:
+        raise InputError(f"robot.direction = {clipped(direction)}; allowed: {', '.join(_RIGHT)}")
     return sorted(points, key=lambda point: right[0] * point[0] + right[1] * point[1])
 
 

@@ -269,7 +269,7 @@ def _film(path: Path, frames_per_second: float | None) -> Video:
         if not container.streams.video:
             raise InputError(f"{path} has no pictures; allowed: {_WHAT}")
         stream = container.streams.video[0]
-        if stream.width and stream.height:
+        if stream.codec_context is not None and stream.width and stream.height:
             _check_size(path, (stream.width, stream.height))
         try:
             frame = next(container.decode(stream), None)
