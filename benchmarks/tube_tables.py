@@ -135,9 +135,7 @@ def main() -> None:
         tails = tails_of(name, arguments.wavelength)
         places = Places(tails[0][1].geometry, tails[0][1].radius)
         if arguments.grid:
-            seats = [
-                (places.seat_between(t, f, yaw * places.largest_yaw_near(t, f)), _GRID_PHASE) for t, f, yaw in _GRID
-            ]
+            seats = [(places.seat_between(t, f, yaw * places.largest_yaw(t, f)), _GRID_PHASE) for t, f, yaw in _GRID]
         else:
             gaps = [1e-3 * gap for gap in arguments.gap]
             seats = drawn(places, arguments.places, arguments.yawed, gaps, arguments.seed)

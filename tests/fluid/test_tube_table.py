@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -57,10 +58,10 @@ def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.nda
     pitches = [*places.up, *(-places.down[1:])]
     rest = np.array([[coefficients(t, f) for f in pitches] for t in places.gaps])
     none = np.zeros(0)
-    turned = (none, none, none, none)
+    turned = (none, none, places.yaw_limit, none)
     if yawed is not None:
         values = np.array([[yawed(t, f) for f in places.yaw_pitches] for t in places.yaw_gaps])
-        turned = (places.yaw_gaps, places.yaw_pitches, places.most_yaw, values)
+        turned = (places.yaw_gaps, places.yaw_pitches, places.yaw_limit, values)
     parts = (places.gaps, places.up, places.down, places.most, rest)
     return kernel.packed(R, places.rings, *parts, *turned, film)
 
@@ -141,7 +142,7 @@ def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
     turned = packed(places, film, smooth, lambda t, f: np.zeros((4, 5, 36)))
     most = kernel.largest_yaw(turned, 0.0, 0.0)
-    assert most == pytest.approx(places.largest_yaw_near(1.0, 0.0))
+    assert most == pytest.approx(places.largest_yaw(1.0, 0.0))
     assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == kernel.TOO_FAR_YAWED
     assert at(turned, 0.0, 0.0, 0.98 * kernel.YAW_SLACK * most)[1] == kernel.INSIDE
 
@@ -181,6 +182,18 @@ def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
             assert seat.tail_clearance(wire.points, wire.radius).clearance > 0.7 * wire.radius
             assert seat.clearance(places.geometry.body) > 0
         assert places.most[row].min() > 0
+
+
+@pytest.mark.parametrize("radius", [R, 0.015])
+@pytest.mark.parametrize("t", [0.02, 0.2, 0.7, 1.0])
+def test_largest_yaw_is_where_the_tail_nears_the_glass(geometry: RobotGeometry, radius: float, t: float) -> None:
+    """Between its nodes, too, nose up and down: to 0.1 degrees."""
+    places = Places(geometry, radius)
+    for f in (-0.9, -0.25, 0.0, 0.1, 0.6):
+        seat = places.seat_between(t, f, places.largest_yaw(t, f))
+        for turned, sign in ((-0.1, 1.0), (0.1, -1.0)):
+            near = replace(seat, yaw=seat.yaw + np.radians(turned))
+            assert sign * (places.tail_clearance(near) - places.least_clearance) > 0
 
 
 @pytest.mark.parametrize("radius", [R, 0.015])

@@ -5,7 +5,10 @@ phase phi of the tail. The rest is interpolated over
 
     t = 1 - e/e_c(p), 0 where a robot without yaw touches the floor of the tube, 1 on its axis,
     f = p/p_hi(t) nose up or p/p_lo(t) nose down, 1 at the largest pitch of the table,
-    g = psi/psi_c(t, f), 1 at the largest yaw of the table there.
+    g = psi/psi_c(e, p), 1 at the largest yaw of the table there, at which the tail is near the glass.
+
+The end of a tail of length L is off the axis by L sin(psi) across the plane of the offset and by L sin(p) - e along it,
+so that sin(psi_c)^2 is a quadratic polynomial of sin(p) and e.
 
 Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - f) between the nodes,
 linear in t below the first, quartic in artanh(g/1.2), and a Fourier sum in the phase: the rest is positive definite
@@ -39,6 +42,7 @@ __all__ = [
     "cut_of_film",
     "film_start",
     "largest_yaw",
+    "limited_yaw",
     "mean_resistance_at",
     "mirror_image",
     "packed",
@@ -48,6 +52,7 @@ __all__ = [
     "rest_coefficients",
     "shapes_of",
     "stretched_yaw",
+    "yaw_limit_of",
 ]
 
 MOTIONS = 8
@@ -68,6 +73,7 @@ _BEYOND_YAW = 1.2  # beyond the largest yaw, so that the inverse tangent stays f
 _RADIUS, _RINGS, _GAPS, _UP, _DOWN, _PHASES, _YAW_GAPS, _YAW_PITCHES = 0, 1, 2, 3, 4, 5, 6, 7
 _HEADER = 8
 _MOST = 12  # nodes in one direction
+_YAW_LIMIT = 7  # numbers of `largest_yaw`
 _LEAST_YAW = 1e-3  # rad, where the tail nearly touches the glass without a yaw
 
 
@@ -81,7 +87,7 @@ def packed(
     rest: Samples,
     yaw_gaps: Samples,
     yaw_pitches: Samples,
-    most_yaw: Samples,
+    yaw_limit: Samples,
     yawed: Samples,
     film: Samples,
 ) -> Samples:
@@ -98,12 +104,12 @@ def packed(
             pitches in the order of `up`, then `down` without its first.
         yaw_gaps: nodes t of the yawed places.
         yaw_pitches: nodes of signed f of the yawed places.
-        most_yaw: largest yaws at the yawed places, (yaw gaps, yaw pitches), rad.
+        yaw_limit: of `yaw_limit_of`, (7,).
         yawed: coefficients of the powers of the stretched yaw, (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
         film: packed film.
     """
     header = [radius, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
-    nodes = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, most_yaw)
+    nodes = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, yaw_limit)
     return np.concatenate([np.ravel(part) for part in (*nodes, rest, yawed, film)])
 
 
@@ -308,30 +314,44 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
             share = of_gap[i] * of_pitch[j]
             for n in range(block):
                 flat[n] += share * table[here + n]
-    if yaw != 0.0 and table[_YAW_GAPS] > 0 and not _add_yaw(table, t, f, yaw, flat):
+    if yaw != 0.0 and table[_YAW_GAPS] > 0 and not _add_yaw(table, t, f, yaw / largest_yaw(table, e, pitch), flat):
         left = TOO_FAR_YAWED
     return left, t
 
 
 @compiled
-def _yaw_weights(table: Samples, t: float, f: float, of_gap: Samples, of_pitch: Samples) -> float:
-    """Fill the weights of the yawed places; the largest yaw, rad."""
-    gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
-    start = _rest_start(table) - gaps - pitches - gaps * pitches
-    _rooted(table, start, gaps, max(t, table[start]), of_gap)
-    _lagrange(table, start + gaps, pitches, f, of_pitch)
-    most = 0.0
-    for i in range(gaps):
-        for j in range(pitches):
-            most += of_gap[i] * of_pitch[j] * table[start + gaps + pitches + i * pitches + j]
-    return max(most, _LEAST_YAW)
+def largest_yaw(table: Samples, e: float, pitch: float) -> float:
+    """Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it."""
+    start = _rest_start(table) - _YAW_LIMIT
+    return limited_yaw(table[start : start + _YAW_LIMIT], e / table[_RADIUS], pitch)
 
 
 @compiled
-def largest_yaw(table: Samples, e: float, pitch: float) -> float:
-    """Largest yaw to either side at a place, rad: the table's nodes reach up to 0.95 of it."""
-    t, f, _ = _place(table, e, pitch, np.empty(_MOST))
-    return _yaw_weights(table, t, f, np.empty(_MOST), np.empty(_MOST))
+def limited_yaw(limit: Samples, x: float, pitch: float) -> float:
+    """Largest yaw at a place, rad.
+
+    Args:
+        limit: of `yaw_limit_of`.
+        x: offset of the body's mid-length over R.
+        pitch: nose up, rad.
+    """
+    p = math.sin(pitch)
+    square = limit[0] + p * (limit[1] + p * limit[2]) + x * (limit[3] + p * limit[4] + x * limit[5])
+    return min(math.asin(math.sqrt(min(max(square, _LEAST_YAW * _LEAST_YAW), 1.0))), float(limit[6]))
+
+
+def yaw_limit_of(x: Samples, pitches: Samples, yaws: Samples, most: float) -> Samples:
+    """The numbers of `limited_yaw`, (7,), from largest yaws at some places.
+
+    Args:
+        x: offsets of the body's mid-length over R, (n,).
+        pitches: nose up, (n,), rad.
+        yaws: at which the tail is near the glass, (n,), rad.
+        most: largest yaw anywhere, rad.
+    """
+    p = np.sin(pitches)
+    terms = np.stack([np.ones_like(x), p, p**2, x, x * p, x**2], axis=1)
+    return np.append(np.linalg.lstsq(terms, np.sin(yaws) ** 2, rcond=None)[0], most)
 
 
 @compiled
@@ -345,22 +365,24 @@ def stretched_yaw(share: float) -> float:
 
 
 @compiled
-def _add_yaw(table: Samples, t: float, f: float, yaw: float, out: Samples) -> bool:
-    """Add what a yaw makes of the coefficients; whether it is within the range."""
+def _add_yaw(table: Samples, t: float, f: float, share: float, out: Samples) -> bool:
+    """Add what a share of the largest yaw makes of the coefficients; whether it is within the range."""
     gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
+    start = _rest_start(table) - _YAW_LIMIT - gaps - pitches
     of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
-    most = _yaw_weights(table, t, f, of_gap, of_pitch)
-    within = abs(yaw) <= YAW_SLACK * most
-    s = stretched_yaw(yaw / most if within else math.copysign(YAW_SLACK, yaw))
+    _rooted(table, start, gaps, max(t, table[start]), of_gap)
+    _lagrange(table, start + gaps, pitches, f, of_pitch)
+    within = abs(share) <= YAW_SLACK
+    s = stretched_yaw(share if within else math.copysign(YAW_SLACK, share))
     at_yawed = film_start(table) - gaps * pitches * YAW_ORDERS * out.size
     for i in range(gaps):
         for j in range(pitches):
             here = at_yawed + (i * pitches + j) * YAW_ORDERS * out.size
-            share = of_gap[i] * of_pitch[j]
+            weight = of_gap[i] * of_pitch[j]
             for _ in range(YAW_ORDERS):
-                share *= s
+                weight *= s
                 for n in range(out.size):
-                    out[n] += share * table[here + n]
+                    out[n] += weight * table[here + n]
                 here += out.size
     return within
 
@@ -376,7 +398,7 @@ def _rest_start(table: Samples) -> int:
     """Where in a packed table the rest begins."""
     yaw_gaps, yaw_pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
     own = 4 * int(table[_RINGS]) + 3 * int(table[_GAPS]) + int(table[_UP] + table[_DOWN])
-    return _HEADER + own + yaw_gaps + yaw_pitches + yaw_gaps * yaw_pitches
+    return _HEADER + own + yaw_gaps + yaw_pitches + _YAW_LIMIT
 
 
 @compiled

@@ -145,7 +145,7 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     shape = len(places.gaps), len(places.up) + len(places.down) - 1, *rest[0].shape
     parts = (places.gaps, places.up, places.down, places.most, np.reshape(rest, shape))
     none = np.zeros(0)
-    straight = kernel.packed(places.radius, places.rings, *parts, none, none, none, none, film)
+    straight = kernel.packed(places.radius, places.rings, *parts, none, none, places.yaw_limit, none, film)
     sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
@@ -156,7 +156,7 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     seats = _yawed_seats(places)
     middles = [_interpolated(straight, seat, of_node.shape[-2]) for seat in seats]
     turned = np.stack([_powers(middle, node) for middle, node in zip(middles, of_node, strict=True)])
-    yawed_nodes = places.yaw_gaps, places.yaw_pitches, places.most_yaw
+    yawed_nodes = places.yaw_gaps, places.yaw_pitches, places.yaw_limit
     return kernel.packed(places.radius, places.rings, *parts, *yawed_nodes, turned, film)
 
 

@@ -7,7 +7,7 @@ is a share of the largest one at its place, at which the tail does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import contact_offset
+from spirillum.kernels.tube_table import contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
@@ -46,6 +46,8 @@ _YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
 _SWEPT = 121
 """Points along the tail between which it is asked how near it comes to the glass."""
 _LEAST_PITCH = np.radians(0.2)
+_SEARCH_YAW = (float(np.radians(44.0)), 45, 1e-6)
+"""Largest yaw that is tried, steps, and accuracy of the search for the tail's contact, rad."""
 _SEARCH = (31, 1e-6)
 """Steps of the search for contact, and its accuracy, rad."""
 
@@ -134,14 +136,21 @@ class Places:
         return np.array(_YAW_PITCHES)
 
     @cached_property
-    def most_yaw(self) -> Samples:
-        """Largest yaw at the yawed places, (yaw gaps, yaw pitches), rad: the tail is off the glass as elsewhere."""
-        return np.array([[self._widest(float(t), float(f)) for f in self.yaw_pitches] for t in self.yaw_gaps])
+    def yaw_limit(self) -> Samples:
+        """Numbers of `limited_yaw`: the tail is then off the glass as elsewhere."""
+        seats = [self.seat(float(t), float(f)) for t in self.yaw_gaps for f in self.yaw_pitches]
+        x, pitches = np.array([(seat.offset / self.radius, seat.pitch) for seat in seats]).T
+        return yaw_limit_of(x, pitches, np.array([self._widest(seat) for seat in seats]), LARGEST_YAW)
 
-    def largest_yaw_near(self, t: float, f: float) -> float:
-        """Largest yaw of the nearest yawed place, rad."""
-        row = int(np.argmin(np.abs(self.yaw_gaps - t)))
-        return float(self.most_yaw[row, int(np.argmin(np.abs(self.yaw_pitches - f)))])
+    @cached_property
+    def most_yaw(self) -> Samples:
+        """Largest yaw at the yawed places, (yaw gaps, yaw pitches), rad."""
+        return np.array([[self.largest_yaw(float(t), float(f)) for f in self.yaw_pitches] for t in self.yaw_gaps])
+
+    def largest_yaw(self, t: float, f: float) -> float:
+        """Largest yaw at a place, rad."""
+        seat = self.seat_between(t, f)
+        return limited_yaw(self.yaw_limit, seat.offset / self.radius, seat.pitch)
 
     @cached_property
     def most(self) -> Samples:
@@ -187,10 +196,10 @@ class Places:
 
         return max(float(_LEAST_PITCH), last_clear(spare, STEEPEST[0 if sign > 0 else 1], *_SEARCH))
 
-    def _widest(self, t: float, f: float) -> float:
-        """Largest yaw at a place."""
+    def _widest(self, seat: Seat) -> float:
+        """Largest yaw of a seat, also beyond the largest of a table."""
 
         def spare(yaw: float) -> float:
-            return self.tail_clearance(self.seat(t, f, yaw)) - self.least_clearance
+            return self.tail_clearance(replace(seat, yaw=yaw)) - self.least_clearance
 
-        return max(float(_LEAST_PITCH), last_clear(spare, LARGEST_YAW, *_SEARCH))
+        return max(float(_LEAST_PITCH), last_clear(spare, *_SEARCH_YAW))

@@ -24,7 +24,7 @@ from spirillum.kernels import tube_table as kernel
 
 __all__ = ["TubeTable", "key_of"]
 
-_FORMAT = "spirillum.tube-table/3"
+_FORMAT = "spirillum.tube-table/4"
 _LARGEST_FILE = 2**21  # bytes
 
 
