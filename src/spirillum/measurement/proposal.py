@@ -284,7 +284,11 @@ def _walls(found: Scouted, robot: Robot) -> Finding:
         words = "no edges along the channel were found on both sides of the robot"
         return Finding("walls", None, "m", "not found", words)
     width = walls.distance * robot.body.diameter
-    words = f"edges along the channel {1e3 * width:.3g} mm apart at the robot's depth, by its own diameter"
+    words = (
+        f"edges along the channel {1e3 * width:.3g} mm apart by the robot's own diameter, as a rule the outer sides of "
+        f"the glass (bore some {1e3 * width / _OUTER:.3g} mm): depth and refraction may change this by a quarter, "
+        "measure the bore"
+    )
     ends = tuple(tuple((float(u), float(v)) for u, v in line) for line in walls.ends)
     confidence: Confidence = "clear" if walls.contrast > 2.0 * SCOUTING.clear else "doubtful"
     return Finding("walls", width, "m", confidence, words, pixels=ends)
