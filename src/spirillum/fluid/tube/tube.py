@@ -205,7 +205,7 @@ class Tube(SwimmerModel):
         unknown += ["the body's pitch"] if placement.pitch is None else []
         walls = "walls are computed, nothing is fitted"
         if not unknown:
-            return f"{walls}; gap and pitch are taken as given: what they are uncertain by comes on top"
+            return f"{walls}; gap and pitch are taken as given: their own uncertainty comes on top"
         decide = "decides" if len(unknown) == 1 else "decide"
         return f"{walls}; {' and '.join(unknown)}, not given here, {decide} much of the answer"
 
