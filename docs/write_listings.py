@@ -376,7 +376,7 @@ def draw_pictures() -> None:
     folder = DOCS / "images" / "study"
     folder.mkdir(parents=True, exist_ok=True)
     for name, picture in figures_of(_studied()).items():
-        picture.figure().savefig(folder / f"{name}.png", dpi=110)
+        picture.figure().savefig(folder / f"{name}.png", dpi=150)
     script = ROOT / "examples" / "theory_in_python.py"
     with TemporaryDirectory() as where:
         sys.argv = [str(script), where]

@@ -39,7 +39,7 @@ if __name__ == "__main__":
     pictures = {
         "design": (design_figure(best), 150),
         "overview": (robot_figure(sp.load("biorob2012-wide")), 150),
-        "flow": (flow_figure(flow, flow.plane("xz")), 90),
+        "flow": (flow_figure(flow, flow.plane("xz")), 150),
         "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 150),
         "frenet": (frenet_figure(sp.load("biorob2012-wide")), 120),
     }
