@@ -16,7 +16,8 @@ def draw_dimensions(axes: Axes, s: Scene) -> None:
     robot = s.robot
     _axial_dimensions(axes, s)
     radius = 0.5 * robot.body.diameter / s.scale.factor
-    x = 0.42 * s.rear
+    straight = robot.body.shape in ("capsule", "cylinder") and not s.stubby
+    x = 0.66 * s.rear if straight else 0.0  # where the body is as wide as that
     dimension_line(axes, (x, -radius), (x, radius))
     if s.stubby:
         label(axes, 0.0, radius + 0.02 * s.total, s.words("D_b", robot.body.diameter))

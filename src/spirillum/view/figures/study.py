@@ -314,6 +314,8 @@ def _draw_robots(shown: StudyView, places: list[int], title: str, rows: Sequence
     named, longest = len(names) <= NAMED_ROBOTS, max(len(name) for name in names)
     width = min(max(0.45 * len(names), 5.0), 9.0)
     upright = _TICK_LETTER * longest * len(names) < width
+    if not upright and 0.3 * len(names) < width:  # room for two lines
+        names = [name.replace(", ", ",\n", 1) for name in names]
     legend = model_handles(shown, own_drive=not shown.observed)
     sheet = Sheet(
         title,
