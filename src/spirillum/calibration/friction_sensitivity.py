@@ -60,7 +60,10 @@ def friction_statement(problem: Problem, friction: Sequence[Estimate], sensitivi
         subject, verbs = "B_eff", verbs.replace("take ", "takes ", 1)
     elif exact:
         advice = f"; --assume-uncertainty {exact[0]}=5% would put 5 % into them"
-    return f"{subject} {verbs}: one per cent more of it moves B_eff by {moves}, medians of the tails{advice}"
+    return (
+        f"{subject} {verbs}: one per cent more of it moves B_eff by {moves}, medians of the tails{advice}; "
+        f"B_eff also holds what model '{problem.model.name}' misses of the torque, which no interval shows"
+    )
 
 
 def _listed(items: Sequence[str]) -> str:

@@ -72,7 +72,7 @@ def _legend(control: Control) -> list[Line2D]:
     ]
     if _path_of(control).estimated is not None:
         found.append(Line2D([], [], color=COLOURS["vermillion"], linestyle="--", label="estimated"))
-    found.append(Line2D([], [], color=COLOURS["green"], linestyle=(0, (4, 2)), label="aimed at, with what is good"))
+    found.append(Line2D([], [], color=COLOURS["green"], linestyle=(0, (4, 2)), label="aim and tolerance"))
     return found
 
 
