@@ -202,19 +202,21 @@ def _assembled(place: Place, surface: Surface, along: _Basis, around: _Basis) ->
     through = motions @ normals[..., None]
     tangential = motions - through * normals[:, :, None, :]
     half = (0.5 * element * h)[..., None]
-
-    def tested(density: Samples, one: Samples, other: Samples) -> Samples:
-        rings = np.tensordot(other, density, axes=(0, 1)).reshape(n_v, count, n_q, 6)
-        return np.tensordot(one, rings, axes=(0, 2)).transpose(2, 0, 1, 3)
-
     loads = (
-        tested(half * (motions @ to_u[..., None])[..., 0], along.slopes, around.values)
-        + tested(half * (motions @ to_v[..., None])[..., 0], along.values, around.slopes)
-        + tested((weights * displaced)[..., None] * through[..., 0], along.values, around.values)
+        _tested(half * (motions @ to_u[..., None])[..., 0], along.slopes, around.values)
+        + _tested(half * (motions @ to_v[..., None])[..., 0], along.values, around.slopes)
+        + _tested((weights * displaced)[..., None] * through[..., 0], along.values, around.values)
     )
     thin = 1.0 / (1.0 + (h / (_SHEARED * place.body.radius)) ** 2)
     sheared = (tangential * np.sqrt(element * thin / h)[..., None, None]).swapaxes(0, 2).reshape(6, -1)
     return stiffness, loads, sheared @ sheared.T
+
+
+def _tested(density: Samples, one: Samples, other: Samples) -> Samples:
+    """Integrals (elements, n_u, n_v, 6) of densities, at all Gauss points, times functions along and around."""
+    n_q = one.shape[0]
+    rings = np.tensordot(other, density, axes=(0, 1)).reshape(other.shape[1], -1, n_q, 6)
+    return np.asarray(np.tensordot(one, rings, axes=(0, 2)).transpose(2, 0, 1, 3))
 
 
 @dataclass(frozen=True)
@@ -314,7 +316,7 @@ def _clearance_of(at: float, radius: float) -> float:
 
 def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[float, float, float]:
     """Offset, pitch and yaw of coordinates in a table; pitches are cut off at `_STEEPEST`."""
-    tube, a, half, rear, rear_round, front, front_round = head[:7]
+    tube, a, half, rear, _, front, _ = head[:7]
     if half:
         psi = float(np.arcsin(np.sinh(eta * np.arcsinh(np.sin(head[table.YAW])))))
         e, wanted = 0.0, _clearance_of(first, a)
@@ -327,23 +329,28 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
     sine = scale * np.sinh(eta * np.arcsinh(np.sin(head[table.YAW]) / scale))
     v = np.minimum(v, v.min() + _STEEPEST * length)
 
-    def clearances(e: float, lift: float) -> Samples:
-        side = float(np.sqrt(1.0 - lift**2) * sine)
-        ends = ((rear, rear_round), (front, front_round))
-        return np.array([table.clearance(head, x, 0.0, a - f, f, e, lift, side) for x, f in ends])
-
     lift = (v[1] - v[0]) / length
     e = tube - a - v[0] + rear * lift
     step = 1e-6
     for _ in range(50):
-        error = clearances(e, lift) - v
+        error = _clearances(head, e, lift, sine) - v
         if np.max(np.abs(error) / v) < 1e-10:
             break
-        by_e = (clearances(e + step * a, lift) - clearances(e - step * a, lift)) / (2.0 * step * a)
-        by_lift = (clearances(e, lift + step) - clearances(e, lift - step)) / (2.0 * step)
+        ahead, behind = (_clearances(head, e + change, lift, sine) for change in (step * a, -step * a))
+        by_e = (ahead - behind) / (2.0 * step * a)
+        up, down = (_clearances(head, e, lift + change, sine) for change in (step, -step))
+        by_lift = (up - down) / (2.0 * step)
         change = np.linalg.solve(np.column_stack([by_e, by_lift]), error)
         e, lift = e - change[0], float(np.clip(lift - change[1], -0.9, 0.9))
     return float(e), float(np.arcsin(lift)), float(np.arcsin(sine))
+
+
+def _clearances(head: Samples, e: float, lift: float, sine: float) -> Samples:
+    """Clearances of both shoulders at an offset, with the sines of pitch and yaw."""
+    _, a, _, rear, rear_round, front, front_round = head[:7]
+    side = float(np.sqrt(1.0 - lift**2) * sine)
+    ends = ((rear, rear_round), (front, front_round))
+    return np.array([table.clearance(head, x, 0.0, a - f, f, e, lift, side) for x, f in ends])
 
 
 def _factors(resistance: Matrix6, a: float, angle: float) -> Samples:

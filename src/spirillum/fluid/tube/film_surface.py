@@ -26,6 +26,7 @@ _LEAST = 1e-12
 """Thinnest film over the tube's radius."""
 TOUCHES = "the body touches the wall of the tube"
 _HALF = 0.5 * np.pi
+_AXIS = np.array([1.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -251,18 +252,16 @@ def _revolved(
     zero = np.zeros_like(sin)
     radial = np.stack([zero, sin, -cos], axis=-1)
     hoop = np.stack([zero, cos, sin], axis=-1)
-    axis = np.array([1.0, 0.0, 0.0])
-
-    def meridian(pair: tuple[Samples, Samples]) -> Samples:
-        return np.asarray(pair[0][:, None, None] * axis + pair[1][:, None, None] * radial)
-
+    to_points, to_normals, to_tangents, to_turning = (
+        x[:, None, None] * _AXIS + r[:, None, None] * radial for x, r in (outline, normal, tangent, turning)
+    )
     steep = normal[1][:, None]
     return Surface(
-        meridian(outline),
-        meridian(normal),
-        meridian(tangent) * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
+        to_points,
+        to_normals,
+        to_tangents * rate[:, None, None] + (rho * by_u)[..., None] * hoop,
         (rho * by_v)[..., None] * hoop,
-        meridian(turning) * rate[:, None, None] + (steep * by_u)[..., None] * hoop,
+        to_turning * rate[:, None, None] + (steep * by_u)[..., None] * hoop,
         (steep * by_v)[..., None] * hoop,
     )
 
