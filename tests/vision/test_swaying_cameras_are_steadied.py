@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from spirillum.vision.camera import anchor
 from spirillum.vision.camera.anchor import steadied, sways
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track.follow import follow
@@ -63,3 +64,13 @@ def test_rates_from_a_hand_are_those_of_the_robot(flat_pictures, tmp_path):
     still = replace(flat, frames=8)
     assert still.write(tmp_path / "b.mp4")
     assert follow(tmp_path / "b.mp4", *load_setup(tmp_path / "b.setup.toml")).drift == 0.0
+
+
+def test_a_wide_blur_on_a_reduced_picture_is_that_of_the_whole():
+    size = (2603, 90)
+    v, u = np.mgrid[: size[1], : size[0]].astype(np.float32)
+    picture = np.clip(120.0 + 60.0 * np.sin(u / 300.0) + 40.0 * np.sin(u / 7.0) + 0.3 * v, 0, 255)
+    ground = cv2.GaussianBlur(picture, (0, 0), size[0] / 20.0)
+    whole = cv2.GaussianBlur(np.clip(picture / ground - 1.0, -0.6, 0.6), (0, 0), 1.0)
+    found = anchor._flat(np.repeat(picture[..., None], 3, axis=2))
+    assert np.abs(found - whole).max() < 0.005

@@ -194,7 +194,7 @@ class Following:
             _TAIL: (tail_size, (known[_TAIL], 2.0 * known[_TAIL])),
         }
         drifts = {
-            _VELOCITY: (DRIFT_PIXELS if striped else DRIFT_BARE) * pixel,
+            _VELOCITY: math.hypot(DRIFT_PIXELS if striped else DRIFT_BARE, self.learnt.glare.drift) * pixel,
             _BODY: max(DRIFT_ANGLE, body_size / 2.0),
             _TAIL: max(DRIFT_ANGLE, tail_size / 2.0),
         }
@@ -229,10 +229,10 @@ class Following:
             InputError: if there is none.
         """
         flags = (*self.moved, *self.learnt.sight.flags, *self.learnt.flags)
-        known, sight = self.learnt.known, self.learnt.sight
         if not self.follower.record.time:
             raise InputError(f"{name} has no frame after the robot was learnt; allowed: a longer one")
-        return trial_of(track_of(self.video, self.setup, sight, known, self.follower.record, flags), self.robot, name)
+        track = track_of(self.video, self.setup, self.learnt, self.follower.record, flags)
+        return trial_of(track, self.robot, name)
 
 
 def _synthetic(video: Video) -> tuple[Flag, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
-from spirillum.measurement.flags import BY_HAND, SEEN, SYNTHETIC, flags_of
+from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.measurement.systematic import (
@@ -64,6 +64,8 @@ _FEWEST = 12
 """Fewest frames for that polynomial."""
 _UNSTEADY = 0.5
 """Largest root mean square residual of that polynomial, rad."""
+_TENTHS = 10
+"""Parts of a track whose mean residuals tell how its errors wander."""
 _TOO_FEW = "it was read on too few frames"
 
 
@@ -280,8 +282,18 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name == "no-stripes" for flag in track.flags)
-    drift = _drift(track, (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel)
+    least = (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel
+    read = any(flag.name in (BY_HAND, IMPORTED) for flag in track.flags)
+    drift = _drift(track, least if read else max(least, _wander(rate)))
     return _with_errors(rate, "m/s", drift, scale, track.drift)
+
+
+def _wander(rate: Rate) -> float:
+    """Scatter of the mean residuals of tenths of the track: pictures of a compressed film lag behind, and catch up."""
+    known = rate.residual[np.isfinite(rate.residual)]
+    if known.size < _TENTHS:
+        return 0.0
+    return float(np.std([part.mean() for part in np.array_split(known, _TENTHS)]))
 
 
 def _mean(track: Track, values: Samples, unit: str, systematic: float) -> Measured:

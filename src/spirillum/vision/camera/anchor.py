@@ -26,6 +26,8 @@ _COARSE = 160
 """Width of the reduced picture whose coarse structure is compared, pixels."""
 _REACH = 10
 """Largest shift that is looked for there, pixels."""
+_BLUR = 32.0
+"""Standard deviation of the widest blur, pixels; wider ones are made on a reduced picture, as they take long."""
 _SWAYS = 0.15
 """Scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels."""
 _STEPS, _STILL = 12, 0.005
@@ -183,7 +185,12 @@ def _flat(image: np.ndarray) -> Samples:
     cv2 = required("cv2", "measuring a video", "video")
     grey = cv2.cvtColor(image.astype(np.float32), cv2.COLOR_RGB2GRAY)
     wide = max(15.0, grey.shape[1] / 20.0)
-    flat = np.clip(grey / np.maximum(cv2.GaussianBlur(grey, (0, 0), wide), 1.0) - 1.0, -0.6, 0.6)
+    few = max(1, int(wide / _BLUR))
+    size = grey.shape[::-1]
+    small = grey if few == 1 else cv2.resize(grey, (size[0] // few, size[1] // few), interpolation=cv2.INTER_AREA)
+    ground = cv2.GaussianBlur(small, (0, 0), wide / few)
+    ground = ground if few == 1 else cv2.resize(ground, size)
+    flat = np.clip(grey / np.maximum(ground, 1.0) - 1.0, -0.6, 0.6)
     return np.asarray(cv2.GaussianBlur(flat, (0, 0), 1.0))
 
 

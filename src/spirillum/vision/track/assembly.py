@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
-from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import LOST_FRAMES
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.identity import Identified
+from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import checked_scale
@@ -39,8 +41,7 @@ _DOUBTFUL_STRIPES = Flag(
 def track_of(
     video: Video,
     setup: Setup,
-    sight: Sight,
-    known: Identified,
+    learnt: Learnt,
     record: Record,
     flags: tuple[Flag, ...],
     still: Steadied | None = None,
@@ -50,12 +51,12 @@ def track_of(
     Args:
         video: the film.
         setup: its setup.
-        sight: the calibrated camera.
-        known: the robot.
+        learnt: the calibrated camera, the robot as it looks, and glare on its way.
         record: what was seen on every frame.
         flags: those of film, camera and first look.
         still: how the camera swayed, where its pictures were moved to where the first one lies.
     """
+    sight, known = learnt.sight, learnt.known
     body, time = known.start.body, np.array(record.time)
     seen = np.array([one.known for one in record.placed])
     pose = np.where(seen[:, None], np.array([one.pose for one in record.placed]), np.nan)
@@ -86,6 +87,7 @@ def track_of(
     odd += no_stripe_passes(motion, body.robot)
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
+    glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
     cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period))
     return Track(
         time=time,
@@ -104,7 +106,7 @@ def track_of(
         video=video.name,
         words=video.words,
         time_uncertainty=restored.relative_error,
-        drift=swayed.drift,
+        drift=math.hypot(swayed.drift, glare),
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

@@ -18,6 +18,7 @@ __all__ = [
     "DIRECTION",
     "FIRST_LOOK",
     "FOLLOWING",
+    "GLARE",
     "IDENTITY",
     "OUTLINE",
     "SCOUTING",
@@ -36,6 +37,7 @@ __all__ = [
     "DirectionConstants",
     "FirstLookConstants",
     "FollowingConstants",
+    "GlareConstants",
     "IdentityConstants",
     "OutlineConstants",
     "ScoutingConstants",
@@ -374,6 +376,10 @@ class WidthConstants:
     """Fewest frames of an edge."""
     uneven: float = radians(2.0)
     """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
+    clear: float = 10.0
+    """Least range over the scatter of an edge on a frame: colours of compressed pictures are blurred, not all alike.
+
+    On six degraded films even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
     left: float = 0.05
     """Share of that range that is left as an error of each angle. Assumed."""
 
@@ -581,6 +587,30 @@ class FollowingConstants:
     """Largest accepted distance from the predicted position, pixels."""
 
 
+@dataclass(frozen=True)
+class GlareConstants:
+    """Glare that stands still on the robot's way (`glare`)."""
+
+    share: float = 0.9
+    """Share of the frames on which a spot has to be white."""
+    covered: float = 0.95
+    """Share of the body's diameter that surely hides what is behind it."""
+    least: float = 0.005
+    """Least size of its part on the way, over what body and coupling cover."""
+    most: float = 1.0
+    """Largest size of it all, over that: what is larger is an overexposed background."""
+    rim: float = 0.4
+    """Width of its rim, over the radius of a disk as large as the spot."""
+    across: float = 0.5
+    """Least sine of the angle between an edge and the way of the robot, of edges that tell how far it has moved."""
+    passes: float = 2.0
+    """Least change of the distance of such an edge from a spot, within its rim, pixels."""
+    fewest: int = 3
+    """Fewest edge points of which this is true."""
+    drift: float = 0.08
+    """Standard error of the way from the first frame to the last, pixels."""
+
+
 SEARCH = SearchConstants()
 CONTOUR = ContourConstants()
 OUTLINE = OutlineConstants()
@@ -600,3 +630,4 @@ DIRECTION = DirectionConstants()
 SWAY = SwayConstants()
 VISIBILITY = VisibilityConstants()
 FOLLOWING = FollowingConstants()
+GLARE = GlareConstants()

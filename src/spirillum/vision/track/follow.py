@@ -67,4 +67,4 @@ def follow(
         if progress is not None:
             progress(count, total)
     flags = (*video.flags, *learnt.sight.flags, *moved.result(), *learnt.flags)
-    return track_of(video, setup, learnt.sight, learnt.known, follower.record, flags, still)
+    return track_of(video, setup, learnt, follower.record, flags, still)

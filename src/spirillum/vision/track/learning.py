@@ -13,6 +13,7 @@ from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
+from spirillum.vision.track.glare import Glare, standing_glare
 from spirillum.vision.track.identity import Identified, identify
 from spirillum.vision.video.frames import Frame, Video
 
@@ -28,12 +29,14 @@ class Learnt(NamedTuple):
     """The robot."""
     still: Samples
     """Static background of the pictures, (h, w, 3)."""
+    glare: Glare
+    """Glare that stands still."""
 
     @property
     def flags(self) -> tuple[Flag, ...]:
         """All that is odd about the robot so far, also about what was read since."""
         known = self.known
-        return (*known.start.flags, *known.flags, *known.stripes.flags, *known.wire.flags)
+        return (*known.start.flags, *known.flags, *known.stripes.flags, *known.wire.flags, *self.glare.flags)
 
 
 def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, folder: Path | None) -> Learnt:
@@ -52,4 +55,6 @@ def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, f
     still = still_picture([frame.image for frame in frames])
     sight = sight_of(video, setup, still, folder)
     finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
-    return Learnt(sight, identify(video.name, setup, finder, frames, still), still)
+    known = identify(video.name, setup, finder, frames, still)
+    poses = [known.start.expected(frame.time) for frame in frames]
+    return Learnt(sight, known, still, standing_glare([frame.image for frame in frames], poses, known.start.body))

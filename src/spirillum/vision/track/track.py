@@ -53,6 +53,6 @@ class Track:
     words: str = ""
     """What the video's file says of itself, such as that it is synthetic."""
     drift: float = 0.0
-    """Standard uncertainty of the velocity by a camera that drifted along the channel, m/s."""
+    """Standard uncertainty of the velocity by a camera that drifted along the channel, and by glare, m/s."""
     time_uncertainty: float = 0.0
     """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""

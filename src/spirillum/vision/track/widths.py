@@ -88,10 +88,10 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     which = (np.arange(count)[None, :] - repeat * turned[:, None]) % count
     shifts = np.full((int(known.sum()), count), np.nan)
     np.put_along_axis(shifts, which, edges[known], axis=1)
-    places = _places(shifts)
+    places, scatter = _places(shifts)
     seen = np.isfinite(places)
     off = float(np.ptp(places[seen])) if seen.any() else 0.0
-    if off < WIDTHS.uneven:
+    if off < max(WIDTHS.uneven, WIDTHS.clear * scatter):
         return untouched
     weight = (np.isfinite(shifts) & seen).astype(float)
     total = np.maximum(weight.sum(axis=1), 1e-9)
@@ -107,11 +107,14 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     return Evened(better, surer, (Flag("uneven-stripes", sentence),))
 
 
-def _places(shifts: Samples) -> Samples:
-    """Shift of each edge, rad, (stripes,), of mean 0; NaN of edges that were seen too rarely, or beside no others."""
+def _places(shifts: Samples) -> tuple[Samples, float]:
+    """Shift of each edge, rad, (stripes,), of mean 0, and the scatter of an edge on a frame, rad.
+
+    The shift is NaN for edges that were seen too rarely, or beside no others.
+    """
     weight = np.isfinite(shifts).astype(float)
     value = np.nan_to_num(shifts)
-    places = np.zeros(shifts.shape[1])
+    places, scale = np.zeros(shifts.shape[1]), 0.0
     for _ in range(WIDTHS.rounds):
         total = np.maximum(weight.sum(axis=1), 1e-9)
         normal = np.diag(weight.sum(axis=0)) - (weight / total[:, None]).T @ weight
@@ -122,4 +125,4 @@ def _places(shifts: Samples) -> Samples:
         scale = float(mad_scale(residual[weight > 0])) + 1e-4
         weight = (np.isfinite(shifts) & (np.abs(residual) < WIDTHS.stray * scale)).astype(float)
     often = weight.sum(axis=0) >= WIDTHS.seen
-    return np.where(often, places - places[often].mean() if often.any() else 0.0, np.nan)
+    return np.where(often, places - places[often].mean() if often.any() else 0.0, np.nan), scale

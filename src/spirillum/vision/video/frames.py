@@ -32,8 +32,8 @@ PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 _WHAT = "a film (mp4, avi, mov, mkv) or a folder of images (png, jpg, tif, bmp)"
 _PURPOSE = "measuring a video"
-_AHEAD = 12
-"""Frames that are decoded ahead of the analysis; memory does not grow with a video's length."""
+_AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
+"""Most and fewest frames that are decoded ahead of the analysis, and the bytes that they may take between."""
 _OPENING = {
     "protocol_whitelist": "file",
     "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc,"
@@ -102,7 +102,8 @@ class Video:
         Raises:
             InputError: if there is none, or the first cannot be read.
         """
-        return ahead(self._read(start, end), _AHEAD)
+        most = _AHEAD_BYTES // (3 * self.size[0] * self.size[1])
+        return ahead(self._read(start, end), max(_FEWEST_AHEAD, min(most, _AHEAD)))
 
     def samples(self, times: Sequence[float]) -> list[Frame]:
         """The first frames at or after some rising times; fewer where the video has ended.
