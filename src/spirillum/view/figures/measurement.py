@@ -124,7 +124,8 @@ def trials_figure(measurement: Measurement) -> Figure:
         reach = np.array([[item.value - item.low for item in items], [item.high - item.value for item in items]])
         reach = np.where(np.isfinite(reach), reach, 0.0) / scale.factor
         axes.errorbar(at, scale(values), yerr=reach, fmt="o", color=COLOURS["blue"], markersize=3.0, capsize=2.5)
-        axes.set_title(f"{name.replace('_', ' ')}, {scale.unit}", fontsize=8.0)
+        first, _, rest = name.partition("_")
+        axes.set_title(f"{first}\n{rest.replace('_', ' ')}, {scale.unit}", fontsize=8.0)
         axes.set_xlim(0.4, len(items) + 0.6)
         axes.set_xticks(at if len(items) <= 8 else [1.0, float(len(items))])
         axes.yaxis.set_major_locator(MaxNLocator(5))
