@@ -5,11 +5,13 @@ Kernels assign and multiply element by element: slices of arrays and `@` take se
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import wraps
+from functools import cache, wraps
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -27,12 +29,26 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled(function: _F) -> _F:
-    """Compile a function of numbers and arrays; its machine code is kept on disk for the next process."""
+    """Compile a function of numbers and arrays; its machine code is kept on disk for the next process.
+
+    What is kept is used again only while no file beside the function's own has changed.
+    """
     try:
         kernel: Any = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+        # Numba looks at the function's own file alone, but its machine code holds what it takes from others.
+        kernel._cache._cache_file._source_stamp = _digest_of(Path(function.__code__.co_filename).parent)  # noqa: SLF001
     except RuntimeError:  # no folder to keep the machine code in: it is compiled again in every process
         kernel = numba.njit(nogil=True, error_model="numpy")(function)
     return cast("_F", kernel)
+
+
+@cache
+def _digest_of(folder: Path) -> bytes:
+    """Digest of the Python files in a folder."""
+    found = hashlib.sha256()
+    for path in sorted(folder.glob("*.py")):
+        found.update(path.read_bytes())
+    return found.digest()
 
 
 def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
