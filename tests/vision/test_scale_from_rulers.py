@@ -169,4 +169,4 @@ def test_what_stands_still_is_the_mean_of_the_middle_half(count: int) -> None:
     images = list(np.random.default_rng(count).integers(0, 256, (count, 37, 5, 3), dtype=np.uint8))
     ordered = np.sort(np.stack(images), axis=0)
     middle = ordered[count // 4 : count - count // 4]
-    assert np.array_equal(still_picture(images), middle.mean(axis=0))
+    assert np.array_equal(still_picture(images), middle.mean(axis=0).astype(np.float32))

@@ -32,6 +32,8 @@ _ROLLS = tuple(math.radians(sign * angle) for angle in (7.0, 14.0, 21.0, 28.0, 3
 """Rolls of the camera that are tried where no ruler lies as it should, rad."""
 _UPRIGHT = math.radians(6.0)
 """Roll up to which lines are taken as they were found, rad; beyond it they are taken along the channel."""
+_MOST_ROWS = 500
+"""About as many rows tell the distance of the lines in large pictures."""
 _BAND = 16
 """Rows sorted at once, so that they stay in the cache."""
 
@@ -69,15 +71,16 @@ class Lines(NamedTuple):
 
 
 def still_picture(images: list[np.ndarray]) -> Samples:
-    """Static background of pictures: the interquartile mean of each pixel, 0 to 255, (h, w, 3)."""
-    pairs, quarter, still = _sorting(len(images)), len(images) // 4, np.empty(images[0].shape)
+    """Static background of pictures: the interquartile mean of each pixel, 0 to 255, (h, w, 3), in single precision."""
+    pairs, quarter = _sorting(len(images)), len(images) // 4
+    still: np.ndarray = np.empty(images[0].shape, dtype=np.float32)
     for low in range(0, len(still), _BAND):
         band = [image[low : low + _BAND] for image in images]
         for a, b in pairs:
             band[a], band[b] = np.minimum(band[a], band[b]), np.maximum(band[a], band[b])
         middle = band[quarter : len(band) - quarter]
         still[low : low + _BAND] = sum(middle, np.zeros(1, dtype=np.uint32)) / len(middle)
-    return still
+    return np.asarray(still)
 
 
 def _sorting(count: int) -> list[tuple[int, int]]:
@@ -109,7 +112,7 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
         turn: angle of the channel to the rows, positive downwards to the right, rad, to some degrees.
     """
     left, top, right, bottom = bounds
-    colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32)
+    colours: np.ndarray = picture[top:bottom, left:right].astype(np.float32, copy=False)
     back = None
     if turn:
         colours, back = _turned(colours, turn)
@@ -203,7 +206,8 @@ def _frequency(flat: Samples) -> float | None:
     """Spatial frequency of the clearest wave along the rows, lines per pixel; None without a clear peak."""
     width = flat.shape[1]
     length = 4 * 1 << int(np.ceil(np.log2(width)))
-    spectrum = np.fft.rfft(flat[::2] * np.hanning(width).astype(flat.dtype), length, axis=1)
+    rows = flat[:: max(2, len(flat) // _MOST_ROWS)]
+    spectrum = np.fft.rfft(rows * np.hanning(width).astype(flat.dtype), length, axis=1)
     power = spectrum.real**2 + spectrum.imag**2
     frequency = np.fft.rfftfreq(length)
     # A ruler's wave spans the whole width, so that its peak holds a large share of a row's power.

@@ -170,9 +170,11 @@ def _slopes(
     """
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
-    whole, background = (picture[top:bottom, left:right].astype(np.float32) for picture in (image, still))
+    whole, background = (
+        cv2.cvtColor(picture[top:bottom, left:right].astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
+        for picture in (image, still)
+    )
     part = whole - SEARCH.background_share * background
-    part = cv2.cvtColor(part, cv2.COLOR_RGB2GRAY)
     if factor > 1:
         size = max(1, part.shape[1] // factor), max(1, part.shape[0] // factor)
         part = cv2.resize(part[: size[1] * factor, : size[0] * factor], size, interpolation=cv2.INTER_AREA)

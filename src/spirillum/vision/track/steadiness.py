@@ -23,7 +23,8 @@ __all__ = ["View", "camera_flags", "shift_between", "shift_of", "view_of"]
 
 _STEPS, _STILL = 8, 0.01
 """Most Gauss-Newton steps, and the step below which they end, pixels."""
-_THREADS = 2
+_THREADS, _LARGE = 2, 6_000_000
+"""Threads, and the bytes of a picture from which on one has to do, for its memory."""
 
 
 class View(NamedTuple):
@@ -74,7 +75,7 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     ]
     if len(parts) < 2:
         return ()
-    with ThreadPoolExecutor(_THREADS) as pool:
+    with ThreadPoolExecutor(1 if frames[0].image.size > _LARGE else _THREADS) as pool:
         views = list(pool.map(lambda part: view_of([frames[k].image for k in part], start, ruled=ruled), parts))
         shifts = [0.0, *pool.map(lambda other: shift_of(views[0], other)[0], views[1:])]
     first = views[0].lines
@@ -148,7 +149,7 @@ def _flat(still: Samples, bounds: tuple[int, int, int, int], rows: tuple[int, in
     """High-pass filtered brightness; 0 in the rows of the robot."""
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
-    grey = cv2.cvtColor(still[top:bottom, left:right].astype(np.float32), cv2.COLOR_RGB2GRAY)
+    grey = cv2.cvtColor(still[top:bottom, left:right].astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
     flat = np.clip(grey / np.maximum(cv2.GaussianBlur(grey, (0, 0), 15.0), 1.0) - 1.0, -0.6, 0.6)
     flat = cv2.GaussianBlur(flat, (0, 0), 1.0)
     flat[max(0, rows[0] - top) : max(0, rows[1] - top)] = 0.0
