@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,8 +123,7 @@ def with_intervals(
         answer = run(one, kept[number])
         for name, values in found.items():
             values.append(float(answer[name]))
-    thinned = replace(posterior, discrepancy={name: tau[kept] for name, tau in posterior.discrepancy.items()})
-    off = drawn_discrepancy(thinned, {"advance": np.zeros(len(drawn))}, rng)
+    off = drawn_discrepancy(posterior.at(kept), {"advance": np.zeros(len(drawn))}, rng)
     if robot.drive is not None and robot.drive.joint == "fixed":
         off["turning"] = np.ones(len(drawn))
     if robot.drive is None or robot.drive.kind != "dc-motor":

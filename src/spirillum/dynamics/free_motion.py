@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from spirillum.arrays import Samples
 from spirillum.dynamics.averages import Stretch
 from spirillum.dynamics.integration import Progress, Reach
 from spirillum.dynamics.long_run import LongRun, long_run
@@ -22,9 +23,11 @@ from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
-from spirillum.dynamics.tube_start import check_in_table, check_roughness, laid_down
+from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
 from spirillum.errors import InputError
-from spirillum.fitted.calibration_file import calibrated_contact
+from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
+from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
 from spirillum.kernels.tube_table import contact_offset_of, largest_yaw
@@ -39,7 +42,7 @@ from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import Rates, swimming_of
 from spirillum.units import KINDS, parse_option, show
 
-__all__ = ["FreeMotion", "free_motion"]
+__all__ = ["FreeMotion", "Laid", "free_motion", "let_go", "means_over"]
 
 _SAMPLES = 240
 """Samples of a turn over which means are taken."""
@@ -47,6 +50,27 @@ _MOST_SAMPLES = 20_000
 _NOWHERE = Reach(nose=0.0, tip=0.0, channel=np.inf, middle=0.0, charge=np.inf)
 _LIGHT = 1e-9
 """Weight in the fluid, over the forces that act, below which a robot has none."""
+
+
+class Laid(NamedTuple):
+    """How a robot is laid down in its tube, and what drives and touches it there."""
+
+    table: TubeTable
+    """Its table."""
+    placement: Placement
+    """Where it is laid down, ends, and a constant flow."""
+    in_tube: InTube
+    """What is asked for of azimuth and dry friction."""
+    roughness: float | None
+    """Height of the asperities that is asked for, m; None: the fitted one, or 1e-4 of the body's radius."""
+    contact: FittedContact
+    """Roughness and dry friction of a calibration, or of a draw of its posterior."""
+    tail_rate: str | float | None
+    """Lab rate of the tail; None: the robot's drive decides."""
+    friction: str | None
+    """Reading of the friction; None: the robot's own."""
+    weight: bool
+    """Whether weight and buoyancy act."""
 
 
 class FreeMotion(NamedTuple):
@@ -60,6 +84,8 @@ class FreeMotion(NamedTuple):
     """What its rates follow from."""
     start_gap: float
     """Smallest distance of body and wall where it was laid down, m."""
+    laid: Laid
+    """How it was laid down."""
 
 
 def free_motion(
@@ -68,6 +94,7 @@ def free_motion(
     tail_rate: str | float | None = None,
     friction: str | None = None,
     calibration: str | Path | None = None,
+    posterior: PosteriorFile | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
     weight: bool = True,
     roughness: str | float | None = None,
@@ -82,6 +109,7 @@ def free_motion(
         tail_rate: lab rotation rate of the tail; None: the robot's drive decides.
         friction: reading of the friction; None: the robot's own.
         calibration: calibration file whose friction, roughness and coefficient of dry friction replace the robot's.
+        posterior: posterior of a calibration with `tube`, whose middle replaces the robot's values instead.
         placement: where it is laid down, the ends of the channel, and a constant flow.
         weight: let weight and buoyancy act, if the masses are known.
         roughness: height of the asperities, with its unit or a float in m; None: 1e-4 of the body's radius.
@@ -95,18 +123,22 @@ def free_motion(
     placed, asked = Placement.of(placement), InTube.of(in_tube)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
     _check(asked)
-    height, asked = with_contact(calibrated_contact(calibration), height, asked)
-    ready, _, batch = prepared(load(robot), "tube", calibration=calibration, placement=placed)
+    own = load(robot)
+    contact = calibrated_contact(calibration)
+    if posterior is not None:
+        own, contact = posterior.central(own), posterior.contact()
+        placed = posterior.placed(own, placed)
+    ready, _, batch = prepared(own, "tube", calibration=calibration, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(
             "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: `simulate`, or motion "
             "'held'"
         )
-    check_in_tube(ready, placed, asked, height)
+    rough, touching = with_contact(contact, height, asked)
+    check_in_tube(ready, placed, touching, rough)
     table = table_for(batch, progress=progress)
-    held = predict(ready, model="tube", tail_rate=tail_rate, friction=friction, placement=placed, band=False)
-    links, start = links_in_tube(held, table, placed, asked, height, weight=weight)
-    links = _driven(links, held, prescribed=tail_rate is not None)
+    laid = Laid(table, placed, asked, height, contact, tail_rate, friction, weight)
+    held, links, start = let_go(ready, laid)
     state = laid_down(ready, links, start)
     check_roughness(links.roughness, float(links.gaps(state).min()))
     check_in_table(links, state, observed_at(links, state)[kernel.OUTSIDE])
@@ -118,12 +150,27 @@ def free_motion(
     tell = progress or (lambda _what, _done, _total: None)
     sign = float(np.sign(held.tail_rotation_rate))
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
-    swimming = _means(held, links, run, prescribed=tail_rate is not None)
+    swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
     warnings = (*held.warnings, *_said(run, links, weight=weight))
     known = run.lying.state in ("steady", "orbits") and not _yawed_beyond_check(run, links)
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
-    return FreeMotion(found, run, links, gap)
+    return FreeMotion(found, run, links, gap, laid)
+
+
+def let_go(robot: Robot, laid: Laid) -> tuple[Prediction, TubeRobot, StartPlace]:
+    """The robot held where it is laid down, what its rates follow from with its drive on, and that place.
+
+    Args:
+        robot: the robot.
+        laid: how it is laid down.
+    """
+    rough, touching = with_contact(laid.contact, laid.roughness, laid.in_tube)
+    held = predict(
+        robot, model="tube", tail_rate=laid.tail_rate, friction=laid.friction, placement=laid.placement, band=False
+    )
+    links, start = links_in_tube(held, laid.table, laid.placement, touching, rough, weight=laid.weight)
+    return held, _driven(links, held), start
 
 
 def _check(asked: InTube) -> None:
@@ -139,10 +186,10 @@ def _check(asked: InTube) -> None:
             )
 
 
-def _driven(links: TubeRobot, held: Prediction, *, prescribed: bool) -> TubeRobot:
+def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
     """The robot with its drive on, or with its tail at the rate that was asked for."""
     drive = held.robot.drive
-    if not prescribed:
+    if held.tail_rate is None:
         return links.at_duty(1.0 if drive is None else drive.duty)
     changed = links.drive.copy()
     changed[rigid_links.KIND], changed[rigid_links.DUTY] = rigid_links.RATE, 1.0
@@ -180,15 +227,23 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     return found
 
 
-def _means(held: Prediction, links: TubeRobot, run: LongRun, *, prescribed: bool) -> Swimming:
-    """Means over the last turn, or going around, over the last circuit."""
-    samples = min(int(np.ceil(run.time / run.turn.time)) * _SAMPLES, _MOST_SAMPLES)
-    time = np.linspace(0.0, run.time, samples + 1)
+def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:
+    """Means of a motion over a time.
+
+    Args:
+        held: the robot where it was laid down.
+        links: what its rates follow from.
+        state: at the start, (19,).
+        time: over which means are taken, s.
+        turns: of the tail in that time.
+    """
+    samples = min(turns * _SAMPLES, _MOST_SAMPLES)
+    moments = np.linspace(0.0, time, samples + 1)
     duty = float(links.drive[rigid_links.DUTY])
-    start = run.start.copy()
+    start = state.copy()
     start[[rigid_links.POSITION, rigid_links.ROLL]] = 0.0
     start[rigid_links.CURRENT + 1 :] = 0.0
-    followed = integrate_in_tube(links, start, time, [Switch(0.0, duty)], _NOWHERE)
+    followed = integrate_in_tube(links, start, moments, [Switch(0.0, duty)], _NOWHERE)
     more = {"mean_flow": followed.observed[:, kernel.MEAN_FLOW]}
     series = dataset_of(held, links, followed, [Stretch(0.0, float(followed.time[-1]))], more, {})
 
@@ -201,7 +256,7 @@ def _means(held: Prediction, links: TubeRobot, run: LongRun, *, prescribed: bool
     current, effective, residual = held.motor_current, held.effective_friction, np.nan
     motor = held.batch.electrics
     if motor is not None and held.batch.drive == "dc-motor":
-        if prescribed:
+        if held.tail_rate is not None:
             slip = tail - body
             current = float(current_at(motor, np.array([slip]))[0])
             spare = float(motor.joint_torque_constant[0]) * current - load_torque
@@ -219,7 +274,7 @@ def _means(held: Prediction, links: TubeRobot, run: LongRun, *, prescribed: bool
         "drive": load_torque,
         "shaft": mean("shaft_power"),
         "friction": effective * (tail - body) ** 2
-        if prescribed and held.friction == "rotor"
+        if held.tail_rate is not None and held.friction == "rotor"
         else mean("friction_power"),
         "dissipated": mean("dissipated_power"),
         "current": current,

@@ -19,13 +19,13 @@ from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.swimming.lying import Lying, State
 
-__all__ = ["LongRun", "Path", "long_run"]
+__all__ = ["STABLE", "LongRun", "Path", "long_run"]
 
 _MOST_TURNS = 300
 """Turns that are followed at most."""
 _BLOCK = 30
 """Turns between two searches for the place that a turn brings back."""
-_STABLE = 1.0 + 1e-4
+STABLE = 1.0 + 1e-4
 """Largest multiplier of a motion that stays where it is."""
 _PLACES = {name: place for place, name in enumerate(STEPS)}
 
@@ -126,10 +126,10 @@ def long_run(
         if path.turns % _BLOCK == 0 and not waiting:
             progress("free motion in the tube: its steady place", path.turns, _MOST_TURNS)
             found = fixed_place(turns, state, heavy=heavy)
-            if found is not None and np.all(np.abs(found.multipliers) < _STABLE):
+            if found is not None and np.all(np.abs(found.multipliers) < STABLE):
                 progress("free motion in the tube", _MOST_TURNS, _MOST_TURNS)
                 largest = float(np.abs(found.multipliers[0]))
-                slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - _STABLE else float("nan")
+                slow = float(-found.turn.time / np.log(largest)) if largest < 2.0 - STABLE else float("nan")
                 name: State = "steady" if heavy else "orbits"
                 return LongRun(path, found.turn, found.state, found.turn.time, _lying(name, found.turn, path, slow))
     if not ended:

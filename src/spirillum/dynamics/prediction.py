@@ -9,13 +9,16 @@ from typing import Any
 
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.warnings import fitted_of
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
+from spirillum.swimming.discrepancy import posterior_for_of
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
-from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 
 __all__ = ["predict"]
 
@@ -56,7 +59,8 @@ def predict(
         friction: reading of the friction, `none`, `rotor`, `body` or `paper`; None: the robot's own.
         calibrated: apply the robot's calibration factors for this model.
         calibration: calibration file whose values replace the robot's.
-        posterior: file of a calibration's posterior, for intervals.
+        posterior: file of a calibration's posterior, for intervals; in free motion in the tube 40 of its draws are
+            followed to their steady motions, in some second each.
         posterior_for: whose intervals: `new` or `measured`.
         resolution: of `slender` and `tube`: `accuracy`, `tolerance`, `phases`; not of free motion in the tube.
         placement: where in the channel the robot lies, or is laid down.
@@ -72,7 +76,12 @@ def predict(
         InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a
             turn.
     """
-    choice = _free_in_tube(robot, model, motion, placement, calibration, posterior)
+    known = None
+    if posterior is not None and motion == "free" and model in ("tube", AUTO):
+        if calibration is not None or not calibrated:
+            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+        known = read_posterior(posterior, *([] if model == AUTO else [model]))
+    choice = _free_in_tube(robot, model, motion, placement, calibration, known)
     if choice is None:
         asked = InTube.of(in_tube)
         given = {
@@ -103,8 +112,7 @@ def predict(
         if not beyond_stokes:
             _check_stokes(answer)
         return answer
-    if posterior is not None:
-        raise InputError("posterior with model 'tube' and motion 'free'; allowed: motion 'held'")
+    whose = posterior_for_of(posterior_for, known, load(robot))
     check_not_resolved(load(robot), resolution)
     if band:
         raise InputError(
@@ -117,12 +125,25 @@ def predict(
         tail_rate=tail_rate,
         friction=friction,
         calibration=calibration,
+        posterior=known,
         placement=placement,
         roughness=roughness,
         in_tube=in_tube,
         progress=progress,
     )
-    return replace(found.prediction, choice=choice)
+    answer = replace(found.prediction, choice=choice)
+    if known is None:
+        return answer
+    from spirillum.dynamics.free_draws import intervals_of_free_motion
+
+    intervals = intervals_of_free_motion(found, known, posterior_for=whose, progress=progress)
+    return replace(
+        answer,
+        swimming=with_middles(answer.swimming, intervals) if whose == "measured" else answer.swimming,
+        intervals=intervals,
+        interval_of=interval_statement(known, answer.robot, whose),
+        warnings=(*answer.warnings, *fitted_of(None, known).run_warnings(answer.robot, answer.model, answer.friction)),
+    )
 
 
 def _check_stokes(answer: Prediction) -> None:
@@ -146,15 +167,15 @@ def _free_in_tube(
     motion: str,
     placement: Placement | Mapping[str, Any] | None,
     calibration: str | Path | None,
-    posterior: str | Path | None,
+    posterior: PosteriorFile | None,
 ) -> ModelChoice | None:
     """Why the robot is followed in its tube; None where model and motion ask for something else."""
     if motion != "free" or model not in ("tube", AUTO):
         return None
     if model == "tube":
         return ModelChoice("tube")
-    if posterior is not None:  # its model decides
-        return None
     where = Placement.of(placement)
-    choice = choose_model(AUTO, load(robot), placement=where, calibration=calibration, motion="free")
+    choice = choose_model(
+        AUTO, load(robot), placement=where, calibration=calibration, posterior=posterior, motion="free"
+    )
     return choice if choice.model == "tube" else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -169,6 +169,14 @@ class PosteriorFile:
         """
         draws = self.of(robot, rng)
         return [self._at({name: float(values[n]) for name, values in draws.items()}, robot) for n in self.places(count)]
+
+    def at(self, places: Sequence[int]) -> PosteriorFile:
+        """The posterior with some of its draws, by their numbers."""
+        kept = list(places)
+        draws, discrepancy, error = (
+            {name: values[kept] for name, values in part.items()} for part in (self.draws, self.discrepancy, self.error)
+        )
+        return replace(self, draws=draws, discrepancy=discrepancy, error=error)
 
     def places(self, count: int) -> list[int]:
         """Places of some draws, evenly among them."""

@@ -31,7 +31,7 @@ from spirillum.swimming.dry_friction import KnownResistance, swim_on_floor
 from spirillum.swimming.motor import battery_voltage, run_time, steady_current
 from spirillum.swimming.steady import friction_reading
 
-__all__ = ["drawn_kinematics", "intervals_of"]
+__all__ = ["drawn_batch", "drawn_kinematics", "intervals_of", "intervals_over"]
 
 _ELECTRIC = ("torque_constant", "back_emf_constant")
 _WIRE_POINTS = 7
@@ -68,13 +68,41 @@ def intervals_of(
     rates = None if tail_rate is None else np.full(size, tail_rate)
     coefficient = draws.get("friction_coefficient") if model.placed else None
     swum = swim_on_floor(batch, drawn, [robot], coefficient, tail_rate=rates, friction=friction)
+    return intervals_over(
+        swum, batch, posterior, robot, rng, own_drive=tail_rate is None, friction=friction, posterior_for=posterior_for
+    )
+
+
+def intervals_over(
+    swum: Swimming,
+    batch: RobotBatch,
+    posterior: PosteriorFile,
+    robot: Robot,
+    rng: np.random.Generator,
+    *,
+    own_drive: bool,
+    friction: str,
+    posterior_for: PosteriorFor,
+) -> Intervals:
+    """Limits of 95 % intervals over the motions of draws, with the model's discrepancy.
+
+    Args:
+        swum: the motion of every draw.
+        batch: the robot of every draw.
+        posterior: the draws.
+        robot: the robot.
+        rng: source of chance.
+        own_drive: whether the robot's drive turns its tail, at no prescribed rate.
+        friction: reading of the friction.
+        posterior_for: whose discrepancy they hold: of a `new` tail, or of this one, which was `measured`.
+    """
     predicted = {
         "advance": swum.advance_per_radian,
         "turning": swum.body_rotation_rate / swum.tail_rotation_rate,
         "motor_rate": swum.motor_rotation_rate,
     }
     off = drawn_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
-    values = _with_discrepancy(swum, batch, off, own_drive=tail_rate is None, friction=friction)
+    values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction)
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL, 0.5]
     limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
     nan = float("nan")
@@ -112,8 +140,15 @@ def _known(column: Samples) -> bool:
     return bool(np.ptp(known) > 1e-9 * np.max(np.abs(known)))
 
 
-def _drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
-    """A robot for each draw."""
+def drawn_batch(robot: Robot, model: str, draws: Mapping[str, Samples], size: int) -> RobotBatch:
+    """A robot for each draw.
+
+    Args:
+        robot: the robot.
+        model: name of the model that was fitted.
+        draws: parameter to (draws,).
+        size: number of draws.
+    """
     one = np.ones(size)
     columns: dict[str, np.ndarray] = {}
     own = robot.friction.effective
@@ -151,7 +186,7 @@ def _drawn(
     Raises:
         InputError: for draws of the place of a robot without a table.
     """
-    batch = _drawn_batch(robot, posterior.model, draws, posterior.count)
+    batch = drawn_batch(robot, posterior.model, draws, posterior.count)
     columns = {name: values[:, None] for name, values in draws.items()}
     if not model.placed:
         return batch, KnownResistance(model, _table(robot, model, draws).whole(columns)[:, 0])

@@ -37,7 +37,7 @@ from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Prediction", "predict"]
+__all__ = ["Prediction", "interval_statement", "predict", "with_middles"]
 
 
 @dataclass(frozen=True)
@@ -268,8 +268,7 @@ def predict(
     over = band_of(batch, chosen, result, case.swim, tell) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
     if intervals is not None and whose == "measured":
-        middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
-        result = replace(result, **middles)
+        result = with_middles(result, intervals)
     warnings += case.fitted_warnings()
     return Prediction(
         robot=ready,
@@ -283,7 +282,7 @@ def predict(
         intervals=intervals,
         band=over,
         motion=motion_of(motion),
-        interval_of=_interval_statement(drawn, ready, whose),
+        interval_of=interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
     )
@@ -363,8 +362,25 @@ class _Case:
         return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
 
 
-def _interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: PosteriorFor) -> str:
-    """Whose intervals they are, in half a sentence; empty without a posterior."""
+def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:
+    """The steady motion with the medians of intervals where they are known.
+
+    Args:
+        swum: of one robot.
+        intervals: over the draws of a posterior.
+    """
+    middles = {name: np.array([middle]) for name, middle in intervals.middle.items() if np.isfinite(middle)}
+    return replace(swum, **middles)
+
+
+def interval_statement(posterior: PosteriorFile | None, robot: Robot, whose: PosteriorFor) -> str:
+    """Whose intervals they are, in half a sentence; empty without a posterior.
+
+    Args:
+        posterior: the posterior; None without one.
+        robot: the robot.
+        whose: whose discrepancy the intervals hold.
+    """
     if posterior is None:
         return ""
     if whose == "measured":
