@@ -22,7 +22,6 @@ __all__ = [
     "two_parts_axial",
 ]
 
-_AXIAL = np.array([0, 3])
 _AXIAL_BOTH = np.array([0, 3, 6, 9])
 
 
