@@ -64,7 +64,8 @@ class LeastSquares:
     error: dict[Quantity, float]
     """Relative error of one trial; NaN without repeated trials."""
     chi2: float
-    """Sum of squared residuals with the trials' errors alone; NaN where they are neither seen nor stated."""
+    """Sum of squared residuals of the fit without discrepancy, over the errors of trials and their floor; NaN where
+    trials' errors are neither seen nor stated."""
     freedom: int
     """Observed means less free numbers."""
     left: dict[Quantity, float]
@@ -111,7 +112,7 @@ def standard_errors(
 
 
 def _noise(problem: Problem, name: Quantity, error: float) -> Samples:
-    """Square of each mean's error by its trials alone, and by what no mean is known better than."""
+    """Variance of each mean: that of its trials, and the floor `LEAST_ERROR`."""
     ratio = problem.ratio(name)
     floor = max(LEAST_ERROR, problem.interpolation_error) * ratio.scale
     found: Samples = ratio.error_of_mean(error) ** 2 + floor**2

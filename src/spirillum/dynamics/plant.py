@@ -48,8 +48,6 @@ from spirillum.units import KINDS, parse_option
 
 __all__ = ["Moment", "Plant", "PlantState", "uninterrupted"]
 
-_AT_ONCE = 1e-9
-"""A time in which nothing moves, s."""
 _LONGEST = 1e6
 """The longest step, s."""
 _TURN = 2.0 * np.pi
@@ -309,9 +307,8 @@ class Plant:
             tube.observe(time, state, self._links.at_duty(now.duty).data, self._links.table, observed)
             last = Checkpoint(0.0, 0.0, ())
             return self._moment(TubeTrajectory(time, np.full(1, now.duty), state, observed, (), last))
-        times = np.array([now.time, now.time + _AT_ONCE])
         switches = [Switch(now.time, now.duty)]
-        return self._moment(integrate(self._links.at_duty(now.duty), state[0], times, switches, self._reach))
+        return self._moment(integrate(self._links, state[0], np.array([now.time]), switches, self._reach))
 
     def impose_flow(self, velocity: float | None) -> None:
         """From now on another mean flow is imposed.

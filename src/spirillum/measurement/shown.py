@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 from spirillum.units import for_people, shown_in
 
-__all__ = ["StudyView", "shown"]
+__all__ = ["ShownNumber", "shown"]
 
 _MOST_DIGITS = 7
 """Digits of a value at most, however narrow its interval is."""
 _MOST_DECIMALS = 9
 
 
-class StudyView(NamedTuple):
+class ShownNumber(NamedTuple):
     """A number with its interval as texts; ``-`` for what is not there."""
 
     value: str
@@ -27,7 +27,7 @@ class StudyView(NamedTuple):
     """Unit of all three; empty where there is no value."""
 
 
-def shown(value: float | None, low: float | None, high: float | None, unit: str) -> StudyView:
+def shown(value: float | None, low: float | None, high: float | None, unit: str) -> ShownNumber:
     """A number down to the second digit of its interval's half width, and the interval's ends likewise.
 
     Args:
@@ -37,15 +37,15 @@ def shown(value: float | None, low: float | None, high: float | None, unit: str)
         unit: SI unit.
     """
     if value is None or not math.isfinite(value):
-        return StudyView("-", "-", "-", "")
+        return ShownNumber("-", "-", "-", "")
     read = for_people(unit)
     number = shown_in(value, read)
     if low is None or high is None or not math.isfinite(low):
-        return StudyView(f"{number:.4g}", "-", "-", read)
+        return ShownNumber(f"{number:.4g}", "-", "-", read)
     ends = [shown_in(low, read), shown_in(high, read)]
     decimals = _decimals(number, 0.5 * (ends[1] - ends[0]))
     texts = [f"{round(item, decimals) + 0.0:.{decimals}f}" for item in (number, *ends)]  # + 0.0: no minus zero
-    return StudyView(texts[0], texts[1], texts[2], read)
+    return ShownNumber(texts[0], texts[1], texts[2], read)
 
 
 def _decimals(value: float, half_width: float) -> int:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["study", "study_answer"]
 
-_RESULTS = ("dataset.nc", "figures", "report.html", "claims.json")
+_RESULTS = ("dataset.nc", "figures", "report.html", "claims.json", "ranking.csv")
 """What a folder without the mark of a study may not hold, for it would be replaced."""
 
 
@@ -53,7 +53,8 @@ def study(
     Args:
         source: study file (see `spirillum schema study`) or its tables; None: the paper's study.
         observations: observations file; the study then also runs at the observed rates and infers B_eff.
-        output: folder for `dataset.nc`, `figures/`, `report.html` and `claims.json`; a rerun resumes there.
+        output: folder for `dataset.nc`, `figures/`, `report.html`, `claims.json` and `ranking.csv`; a rerun resumes
+            there.
             None: nothing is written.
         overrides: dotted robot fields, applied to every robot (``{"tail.taper": "none"}``).
         models: hydrodynamic models instead of the study's; None: the study's.

@@ -1,4 +1,4 @@
-"""Write a study's figures, `claims.json` and `report.html`, each whole or not at all."""
+"""Write a study's figures, `claims.json`, `ranking.csv` and `report.html`, each whole or not at all."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LARGEST_SVG = 2_000_000
 
 
 def write_report(dataset: xr.Dataset, folder: Path, tell: Callable[[str, int, int], None]) -> None:
-    """Write `figures/` (PNG and SVG), `claims.json` and a self-contained `report.html`.
+    """Write `figures/` (PNG and SVG), `claims.json`, `ranking.csv` and a self-contained `report.html`.
 
     Args:
         dataset: what `spirillum.study` returns.

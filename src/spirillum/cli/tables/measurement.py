@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
-from spirillum.measurement.shown import StudyView, shown
+from spirillum.measurement.shown import ShownNumber, shown
 from spirillum.measurement.trials import MEASURED, RATE_NAMES
 
 __all__ = ["table"]
@@ -60,5 +60,5 @@ def _show_trials(answer: Answer, console: Console) -> None:
     console.print(table)
 
 
-def _numbers(item: Answer) -> StudyView:
+def _numbers(item: Answer) -> ShownNumber:
     return shown(item["value"], item.get("low"), item.get("high"), item["unit"])

@@ -301,7 +301,7 @@ def _robots_picture(shown: StudyView) -> Picture:
     notes = list(dict.fromkeys(row.tells for row in rows if row.tells))
     notes.append(shown.unanswered())
     if len(places) < count:
-        notes.append(f"StudyView: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
+        notes.append(f"Shown: {len(places)} of {count} robots, evenly spread; the dataset holds all.")
     notes = [note for note in notes if note]
     what = "; ".join(" ".join(row.label.split("\n")[:1]) for row in rows)
     alternative = f"{len(rows)} panels with a point for each of {len(places)} robots: {what}. {shown.source_line}"
