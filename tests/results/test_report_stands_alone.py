@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
-from spirillum.papers.biorob2012.evidence import Claim
+from spirillum.papers.claim import Claim
 from spirillum.results.study_content import FRICTION_MEANINGS
 from spirillum.results.study_report import write_report
 from spirillum.robot.actuation import FrictionReading

@@ -6,7 +6,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.papers.biorob2012.claims import evaluated
-from spirillum.papers.biorob2012.evidence import Claim
+from spirillum.papers.claim import Claim
 from spirillum.papers.registry import claims_of
 
 

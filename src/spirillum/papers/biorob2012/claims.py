@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from spirillum.papers.biorob2012 import claims_geometry, claims_predicted, claims_swimming
-from spirillum.papers.biorob2012.evidence import Claim, Evidence
+from spirillum.papers.biorob2012.evidence import Evidence
+from spirillum.papers.claim import Claim
 
 if TYPE_CHECKING:
     import xarray as xr

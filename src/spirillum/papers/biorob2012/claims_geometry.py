@@ -8,7 +8,8 @@ import numpy as np
 
 from spirillum.fluid.closed.thin_wire import EXACT_EPS_CONSTANT, PRINTED_EPS_CONSTANT
 from spirillum.papers.biorob2012.constants import FRAME_RATE, NARROWER, ROBOT_LENGTH
-from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict
+from spirillum.papers.biorob2012.evidence import NO_RATES, Evidence
+from spirillum.papers.claim import Claim, Verdict
 from spirillum.robot.load import load
 from spirillum.units import Hz
 

@@ -15,8 +15,9 @@ from spirillum.papers.biorob2012.constants import (
     LARGEST_REYNOLDS,
     VELOCITY_DROPS,
 )
-from spirillum.papers.biorob2012.evidence import Claim, Evidence, PredictedVerdict
+from spirillum.papers.biorob2012.evidence import Evidence
 from spirillum.papers.biorob2012.readings import Judgement, Readings
+from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.studies.laid_down import INFERRED_BY
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label

@@ -14,7 +14,8 @@ from spirillum.papers.biorob2012.constants import (
     LOW_REYNOLDS,
     VELOCITY_DROPS,
 )
-from spirillum.papers.biorob2012.evidence import NO_RATES, Claim, Evidence, Verdict, fraction_between, in_hertz
+from spirillum.papers.biorob2012.evidence import NO_RATES, Evidence, fraction_between, in_hertz
+from spirillum.papers.claim import Claim, Verdict
 from spirillum.units import Hz
 from spirillum.view.figures.style import label_of_model as label
 

@@ -1,4 +1,4 @@
-"""What a study says about the paper's quantitative statements: the evidence, and the form of a verdict.
+"""What a study says about the paper's quantitative statements.
 
 The paper's data points are lost, and with them the tails' rates. A statement is judged only where it follows
 for any rates, from the geometry, or from an observations file; else it is undecidable, and the reason says
@@ -8,8 +8,7 @@ what was computed instead.
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,29 +22,9 @@ from spirillum.units import Hz
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NO_RATES", "Claim", "Evidence", "PredictedVerdict", "Verdict", "fraction_between", "in_hertz"]
-
-Verdict = Literal["agrees", "disagrees", "undecidable"]
-
-PredictedVerdict = Literal["predicted-agrees", "predicted-disagrees", "depends"]
-"""Of a third kind: what robots that are laid down and let go would do, with nothing fitted or observed."""
+__all__ = ["NO_RATES", "Evidence", "fraction_between", "in_hertz"]
 
 NO_RATES = "the observed rates are lost; give an observations file to decide"
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A statement of the paper and what became of it."""
-
-    claim: str
-    paper: str
-    computed: str
-    verdict: Verdict | PredictedVerdict
-    reason: str
-
-    def to_dict(self) -> dict[str, str]:
-        """The entry of `claims.json`."""
-        return asdict(self)
 
 
 class Evidence:

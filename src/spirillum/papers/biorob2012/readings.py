@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from spirillum.arrays import Flags, Values
-from spirillum.papers.biorob2012.evidence import Claim, Evidence, PredictedVerdict
+from spirillum.papers.biorob2012.evidence import Evidence
+from spirillum.papers.claim import Claim, PredictedVerdict
 from spirillum.studies.factorial import main_effects
 from spirillum.studies.laid_down import READ, WINDOWS, levels_of_readings
 from spirillum.units import show

@@ -1,0 +1,28 @@
+"""A statement of a paper and its verdict."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+__all__ = ["Claim", "PredictedVerdict", "Verdict"]
+
+Verdict = Literal["agrees", "disagrees", "undecidable"]
+
+PredictedVerdict = Literal["predicted-agrees", "predicted-disagrees", "depends"]
+"""Of a third kind: what robots that are laid down and let go would do, with nothing fitted or observed."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and what became of it."""
+
+    claim: str
+    paper: str
+    computed: str
+    verdict: Verdict | PredictedVerdict
+    reason: str
+
+    def to_dict(self) -> dict[str, str]:
+        """The entry of `claims.json`."""
+        return asdict(self)
