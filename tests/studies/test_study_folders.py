@@ -80,12 +80,13 @@ def test_folder_of_another_study_is_refused(small: dict[str, object], tmp_path: 
     assert (tmp_path / "out" / "dataset.nc").read_bytes() == before
 
 
-def test_results_of_unknown_origin_are_not_overwritten(small: dict[str, object], tmp_path: Path) -> None:
-    (tmp_path / "dataset.nc").write_text("precious")
+@pytest.mark.parametrize("name", ["dataset.nc", "ranking.csv"])
+def test_results_of_unknown_origin_are_not_overwritten(small: dict[str, object], tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("precious")
     with pytest.raises(sp.InputError, match="unknown origin"):
         sp.study(small, output=tmp_path)
-    assert (tmp_path / "dataset.nc").read_text() == "precious"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["dataset.nc"]
+    assert (tmp_path / name).read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == [name]
 
 
 def test_damaged_mark_and_file_in_place_of_a_folder_are_refused(small: dict[str, object], tmp_path: Path) -> None:
