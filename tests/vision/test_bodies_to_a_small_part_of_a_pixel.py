@@ -79,7 +79,7 @@ def test_the_robot_is_found_without_a_hint_and_its_place_is_no_place_without_it(
     film, pictures = frames
     body = BodyFinder(film.robot, AIR, (0, 0, 320, 240))
     still = np.full((240, 320, 3), 0.0)
-    best, *others = candidates(pictures[0], still, body)
+    best, *others = candidates(pictures[0], still, body.shape())
     assert (best.pose.x, best.pose.y) == pytest.approx((0.01, 0.003), abs=2.5e-3)
     assert best.score > 1.5 * others[0].score
     truth = film.truth(film.times)

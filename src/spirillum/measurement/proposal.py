@@ -341,5 +341,6 @@ def _warnings(video: Video, found: Scouted, findings: tuple[Finding, ...], spaci
                 f"spacing = {1e3 * spacing:.4g} mm does not fit: by the robot's size the lines are {1e3 * apart:.2g} "
                 "mm apart, or a tenth more where the ruler lies below it; check the spacing, or the robot file"
             )
-    flags = camera_flags(found.frames, found.known.start, ruled=lines is not None)
+    frames = [frame.small(found.reduction) for frame in found.frames]
+    flags = camera_flags(frames, found.known.start, ruled=lines is not None)
     yield from (flag.sentence for flag in (*flags, *found.known.wire.flags))

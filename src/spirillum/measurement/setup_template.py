@@ -172,7 +172,8 @@ def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tupl
     learnt = learnt_from(video, frames, setup, robot, folder)
     start, known = learnt.known.start, learnt.known
     scale, size_flags = checked_scale(learnt.sight.scale, start.body, known.size, setup.markers.spacing)
-    moved = camera_flags(frames, start, ruled=setup.markers.spacing is not None)
+    few = [frame.small(learnt.sight.reduction) for frame in frames]
+    moved = camera_flags(few, start, ruled=setup.markers.spacing is not None)
     seen = {
         "name": video.name,
         "frames": len(frames),

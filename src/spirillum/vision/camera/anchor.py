@@ -19,6 +19,7 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.robust import mad_scale
 from spirillum.vision.video.frames import Frame
+from spirillum.vision.video.pictures import reduced, reduction
 
 __all__ = ["Anchor", "Pose", "Steadied", "steadied", "sways"]
 
@@ -26,7 +27,7 @@ _COARSE = 160
 """Width of the reduced picture whose coarse structure is compared, pixels."""
 _REACH = 10
 """Largest shift that is looked for there, pixels."""
-_BLUR = 32.0
+_BLUR = 24.0
 """Standard deviation of the widest blur, pixels; wider ones are made on a reduced picture, as they take long."""
 _SWAYS = 0.15
 """Scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels."""
@@ -121,7 +122,7 @@ class Steadied(NamedTuple):
     """How a camera swayed during a film."""
 
     anchor: Anchor
-    """The first picture."""
+    """The first picture, reduced where it is large."""
     times: Samples
     """Times of the frames, s, (n,)."""
     poses: Samples
@@ -142,9 +143,10 @@ def sways(frames: Sequence[Frame]) -> bool:
     Args:
         frames: frames spread over a film.
     """
-    anchor = Anchor(_flat(frames[0].image))
-    poses = np.array([anchor.pose(_flat(frame.image), Pose(0.0, 0.0, 0.0)) for frame in frames])
-    down, turned = poses[:, 1], 0.5 * frames[0].image.shape[1] * poses[:, 2]
+    flats = (_flat(frame.reduced(_reduction(frame))) for frame in frames)
+    anchor = Anchor(next(flats))
+    poses = np.array([Pose(0.0, 0.0, 0.0), *(anchor.pose(flat, Pose(0.0, 0.0, 0.0)) for flat in flats)])
+    down, turned = poses[:, 1], 0.5 * anchor.flat.shape[1] * poses[:, 2]
     return max(float(mad_scale(values - np.median(values))) for values in (down, turned)) > _SWAYS
 
 
@@ -158,8 +160,10 @@ def steadied(frames: Iterable[Frame]) -> Steadied:
     before: Samples = np.empty((0, 0, 0))
     times, poses = [], []
     pose = Pose(0.0, 0.0, 0.0)
+    factor = 1
     for frame in frames:
-        flat = _flat(frame.image)
+        factor = _reduction(frame)
+        flat = _flat(reduced(frame.image, factor))
         now = _texture(flat)
         if anchor is None:
             anchor = Anchor(flat)
@@ -170,7 +174,12 @@ def steadied(frames: Iterable[Frame]) -> Steadied:
         times.append(frame.time)
         poses.append(pose)
     assert anchor is not None  # noqa: S101 - a film has a frame
-    return Steadied(anchor, np.array(times), np.array(poses))
+    return Steadied(anchor, np.array(times), np.array(poses) * np.array([factor, factor, 1.0]))
+
+
+def _reduction(frame: Frame) -> int:
+    """Factor by which a frame is reduced before it is registered."""
+    return reduction((frame.image.shape[1], frame.image.shape[0]))
 
 
 def _matrix(pose: Pose, size: tuple[int, int]) -> Samples:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,13 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.vision.camera.checkerboard import lens_of
 from spirillum.vision.camera.optics import DIRECTIONS
-from spirillum.vision.camera.ruler import ruler_in, still_picture
+from spirillum.vision.camera.ruler import Lines, resolved, ruler_in, still_picture
 from spirillum.vision.camera.scale import Sight, fitted_camera, given_camera
 from spirillum.vision.setup import Setup
 from spirillum.vision.video.frames import Frame, Video, open_video
+from spirillum.vision.video.pictures import reduction
 
-__all__ = ["bounds_of", "opened", "samples_of", "scale_of", "sight_of"]
+__all__ = ["background", "bounds_of", "opened", "ruler_of", "samples_of", "scale_of", "sight_of"]
 
 _SAMPLES = 24
 """Frames from which scale and appearance are learnt."""
@@ -38,7 +40,7 @@ def scale_of(video: str | Path | Video, setup: Setup, *, folder: Path | None = N
     """
     video = opened(video, setup)
     frames = samples_of(video, setup.start, setup.end)
-    return sight_of(video, setup, still_picture([frame.image for frame in frames]), folder), video
+    return sight_of(video, setup, background(frames, reduction(video.size)), folder, frames), video
 
 
 def opened(video: str | Path | Video, setup: Setup) -> Video:
@@ -89,21 +91,56 @@ def bounds_of(setup: Setup, video: Video) -> tuple[int, int, int, int]:
     return region.left, region.top, right, bottom
 
 
-def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) -> Sight:
-    """The calibrated camera of a video, from its static background `still`, (h, w, 3).
+def background(frames: Sequence[Frame], factor: int) -> Samples:
+    """The static background of some frames, reduced by a factor, (h, w, 3)."""
+    return still_picture([frame.reduced(factor) for frame in frames])
+
+
+def ruler_of(
+    still: Samples, bounds: tuple[int, int, int, int], turn: float, factor: int, frames: Sequence[Frame] = ()
+) -> tuple[Lines | None, int]:
+    """The ruler, in pixels of the full picture, and the factor by which pictures may be reduced that show it.
+
+    Args:
+        still: the background, (h, w, 3).
+        bounds: region of interest in the full picture: left, top, right, bottom.
+        turn: angle of the channel to the rows, positive downwards to the right, rad; off by up to 45 degrees.
+        factor: by which the background was reduced.
+        frames: of the video; where the ruler is too fine for the reduced background, they are looked at as they are.
+    """
+    left, top, right, bottom = (at // factor for at in bounds)
+    found = ruler_in(still, (left, top, right, bottom), turn)
+    if factor == 1 or not frames:
+        return found, factor
+    if found is not None and resolved(found.enlarged(factor), frames[0].image, factor):
+        return found.enlarged(factor), factor
+    found = ruler_in(background(frames, 1), bounds, turn)
+    return found, factor if found is None else 1
+
+
+def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None, frames: Sequence[Frame] = ()) -> Sight:
+    """The calibrated camera of a video.
+
+    Args:
+        video: the video, for its name and the size of its pictures.
+        setup: its setup.
+        still: its static background, (h, w, 3), or reduced by a whole factor.
+        folder: folder of the setup file, to which the checkerboard's folder is relative.
+        frames: of the video, where the background was reduced.
 
     Raises:
         InputError: if the setup has a ruler and none is found.
     """
+    factor = video.size[0] // still.shape[1]
     board = setup.camera.checkerboard
     lens = None if board is None else lens_of(board, Path() if folder is None else folder, video.size)
     if setup.markers.spacing is None:
-        return given_camera(setup, video.size, lens)
+        return given_camera(setup, video.size, lens)._replace(reduction=factor)
     bounds = bounds_of(setup, video)
-    lines = ruler_in(still, bounds, -DIRECTIONS[setup.robot.direction])
+    lines, factor = ruler_of(still, bounds, -DIRECTIONS[setup.robot.direction], factor, frames)
     if lines is None:
         side = setup.robot.direction
-        if ruler_in(still, bounds, 0.5 * np.pi - DIRECTIONS[side]) is not None:
+        if ruler_of(still, bounds, 0.5 * np.pi - DIRECTIONS[side], factor, frames)[0] is not None:
             across, other = ("columns", ("up", "down")) if side in ("right", "left") else ("rows", ("right", "left"))
             raise InputError(
                 f"robot.direction = '{side}', but {video.name} shows its ruler along the {across} of the picture; "
@@ -114,4 +151,4 @@ def sight_of(video: Video, setup: Setup, still: Samples, folder: Path | None) ->
             f"the nose points {side} within 45 degrees; allowed: a ruler, robot.direction as it is in the picture, or "
             "markers.length_per_pixel"
         )
-    return fitted_camera(setup, video.size, lines, lens)
+    return fitted_camera(setup, video.size, lines, lens)._replace(reduction=factor)

@@ -125,6 +125,18 @@ class Optics:
         ends = self.origin + np.array([[-step, 0.0, 0.0], [step, 0.0, 0.0]])
         return float(2.0 * step / np.linalg.norm(np.diff(self.pixels(ends), axis=0)))
 
+    def reduced(self, factor: int) -> Self:
+        """The camera as pictures show it whose blocks of `factor` by `factor` pixels are made one, from the upper left.
+
+        Args:
+            factor: a whole number.
+        """
+        if factor == 1:
+            return self
+        size = self.size[0] // factor, self.size[1] // factor
+        u, v = ((at - 0.5 * (factor - 1)) / factor for at in (self.middle if self.centre is None else self.centre))
+        return replace(self, size=size, focal=self.focal / factor, centre=(u, v))
+
     def moved(self, changes: Mapping[str, float]) -> Self:
         """A copy with changed parameters."""
         return replace(self, **changes)  # type: ignore[arg-type]

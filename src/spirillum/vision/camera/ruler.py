@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.extras import required
 
-__all__ = ["Lines", "lines_in", "ruler_in", "still_picture"]
+__all__ = ["Lines", "lines_in", "resolved", "ruler_in", "still_picture"]
 
 _SHORTEST = 3.0
 """Shortest resolved distance of lines, pixels."""
@@ -32,6 +32,9 @@ _ROLLS = tuple(math.radians(sign * angle) for angle in (7.0, 14.0, 21.0, 28.0, 3
 """Rolls of the camera that are tried where no ruler lies as it should, rad."""
 _UPRIGHT = math.radians(6.0)
 """Roll up to which lines are taken as they were found, rad; beyond it they are taken along the channel."""
+_PROFILES, _NEAR, _HELD = 8, 0.06, 0.25
+"""Profiles along each strip that tell whether a reduced picture shows lines at their true distance; the relative range
+of a spatial frequency in which its power is looked for; and the least power there over that of finer lines."""
 _MOST_ROWS = 500
 """About as many rows tell the distance of the lines in large pictures."""
 _BAND = 16
@@ -49,6 +52,10 @@ class Lines(NamedTuple):
     """Label of each point's strip, (n,)."""
     distance: float
     """Distance of neighbouring lines, pixels."""
+
+    def enlarged(self, factor: int) -> Lines:
+        """The lines in the full picture, if they were seen in one that was reduced by a factor."""
+        return self._replace(pixels=factor * self.pixels + 0.5 * (factor - 1), distance=factor * self.distance)
 
     @property
     def lines(self) -> int:
@@ -122,6 +129,43 @@ def lines_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 
             pixels = found.pixels if back is None else found.pixels @ back[:, :2].T + back[:, 2]
             return found._replace(pixels=pixels + np.array([left, top], dtype=float))
     return None
+
+
+def resolved(lines: Lines, image: np.ndarray, factor: int) -> bool:
+    """Whether lines that were seen in a reduced picture are those of the full one, and not a moire of finer ones.
+
+    Lines that are finer than two reduced pixels would show at a spatial frequency that is mirrored about multiples of
+    1 / factor. The full picture tells at which of these it holds the larger part of its power.
+
+    Args:
+        lines: in pixels of the full picture.
+        image: a full picture, 8-bit RGB, (h, w, 3).
+        factor: by which the other one was reduced.
+    """
+    cv2 = required("cv2", "measuring a video", "video")
+    way = np.array([math.cos(lines.roll), math.sin(lines.roll)])
+    side = np.array([-way[1], way[0]])
+    power: Samples = np.zeros(1)
+    frequency: Samples = np.zeros(1)
+    for label in np.unique(lines.strip):
+        points = lines.pixels[lines.strip == label]
+        along, across = points @ way, np.quantile(points @ side, np.linspace(0.2, 0.8, _PROFILES))
+        if label == lines.strip[0] or np.ptp(along) >= frequency.size:
+            places = np.arange(along.min(), along.max())
+            at = (places[:, None] * way + across[:, None, None] * side).astype(np.float32)
+            seen = cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR).mean(axis=2)
+            seen = (seen - seen.mean(axis=1, keepdims=True)) * np.hanning(places.size)
+            wave = np.fft.rfft(seen, axis=1)
+            power = np.asarray(np.sum(wave.real**2 + wave.imag**2, axis=0), dtype=float)
+            frequency = np.arange(len(power)) / places.size
+    own = 1.0 / lines.distance
+    finer = [m / factor + sign * own for m in range(1, factor) for sign in (-1.0, 1.0)]
+
+    def held(at: float) -> float:
+        near = np.abs(frequency - at) <= max(_NEAR * own, frequency[1])
+        return float(power[near].max()) if near.any() else 0.0
+
+    return held(own) >= _HELD * max(held(at) for at in finer)
 
 
 def ruler_in(picture: Samples, bounds: tuple[int, int, int, int], turn: float = 0.0) -> Lines | None:

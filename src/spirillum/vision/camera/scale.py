@@ -63,6 +63,8 @@ class Sight(NamedTuple):
     optics: Optics
     scale: Scale
     flags: tuple[Flag, ...] = ()
+    reduction: int = 1
+    """Factor by which pictures may be reduced that are looked at as a whole: the ruler is resolved in them."""
 
 
 def given_camera(setup: Setup, size: tuple[int, int], lens: Lens | None = None) -> Sight:

@@ -14,6 +14,7 @@ from spirillum.robust import mad_scale, theil_sen_line
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.constants import OUTLINE
 from spirillum.vision.track.contour import GROUPS, Contour, contour_of
+from spirillum.vision.track.shape import Shape
 
 __all__ = ["BodyFinder", "Placed", "grey_part"]
 
@@ -48,6 +49,7 @@ class BodyFinder:
         """
         self.robot, self.optics, self.bounds = robot, optics, bounds
         self.contour: Contour = contour_of(robot, optics)
+        self._shapes: dict[int, Shape] = {}
         self.half = OUTLINE.half_profile
         self.offsets = np.arange(-self.half, self.half + 1, dtype=float)
         self._template: Samples | None = None
@@ -60,6 +62,16 @@ class BodyFinder:
         middle = self.contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
         spacing = float(np.median(np.hypot(*np.diff(middle, axis=0).T)))
         self._correlation = max(1.0, OUTLINE.noise_correlation / max(spacing, 0.1))
+
+    def shape(self, factor: int = 1) -> Shape:
+        """What is looked for in whole pictures.
+
+        Args:
+            factor: by which the pictures are reduced.
+        """
+        if factor not in self._shapes:
+            self._shapes[factor] = Shape.of(self.contour, self.optics.reduced(factor), self.bounds, factor)
+        return self._shapes[factor]
 
     def learn(self, images: list[np.ndarray], poses: list[BodyPose], times: Samples) -> list[Placed]:
         """Learn the edges' templates from frames with approximately known poses, and refine these poses.

@@ -59,6 +59,8 @@ class SearchConstants:
 
     body_width: float = 16.0
     """Apparent width of the body in the reduced picture that is searched first, pixels."""
+    reduced_width: float = 48.0
+    """Least apparent width of the body in a large picture that was reduced before, pixels."""
     headings: tuple[float, ...] = (-8.0, -4.0, 0.0, 4.0, 8.0)
     """Headings that are tried, degrees."""
     background_share: float = 0.8

@@ -54,6 +54,12 @@ class Contour:
         edge_points(np.array(pose, dtype=float), self._factors, self.normals, self._reach, out)
         return out
 
+    def thinned(self, stride: int) -> Contour:
+        """Every `stride`-th of the points."""
+        every = slice(None, None, stride)
+        factors = np.ascontiguousarray(self._factors[..., every])
+        return Contour(self.group[every], self.normals[every], self.floor[every], factors, self._reach)
+
     def places(self, pose: BodyPose, optics: Optics) -> tuple[Samples, Samples, Samples, Samples]:
         """Project the edges into the picture.
 

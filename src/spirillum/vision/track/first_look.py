@@ -17,11 +17,12 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import FIRST_LOOK, VISIBILITY
 from spirillum.vision.track.search import Candidate, close_places, most_likely, refined
+from spirillum.vision.track.shape import Shape
 from spirillum.vision.track.size import OutlineFit, clearness, outline_seen, resized
 from spirillum.vision.track.warnings import rivals_in, turned_flags
 from spirillum.vision.video.frames import Frame
 
-__all__ = ["Start", "first_look", "on_the_way"]
+__all__ = ["Start", "close_place", "first_look", "on_the_way"]
 
 _THREADS = 2
 _ALLOWED = "allowed: one that is in view, with the right robot.file, heights and scale, or a [region] around it"
@@ -79,7 +80,7 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
         name: name of the video.
         body: the robot's body, about as large as it looks.
         frames: frames spread over the video.
-        still: static background of the frames, (h, w, 3).
+        still: static background of the frames, (h, w, 3), reduced as far as they are to be searched.
 
     Raises:
         InputError: if there is no robot.
@@ -87,10 +88,11 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     every = np.unique(
         np.linspace(0, len(frames) - 1, min(FIRST_LOOK.searched, len(frames))).round().astype(int)
     ).tolist()
-    images, focal = [frames[k].image for k in every], body.optics.focal
-    found = _places(body, images, still)
+    factor, focal = frames[0].image.shape[1] // still.shape[1], body.optics.focal
+    images, shape = [frames[k].reduced(factor) for k in every], body.shape(factor)
+    found = _places(shape, images, still)
     if not _clear(found):
-        if _clear(_places(body, images, still, turn=np.pi)):
+        if _clear(_places(shape, images, still, turn=np.pi)):
             side, other = body.optics.direction, opposite(body.optics.direction)
             raise InputError(
                 f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
@@ -98,7 +100,8 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
             )
         raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
     chosen = most_likely(found, body.robot.body.length)
-    rivals, flags = rivals_in(body, images, found, chosen), turned_flags(body, images, still, found, chosen)
+    rivals = rivals_in(body, [frames[k].image for k in every], found, chosen)
+    flags = turned_flags(shape, images, still, found, chosen)
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
     learnt = _learnt(name, body, _roughly(body, known, frames, still))
     outline = outline_seen(body, learnt.typical)
@@ -117,17 +120,30 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
 
 
-def _places(
-    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0
-) -> list[list[Candidate]]:
+def _places(body: Shape, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0) -> list[list[Candidate]]:
     """The likeliest places on some frames, of a body that is turned by an angle in the picture's plane."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops run side by side
         return list(pool.map(lambda image: close_places(image, still, body, turn=turn), images))
 
 
+def close_place(frame: Frame, still: Samples, body: BodyFinder, guess: BodyPose) -> Candidate:
+    """The body near a guess, to a pixel: in the reduced picture first, if the background was reduced.
+
+    Args:
+        frame: the frame.
+        still: static background of the video, (h, w, 3), or reduced by a whole factor.
+        body: the robot's body.
+        guess: about where it is.
+    """
+    factor, start = frame.image.shape[1] // still.shape[1], Candidate(guess, 0.0)
+    if factor > 1:
+        start = refined(frame.reduced(factor), still, body.shape(factor), start)
+    return refined(frame.image, still, body.shape(), start._replace(score=0.0))
+
+
 def _roughly(body: BodyFinder, known: list[tuple[float, BodyPose]], frames: Sequence[Frame], still: Samples) -> _Learnt:
     """Frames on which the robot is clear, and to a pixel where it is, from a few known places."""
-    found = [refined(frame.image, still, body, Candidate(on_the_way(known, frame.time), 0.0)) for frame in frames]
+    found = [close_place(frame, still, body, on_the_way(known, frame.time)) for frame in frames]
     usual = float(np.quantile([one.score for one in found], 0.8))
     found = _on_one_way(found, usual, body, frames, still)
     clear = [
@@ -147,7 +163,7 @@ def _on_one_way(
     found = list(found)
     for k in sorted(doubtful, key=lambda k: min(abs(k - other) for other in sure)):
         guess = on_the_way(sorted(sure.values()), frames[k].time)
-        better = refined(frames[k].image, still, body, Candidate(guess, 0.0))
+        better = close_place(frames[k], still, body, guess)
         if better.score > FIRST_LOOK.clearer * found[k].score:
             found[k], sure[k] = better, (frames[k].time, better.pose)
     return found

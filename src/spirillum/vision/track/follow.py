@@ -54,6 +54,7 @@ def follow(
     if still is not None:
         frames = [still.frame(frame) for frame in frames]
     learnt = learnt_from(video, frames, setup, robot, folder)
+    frames = [frame.small(learnt.sight.reduction) for frame in frames]  # large pictures have done their duty
     follower = Follower(learnt.known, learnt.still)
     aside = ThreadPoolExecutor(1)  # runs while the frames are followed
     moved = aside.submit(camera_flags, frames, learnt.known.start, ruled=setup.markers.spacing is not None)

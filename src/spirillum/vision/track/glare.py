@@ -33,6 +33,7 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
         poses: where the robot is on each of them, to a pixel or so.
         body: the robot's body.
     """
+    cv2 = required("cv2", "measuring a video", "video")
     bodies = np.array([_covered(body, pose) for pose in poses])
     (left, top, right, bottom), wide = body.bounds, int(np.ptp(bodies[0], axis=0).min())
     low = np.maximum(bodies.min(axis=(0, 1)).astype(int) - wide, (left, top))
@@ -40,7 +41,8 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
     if np.any(high <= low):
         return Glare(0.0, ())
     around = slice(low[1], high[1]), slice(low[0], high[0])
-    white = np.array([image[around].min(axis=2) >= STRIPES.white for image in images])
+    darkest = 3 * (float(np.ceil(STRIPES.white)),)
+    white = np.array([cv2.inRange(image[around], darkest, (255.0, 255.0, 255.0)) for image in images], dtype=bool)
     spots = _standing(white, bodies - low)
     if not spots.any() or not _pass(body, poses, spots, low):
         return Glare(0.0, ())

@@ -91,7 +91,7 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     except InputError as error:
         found = error
     half = not isinstance(found, InputError) and found.robot  # its tail does not fit: another size has to fit wholly
-    images = [frame.image for frame in frames]
+    images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
         least = FIRST_LOOK.clearness if half else SIZE.clearness
         size = best_other_size(resized(stated, about), images, still, least)

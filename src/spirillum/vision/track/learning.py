@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from spirillum.arrays import Samples
 from spirillum.robot.robot import Robot
-from spirillum.vision.camera.camera import bounds_of, sight_of
-from spirillum.vision.camera.ruler import still_picture
+from spirillum.vision.camera.camera import background, bounds_of, sight_of
 from spirillum.vision.camera.scale import Sight
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.glare import Glare, standing_glare
 from spirillum.vision.track.identity import Identified, identify
+from spirillum.vision.track.search import searched_at
 from spirillum.vision.video.frames import Frame, Video
+from spirillum.vision.video.pictures import reduction
 
 __all__ = ["Learnt", "learnt_from"]
 
@@ -28,7 +30,7 @@ class Learnt(NamedTuple):
     known: Identified
     """The robot."""
     still: Samples
-    """Static background of the pictures, (h, w, 3)."""
+    """Static background of the pictures, (h, w, 3); reduced by a whole factor where they are large."""
     glare: Glare
     """Glare that stands still."""
 
@@ -52,9 +54,14 @@ def learnt_from(video: Video, frames: list[Frame], setup: Setup, robot: Robot, f
     Raises:
         InputError: if neither ruler nor robot is found.
     """
-    still = still_picture([frame.image for frame in frames])
-    sight = sight_of(video, setup, still, folder)
+    factor = reduction(video.size)
+    still = background(frames, factor)
+    sight = sight_of(video, setup, still, folder, frames)
     finder = BodyFinder(robot, sight.optics, bounds_of(setup, video))
+    searched = searched_at(finder.shape().width, factor)
+    still = still if searched == factor else background(frames, searched)
     known = identify(video.name, setup, finder, frames, still)
     poses = [known.start.expected(frame.time) for frame in frames]
-    return Learnt(sight, known, still, standing_glare([frame.image for frame in frames], poses, known.start.body))
+    glare = standing_glare([frame.image for frame in frames], poses, known.start.body)
+    known = known._replace(start=replace(known.start, seen=[]))  # what was learnt from is not needed any longer
+    return Learnt(sight, known, still, glare)

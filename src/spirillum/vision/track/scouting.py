@@ -16,17 +16,19 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
-from spirillum.vision.camera.camera import bounds_of, samples_of
+from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
-from spirillum.vision.camera.ruler import Lines, ruler_in, still_picture
+from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import IDENTITY, SCOUTING
 from spirillum.vision.track.identity import Identified, identified_at
+from spirillum.vision.track.search import searched_at
 from spirillum.vision.track.size import best_other_size, resized
 from spirillum.vision.track.stripes import Stripes
 from spirillum.vision.video.frames import Frame, Video
+from spirillum.vision.video.pictures import reduction
 
 __all__ = ["Scouted", "Walls", "scouted"]
 
@@ -57,6 +59,8 @@ class Scouted(NamedTuple):
     """Walls of its channel; None where none were found."""
     frames: list[Frame]
     """Frames that were looked at."""
+    reduction: int
+    """Factor by which they may be reduced where they are looked at as a whole: the ruler is resolved in them."""
 
     @property
     def optics(self) -> Optics:
@@ -88,26 +92,44 @@ def scouted(video: Video, robot: Robot, spacing: float | None = None) -> Scouted
     """
     anywhere = _setup(robot, video.size, 1e-4, "right")
     frames = samples_of(video, anywhere.start, anywhere.end)
-    still = still_picture([frame.image for frame in frames])
-    lines, directions = _ruler(still, bounds_of(anywhere, video))
+    stills = _Stills(frames)
+    (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
     for guess in _guesses(robot, video.size, lines, spacing):
-        for direction, known in _found_at(video, robot, (guess, lines, directions), frames, still):
+        for direction, known in _found_at(video, robot, (guess, lines, directions), stills):
             stripes = _stripes_seen(robot, known)
-            walls = _walls(still, known, lines)
-            return Scouted(lines, known, direction, stripes, walls, frames)
-    return Scouted(lines, None, "right", (), None, frames)
+            walls = _walls(stills.at(factor), known, lines)
+            return Scouted(lines, known, direction, stripes, walls, frames, factor)
+    return Scouted(lines, None, "right", (), None, frames, factor)
 
 
-def _ruler(still: Samples, bounds: tuple[int, int, int, int]) -> tuple[Lines | None, tuple[str, ...]]:
-    """The ruler, and the directions in which the nose may point."""
-    along = {side: ruler_in(still, bounds, -DIRECTIONS[side]) for side in ("right", "down")}
-    known = [(len(lines.number), side, lines) for side, lines in along.items() if lines is not None]
+class _Stills:
+    """Frames, and their static background, reduced by any factor."""
+
+    def __init__(self, frames: list[Frame]) -> None:
+        self.frames = frames
+        self._at: dict[int, Samples] = {}
+
+    def at(self, factor: int) -> Samples:
+        """The background reduced by a factor."""
+        if factor not in self._at:
+            self._at[factor] = background(self.frames, factor)
+        return self._at[factor]
+
+
+def _ruler(
+    stills: _Stills, bounds: tuple[int, int, int, int], most: int
+) -> tuple[tuple[Lines | None, int], tuple[str, ...]]:
+    """The ruler and a factor by which pictures may be reduced that show it, and where the nose may point."""
+    along = {
+        side: ruler_of(stills.at(most), bounds, -DIRECTIONS[side], most, stills.frames) for side in ("right", "down")
+    }
+    known = [(len(lines.number), side, lines, factor) for side, (lines, factor) in along.items() if lines is not None]
     if not known:
         left, top, right, bottom = bounds
         sides = ("right", "left", "up", "down")
-        return None, sides if right - left >= bottom - top else sides[::-1]
-    _, side, lines = max(known, key=lambda one: one[0])
-    return lines, (side, opposite(side))
+        return (None, most), sides if right - left >= bottom - top else sides[::-1]
+    _, side, lines, factor = max(known, key=lambda one: one[0])
+    return (lines, factor), (side, opposite(side))
 
 
 def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
@@ -137,8 +159,7 @@ def _found_at(
     video: Video,
     robot: Robot,
     guess: tuple[float, Lines | None, tuple[str, ...]],
-    frames: list[Frame],
-    still: Samples,
+    stills: _Stills,
 ) -> Iterator[tuple[str, Identified]]:
     """The robot near a guessed scale, with the direction of its nose; then at half to twice of it."""
     finders = {}
@@ -149,9 +170,12 @@ def _found_at(
         if lines is not None:
             optics = optics.moved({"rotation": first_rotation(optics, lines)})
         finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
+    frames, most = stills.frames, reduction(video.size)
     for sized in (False, True):
         for direction, (setup, finder) in finders.items():
-            size = best_other_size(finder, [frame.image for frame in frames], still) if sized else 1.0
+            factor = searched_at(finder.shape().width, most)
+            images, still = [frame.reduced(factor) for frame in frames], stills.at(factor)
+            size = best_other_size(finder, images, still) if sized else 1.0
             body = finder if size is None else resized(finder, size)
             for _ in range(0 if size is None else SCOUTING.rounds):
                 try:
@@ -206,7 +230,8 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     side = np.array([-way[1], way[0]])
     centre = np.median(poses[:, :2], axis=0)
     centre = centre + way * ((optics.origin[:2] - centre) @ way)
-    step = optics.length_per_pixel
+    factor = optics.size[0] // still.shape[1]
+    step = factor * optics.length_per_pixel
     reach = SCOUTING.widest * diameter
     across = np.arange(-reach, reach, step)
     along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * step
@@ -215,7 +240,8 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     pixels = np.nan_to_num(optics.pixels(points.reshape(-1, 3)), nan=-9.0).round().astype(int)
     inside = np.all((pixels >= 0) & (pixels < np.array(optics.size)), axis=1)
     brightness = np.full(len(pixels), np.nan)
-    brightness[inside] = still[pixels[inside, 1], pixels[inside, 0]].mean(axis=1)
+    rows, columns = np.minimum(pixels[inside, ::-1] // factor, np.array(still.shape[:2]) - 1).T
+    brightness[inside] = still[rows, columns].mean(axis=1)
     table = brightness.reshape(grid.shape[:2])
     seen = np.isfinite(table).mean(axis=0) > SCOUTING.seen
     if not seen.any():

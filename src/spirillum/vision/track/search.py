@@ -11,11 +11,11 @@ from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
 from spirillum.vision.camera.optics import BodyPose, Optics
-from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SEARCH
 from spirillum.vision.track.contour import GROUPS
+from spirillum.vision.track.shape import Shape
 
-__all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined"]
+__all__ = ["Candidate", "candidates", "close_places", "most_likely", "refined", "searched_at"]
 
 
 class Candidate(NamedTuple):
@@ -26,24 +26,22 @@ class Candidate(NamedTuple):
     """Edge score at the pose, over the mean gradient of the picture."""
 
 
-def candidates(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
+def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[Candidate]:
     """Candidate poses of the body by a grid search over the reduced picture, best first, a body's width apart.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
         still: static background of the video, (h, w, 3).
-        body: the finder of the robot's body.
+        body: the robot's body, before the camera of these pictures.
         turn: offset of the trial headings, rad.
     """
-    contour, optics, bounds = body.contour, body.optics, body.bounds
+    contour, optics, bounds = body.thin, body.optics, body.bounds
     left, top, _, bottom = bounds
-    middle = contour.places(BodyPose(float(optics.origin[0]), float(optics.origin[1]), 0.0), optics)[0]
-    width = float(np.ptp(middle[:, 1]))
+    width = body.width
     factor = max(1, int(width / SEARCH.body_width))
     slope_u, slope_v, usual = _slopes(image, still, bounds, factor, SEARCH.coarse_blur)
     length, height = slope_u.shape
-    thin = np.arange(0, len(contour.group), SEARCH.edge_stride)
-    group, shift = contour.group[thin], np.array([-0.5 * SEARCH.column_step, -0.5 * height])
+    shift = np.array([-0.5 * SEARCH.column_step, -0.5 * height])
     scores = np.empty((SEARCH.column_step, height + 1))
     found: list[tuple[float, BodyPose]] = []
     for column in range(SEARCH.column_step // 2, length + SEARCH.column_step // 2, SEARCH.column_step):
@@ -54,8 +52,8 @@ def candidates(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: flo
                 continue
             pose = BodyPose(float(at[0]), float(at[1]), float(heading) + turn)
             pixels, normals, _, _ = contour.places(pose, optics)
-            small = (pixels[thin] - np.array([left, top])) / factor - 0.5 + 0.5 / factor
-            edge_scores(slope_u, slope_v, small, normals[thin], group, len(GROUPS), tuple(shift), scores)
+            small = (pixels - np.array([left, top])) / factor - 0.5 + 0.5 / factor
+            edge_scores(slope_u, slope_v, small, normals, contour.group, len(GROUPS), tuple(shift), scores)
             best = np.argpartition(scores, -SEARCH.peaks, axis=None)[-SEARCH.peaks :]
             places = start + factor * (shift + np.column_stack(np.unravel_index(best, scores.shape)))
             for k, there in zip(best, optics.points(places, optics.axis_height), strict=True):
@@ -76,13 +74,23 @@ def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) ->
     return kept
 
 
-def close_places(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: float = 0.0) -> list[Candidate]:
+def searched_at(width: float, most: int) -> int:
+    """Factor by which pictures are reduced in which a body is looked for, so that it is not too narrow there.
+
+    Args:
+        width: of the body in the full picture, pixels.
+        most: largest factor.
+    """
+    return max(1, min(most, int(width / SEARCH.reduced_width)))
+
+
+def close_places(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 0.0) -> list[Candidate]:
     """The three best candidates, refined in the full picture, best first.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
         still: static background of the video, (h, w, 3).
-        body: the finder of the robot's body.
+        body: the robot's body, before the camera of these pictures.
         turn: offset of the trial headings, rad.
     """
     rough = candidates(image, still, body, turn=turn)[:3]
@@ -90,17 +98,17 @@ def close_places(image: np.ndarray, still: Samples, body: BodyFinder, *, turn: f
     return sorted(close, key=lambda one: -one.score)
 
 
-def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidate) -> Candidate:
+def refined(image: np.ndarray, still: Samples, body: Shape, start: Candidate) -> Candidate:
     """Refine a candidate to a pixel in the full picture; its score is a gradient, grey values per pixel.
 
     Args:
         image: 8-bit RGB, (h, w, 3).
-        still: static background of the video, (h, w, 3).
-        body: the finder of the robot's body.
+        still: static background of the video, (h, w, 3), or reduced by a whole factor.
+        body: the robot's body, before the camera of these pictures.
         start: the candidate to be refined.
     """
-    contour, optics, bounds = body.contour, body.optics, body.bounds
-    first = contour.places(start.pose, optics)[0]
+    contour, optics, bounds = body.thin, body.optics, body.bounds
+    first = body.contour.places(start.pose, optics)[0]
     if not np.isfinite(first).all():
         return Candidate(start.pose, 0.0)
     low = np.maximum(first.min(axis=0) - SEARCH.margin, bounds[:2]).astype(int)
@@ -109,8 +117,7 @@ def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidat
         return Candidate(start.pose, 0.0)
     part = int(low[0]), int(low[1]), int(high[0]), int(high[1])
     slope_u, slope_v, _ = _slopes(image, still, part, 1, SEARCH.fine_blur, bounded=False)
-    thin = np.arange(0, len(contour.group), SEARCH.edge_stride)
-    group, best = contour.group[thin], Candidate(start.pose, 0.0)
+    best = Candidate(start.pose, 0.0)
     reach = SEARCH.reach
     scores, shift = np.empty((2 * reach + 1, 2 * reach + 1)), np.full(2, -float(reach))
     for _ in range(2):
@@ -118,7 +125,7 @@ def refined(image: np.ndarray, still: Samples, body: BodyFinder, start: Candidat
         for turn in np.deg2rad([-3.0, -1.5, 0.0, 1.5, 3.0] if best.score == 0.0 else [-0.75, 0.0, 0.75]):
             heading = pose.heading + float(turn)
             pixels, normals, _, _ = contour.places(BodyPose(pose.x, pose.y, heading), optics)
-            edge_scores(slope_u, slope_v, pixels[thin] - low, normals[thin], group, len(GROUPS), tuple(shift), scores)
+            edge_scores(slope_u, slope_v, pixels - low, normals, contour.group, len(GROUPS), tuple(shift), scores)
             if scores.max() > best.score:
                 place = shift + np.unravel_index(np.argmax(scores), scores.shape)
                 middle = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]])) + place
@@ -155,6 +162,20 @@ def most_likely(found: list[list[Candidate]], size: float) -> list[Candidate | N
     return chosen
 
 
+def _background(still: Samples, bounds: tuple[int, int, int, int], factor: int) -> Samples:
+    """A part of the background, enlarged if it was reduced by a factor."""
+    left, top, right, bottom = bounds
+    if factor == 1:
+        return still[top:bottom, left:right]
+    cv2 = required("cv2", "measuring a video", "video")
+    low, high = np.array([left, top]) // factor, -(-np.array([right, bottom]) // factor)
+    part = still[low[1] : high[1], low[0] : high[0]]
+    large = cv2.resize(part, (part.shape[1] * factor, part.shape[0] * factor), interpolation=cv2.INTER_LINEAR)
+    large = np.pad(large, ((0, factor), (0, factor), (0, 0)), mode="edge")  # beyond the last whole block
+    column, row = np.array([left, top]) - factor * low
+    return np.asarray(large[row : row + bottom - top, column : column + right - left])
+
+
 def _slopes(
     image: np.ndarray,
     still: Samples,
@@ -171,8 +192,8 @@ def _slopes(
     cv2 = required("cv2", "measuring a video", "video")
     left, top, right, bottom = bounds
     whole, background = (
-        cv2.cvtColor(picture[top:bottom, left:right].astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
-        for picture in (image, still)
+        cv2.cvtColor(part.astype(np.float32, copy=False), cv2.COLOR_RGB2GRAY)
+        for part in (image[top:bottom, left:right], _background(still, bounds, image.shape[1] // still.shape[1]))
     )
     part = whole - SEARCH.background_share * background
     if factor > 1:

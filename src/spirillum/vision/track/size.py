@@ -17,18 +17,22 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.edges import sums_along
-from spirillum.vision.camera.optics import BodyPose
+from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.camera.scale import Scale, with_source
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.constants import SIZE
+from spirillum.vision.track.contour import contour_of
 from spirillum.vision.track.search import Candidate, close_places
+from spirillum.vision.track.shape import Shape
 
 __all__ = ["LENGTHS", "OutlineFit", "best_other_size", "checked_scale", "clearness", "outline_seen", "resized"]
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
 """Candidate sizes over the stated one; sizes in between are fitted to the edges."""
+_RUNS = tuple(map(tuple, np.split(_SIZES, 2)))
+"""Sizes that are looked for with one computed outline, that of the least of them: its camera sees farthest."""
 _FINE = 8
 """Samples of the edges' gradient profile per pixel."""
 _SPANS = (0.08, 3.0, 3.0, 0.05), (0.01, 0.5, 0.5, 0.01), (0.002, 0.1, 0.1, 0.002)
@@ -61,7 +65,7 @@ def best_other_size(
 
     Args:
         body: the robot's body at the stated scale.
-        images: some frames, 8-bit RGB, (h, w, 3) each.
+        images: some frames, 8-bit RGB, (h, w, 3) each; they and the background may be reduced by a whole factor.
         still: static background of the frames, (h, w, 3).
         least: clearness from which on a detection counts.
 
@@ -69,14 +73,22 @@ def best_other_size(
         The size over the stated one; None if no detection is clear.
     """
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, SIZE.looked_at).round().astype(int))]
+    factor = body.optics.size[0] // still.shape[1]
+    contours = {run: contour_of(body.robot, _magnified(body.optics, min(run))) for run in _RUNS}
 
-    def at(size: float) -> list[list[Candidate]]:
-        other = resized(body, float(size))
-        return [close_places(image, still, other) for image in few]
+    def at(size: float) -> float:
+        [contour] = [contour for run, contour in contours.items() if size in run]
+        other = Shape.of(contour, _magnified(body.optics, size).reduced(factor), body.bounds, factor)
+        places: list[list[Candidate]] = []
+        for image in few:
+            places.append(close_places(image, still, other))
+            unclear = [one for one in places if clearness([one]) <= least]
+            if 2 * len(unclear) >= len(few) + 1:
+                return 0.0  # the others do not raise the median
+        return _resemblance(places) if clearness(places) > least else 0.0
 
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
-        tried = list(pool.map(at, _SIZES))
-    resemblance = [_resemblance(places) if clearness(places) > least else 0.0 for places in tried]
+        resemblance = list(pool.map(at, _SIZES.tolist()))
     best = int(np.argmax(resemblance))
     return float(_SIZES[best]) if resemblance[best] > 0.0 else None
 
@@ -88,7 +100,12 @@ def resized(body: BodyFinder, size: float) -> BodyFinder:
         body: the body.
         size: factor.
     """
-    return BodyFinder(body.robot, replace(body.optics, focal=body.optics.focal * size), body.bounds)
+    return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds)
+
+
+def _magnified(optics: Optics, size: float) -> Optics:
+    """A camera before which everything looks larger by a factor."""
+    return replace(optics, focal=optics.focal * size)
 
 
 class OutlineFit(NamedTuple):

@@ -40,15 +40,16 @@ def view_of(images: Sequence[np.ndarray], start: Start, *, ruled: bool) -> View:
     """What stands still in some pictures, three or more.
 
     Args:
-        images: 8-bit RGB, (h, w, 3) each.
+        images: 8-bit RGB, (h, w, 3) each; all of them may be reduced by a whole factor.
         start: result of the first look.
         ruled: whether a ruler is in the picture.
     """
-    still, bounds = still_picture(list(images)), start.body.bounds
+    factor = start.body.optics.size[0] // images[0].shape[1]
+    still, bounds = still_picture(list(images)), start.body.shape(factor).bounds
     if start.body.optics.upright:  # the channel's shift is looked for along the rows
         left, top, right, bottom = bounds
         still, bounds = np.ascontiguousarray(np.swapaxes(still, 0, 1)), (top, left, bottom, right)
-    return View(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start)))
+    return View(lines_in(still, bounds) if ruled else None, _flat(still, bounds, _rows_of(start, factor)))
 
 
 def shift_of(first: View, other: View) -> tuple[float, bool]:
@@ -64,7 +65,8 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     """Flag a camera or tank that moved along the channel during the film.
 
     Args:
-        frames: frames spread over the video, in order of time.
+        frames: frames spread over the video, in order of time; all of them may be reduced by a whole factor, and what
+            counts as moved are pixels of these.
         start: result of the first look at them.
         ruled: whether a ruler is in the picture.
     """
@@ -75,6 +77,7 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
     ]
     if len(parts) < 2:
         return ()
+    factor = start.body.optics.size[0] // frames[0].image.shape[1]
     with ThreadPoolExecutor(1 if frames[0].image.size > _LARGE else _THREADS) as pool:
         views = list(pool.map(lambda part: view_of([frames[k].image for k in part], start, ruled=ruled), parts))
         shifts = [0.0, *pool.map(lambda other: shift_of(views[0], other)[0], views[1:])]
@@ -84,21 +87,23 @@ def camera_flags(frames: Sequence[Frame], start: Start, *, ruled: bool) -> tuple
         return ()
     step = int(np.argmax([abs(b - a) for a, b in pairwise(shifts)]))
     before, after = (float(np.median([frames[k].time for k in parts[step + more]])) for more in (0, 1))
+    shift = factor * np.ptp(shifts)
     sentence = (
-        f"the camera or the ruler was moved: the picture shifts by {np.ptp(shifts):.1f} pixels along the channel, most "
+        f"the camera or the ruler was moved: the picture shifts by {shift:.1f} pixels along the channel, most "
         f"between {before:.1f} s and {after:.1f} s; nothing is given (start and end of the setup choose a part of the "
         "video)"
     )
     return (Flag("camera-moved", sentence, ("forward_velocity", "body_rotation_rate", "tail_rotation_rate")),)
 
 
-def _rows_of(start: Start) -> tuple[int, int]:
-    """First and last row of the picture that the robot ever covers; columns, where the channel runs along these."""
+def _rows_of(start: Start, factor: int) -> tuple[int, int]:
+    """First and last row of a reduced picture that the robot ever covers; columns, if the channel runs along these."""
     body = start.body
     wide = max(0.5 * body.robot.body.diameter, body.robot.tail.amplitude) + body.robot.tail.wire_diameter
     sides = np.array([[0.0, -wide, 0.0], [0.0, wide, 0.0]])
     across = 0 if body.optics.upright else 1
-    rows = [seen(sides, pose, body.optics)[:, across] for _, pose in start.path]
+    optics = body.shape(factor).optics
+    rows = [seen(sides, pose, optics)[:, across] for _, pose in start.path]
     low, high = np.nanmin(rows) - STEADINESS.rows_beside, np.nanmax(rows) + STEADINESS.rows_beside
     return max(0, int(low)), max(0, int(high))
 

@@ -11,9 +11,9 @@ from spirillum.arrays import Samples
 from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.track.body import Placed
 from spirillum.vision.track.constants import FOLLOWING
-from spirillum.vision.track.first_look import on_the_way
+from spirillum.vision.track.first_look import close_place, on_the_way
 from spirillum.vision.track.identity import Identified
-from spirillum.vision.track.search import candidates, refined
+from spirillum.vision.track.search import candidates
 from spirillum.vision.video.frames import Frame
 
 __all__ = ["Follower", "Record", "Seen"]
@@ -62,7 +62,7 @@ class Follower:
 
         Args:
             known: the robot, with readers that have learnt its appearance.
-            still: static background of the pictures, (h, w, 3).
+            still: static background of the pictures, (h, w, 3), or reduced by a whole factor.
             ahead: whether the first look has seen the frames that come, so that its path says where the robot is.
         """
         self.known, self.still, self.record = known, still, Record()
@@ -74,7 +74,7 @@ class Follower:
         start, record = self.known.start, self.record
         found = self._placed(frame, self._guess(frame.time))
         if not found.known and len(record.time) % FOLLOWING.search_interval == 0:
-            found = self._found_again(frame.image, found)
+            found = self._found_again(frame, found)
         stripes = self.known.stripes
         roll, edges = _UNREAD, np.asarray(np.full(len(stripes.stripes), np.nan))
         if found.known:
@@ -119,13 +119,14 @@ class Follower:
             return again
         return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
 
-    def _found_again(self, image: np.ndarray, lost: Placed) -> Placed:
+    def _found_again(self, frame: Frame, lost: Placed) -> Placed:
         """Search the whole picture for the body; `lost` if it is not found."""
-        start = self.known.start
-        for candidate in candidates(image, self.still, start.body)[:2]:
-            better = refined(image, self.still, start.body, candidate)
+        start, still = self.known.start, self.still
+        factor = frame.image.shape[1] // still.shape[1]
+        for candidate in candidates(frame.reduced(factor), still, start.body.shape(factor))[:2]:
+            better = close_place(frame, still, start.body, candidate.pose)
             if start.as_clear(better.score):
-                found = start.body.place(image, better.pose)
+                found = start.body.place(frame.image, better.pose)
                 if found.known:
                     return found
         return lost

@@ -15,6 +15,7 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder, Placed
 from spirillum.vision.track.constants import VISIBILITY
 from spirillum.vision.track.search import Candidate, close_places
+from spirillum.vision.track.shape import Shape
 
 __all__ = ["EVERYTHING", "cut_off", "gaps_of", "rivals_in", "sight_flags", "turned_flags"]
 
@@ -53,7 +54,7 @@ def rivals_in(
 
 
 def turned_flags(
-    body: BodyFinder,
+    body: Shape,
     images: Sequence[np.ndarray],
     still: Samples,
     found: Sequence[list[Candidate]],
@@ -62,7 +63,7 @@ def turned_flags(
     """Flag a robot whose nose is at the other end.
 
     Args:
-        body: the robot's body.
+        body: the robot's body, before the camera of these pictures.
         images: the frames that were searched, 8-bit RGB.
         still: static background of the video, (h, w, 3).
         found: candidates of each frame.
@@ -82,7 +83,7 @@ def turned_flags(
     return (Flag("nose-on-the-other-side", sentence, EVERYTHING),)
 
 
-def _turned(body: BodyFinder, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
+def _turned(body: Shape, seen: Sequence[tuple[np.ndarray, float]], still: Samples) -> float:
     """Median score ratio of the body turned by 180 degrees; `seen` holds each frame with its score as stated."""
     with ThreadPoolExecutor(_THREADS) as pool:  # the compiled loops release the GIL
         backs = pool.map(

@@ -19,7 +19,7 @@ from spirillum.extras import required
 from spirillum.files import checked_path, opened
 from spirillum.files.limits import MOST_IMAGES, MOST_PIXELS, SMALLEST_SIDE
 from spirillum.vision.flag import Flag
-from spirillum.vision.video.pictures import read_image
+from spirillum.vision.video.pictures import read_image, reduced
 from spirillum.vision.video.provenance import one_line, words_of_images
 from spirillum.vision.video.read_ahead import ahead
 
@@ -59,6 +59,17 @@ class Frame:
     """When it was taken, s."""
     image: np.ndarray = field(repr=False)
     """8-bit RGB, (height, width, 3)."""
+    _reduced: dict[int, np.ndarray] = field(default_factory=dict, init=False, repr=False, compare=False)
+
+    def reduced(self, factor: int) -> np.ndarray:
+        """The picture reduced by a whole factor; it is kept."""
+        if factor not in self._reduced:
+            self._reduced[factor] = reduced(self.image, factor)
+        return self._reduced[factor]
+
+    def small(self, factor: int) -> Frame:
+        """The frame with its picture reduced by a whole factor in place of the full one."""
+        return Frame(self.index, self.time, self.reduced(factor))
 
 
 @dataclass

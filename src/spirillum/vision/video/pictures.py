@@ -1,4 +1,4 @@
-"""Images decoded, once it is known how large they are."""
+"""Images decoded, once it is known how large they are; and large ones reduced."""
 
 from __future__ import annotations
 
@@ -14,10 +14,36 @@ from spirillum.extras import required
 from spirillum.files import read_bytes
 from spirillum.files.limits import LARGEST_PICTURE, MOST_PIXELS
 
-__all__ = ["read_image"]
+__all__ = ["read_image", "reduced", "reduction"]
 
 _WHAT = "an image (png, jpg, tif, bmp)"
+_USUAL = 1280
+"""Longest side of pictures that are looked at as a whole as they are, pixels."""
 _KINDS = ("PNG", "JPEG", "MPO", "TIFF", "BMP")
+
+
+def reduction(size: tuple[int, int]) -> int:
+    """Factor by which pictures of a size are reduced where they are looked at as a whole; 1 for usual ones.
+
+    Args:
+        size: width and height, pixels.
+    """
+    return -(-max(size) // _USUAL)
+
+
+def reduced(image: np.ndarray, factor: int) -> np.ndarray:
+    """A picture whose blocks of `factor` by `factor` pixels are made one, their mean; from the upper left.
+
+    Args:
+        image: 8-bit, (h, w) or (h, w, channels).
+        factor: a whole number; 1 gives the picture itself.
+    """
+    if factor == 1:
+        return image
+    cv2 = required("cv2", "measuring a video", "video")
+    height, width = image.shape[0] // factor, image.shape[1] // factor
+    whole = image[: height * factor, : width * factor]
+    return np.asarray(cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA))
 
 
 def read_image(path: Path, *, grey: bool = False) -> np.ndarray | None:
