@@ -139,6 +139,8 @@ class Following:
     def _place(self, pose: BodyPose) -> tuple[tuple[float, float], tuple[float, float]]:
         """Along and across the channel, m, and the pixel of the body's mid-length."""
         optics = self.learnt.known.start.body.optics
+        off_x, off_y = self.learnt.known.start.off
+        pose = pose._replace(x=pose.x + off_x, y=pose.y + off_y)
         x, y = self._places(np.array([[pose.x, pose.y]]))[0]
         c, s = math.cos(self.roll), math.sin(self.roll)
         u, v = optics.pixels(np.array([[pose.x, pose.y, optics.axis_height]]))[0]

@@ -61,6 +61,7 @@ def track_of(
     seen = np.array([one.known for one in record.placed])
     pose = np.where(seen[:, None], np.array([one.pose for one in record.placed]), np.nan)
     errors = np.array([one.error for one in record.placed])
+    pose[:, :2] += known.start.off
     roll, tail = np.array(record.roll), np.array(record.tail)
     optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
     seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)

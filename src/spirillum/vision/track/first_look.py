@@ -36,6 +36,9 @@ class Start:
     """The body, which has learnt, in front of a camera that shows it as large as it looks."""
     size: float
     """How large it looks, over the body that was looked for."""
+    off: tuple[float, float]
+    """From where its edges were learnt to where its outline lies, (x, y), m: the search takes a lit side and a shadow
+    for a part of the body, by some tenths of a pixel, and edges are learnt where it has found them."""
     seen: list[tuple[np.ndarray, BodyPose]] = field(repr=False)
     """Frames on which the robot was found, 8-bit RGB, and where."""
     path: list[tuple[float, BodyPose]]
@@ -117,7 +120,8 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
         (learnt.frames[k].image, learnt.poses[k]) for k in (whole if len(whole) >= FIRST_LOOK.whole_frames else every)
     ]
     path = [(frame.time, pose) for frame, pose in zip(learnt.frames, learnt.poses, strict=True)]
-    return Start(body, size, seen, path, learnt.score, clearness(found), rivals, flags)
+    off = (outline.move.x, outline.move.y) if outline.fits(body.optics.length_per_pixel) else (0.0, 0.0)
+    return Start(body, size, off, seen, path, learnt.score, clearness(found), rivals, flags)
 
 
 def _places(body: Shape, images: Sequence[np.ndarray], still: Samples, *, turn: float = 0.0) -> list[list[Candidate]]:
