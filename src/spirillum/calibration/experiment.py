@@ -21,16 +21,15 @@ from spirillum.errors import InputError
 from spirillum.files import read_bytes
 from spirillum.files.limits import LARGEST_TABLE
 from spirillum.measurement.observations import Observation, check_signs, observation_table, read_observations
-from spirillum.measurement.statistics import student_t_quantile
+from spirillum.measurement.statistics import NORMAL, student_t_quantile
 from spirillum.robot.robot import Robot
+from spirillum.swimming.discrepancy import error_of_mean
 
 __all__ = ["Experiment", "Quantity", "Ratio", "channel_of", "read_experiment", "tail_words", "with_tail"]
 
 Quantity = Literal["advance", "turning", "motor_rate"]
 """U/omega (or U/omega_m), Omega/omega, omega_m."""
 
-_NORMAL = 1.959964
-"""Half width of a 95 % interval over the standard error."""
 _FLOOR = 0.1
 """Smallest scale of a relative error, over the median of all robots: a mean near zero has no relative error."""
 
@@ -53,16 +52,12 @@ class Ratio:
     """Relative standard error of one trial as the file states it, over the scale; NaN where it does not."""
 
     def error_of_mean(self, error: Samples | float) -> Samples:
-        """Standard error of each mean, SI: that of a trial over the root of the number of trials.
-
-        The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their
-        sum.
+        """Standard error of each mean, SI: see `spirillum.swimming.discrepancy.error_of_mean`.
 
         Args:
             error: relative error of one trial by the scatter, (robots,), (draws, 1) or a number; NaN where unknown.
         """
-        found: Samples = np.fmax(error, np.nan_to_num(self.stated)) * self.scale / np.sqrt(np.maximum(self.trials, 1.0))
-        return found
+        return error_of_mean(error, self.stated, self.scale, self.trials)
 
     def drawn_error(self, count: int, rng: np.random.Generator) -> Samples:
         """Draws of the relative error of one trial as the scatter tells it, (count, 1); NaN without repeated trials.
@@ -303,7 +298,7 @@ def _ratios(path: Path, items: Sequence[Observation], hand: float) -> _Seen:
     else:
         halves = np.array([item.intervals for item in items]).T
         with np.errstate(divide="ignore", invalid="ignore"):
-            u, w, b, m = halves / _NORMAL / np.abs((velocity, tail, body, motor))
+            u, w, b, m = halves / NORMAL / np.abs((velocity, tail, body, motor))
         found = _Seen(
             _of_trials(velocity / (motor if by_motor else tail), u, m if by_motor else w),
             by_motor,

@@ -9,7 +9,7 @@ from typing import Any
 
 from spirillum.dynamics.tube_options import InTube, check_not_resolved
 from spirillum.errors import InputError
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import fitted_of
 from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
@@ -17,7 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 
 __all__ = ["predict"]
@@ -78,9 +78,7 @@ def predict(
     """
     known = None
     if posterior is not None and motion == "free" and model in ("tube", AUTO):
-        if calibration is not None or not calibrated:
-            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        known = read_posterior(posterior, *([] if model == AUTO else [model]))
+        known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
     choice = _free_in_tube(robot, model, motion, placement, calibration, known)
     if choice is None:
         asked = InTube.of(in_tube)

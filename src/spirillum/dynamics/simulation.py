@@ -21,7 +21,6 @@ from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
-from spirillum.fitted.posterior_file import read_posterior
 from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.table import TubeTable
@@ -35,7 +34,7 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
-from spirillum.swimming.model_choice import AUTO
+from spirillum.swimming.model_choice import AUTO, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import friction_reading, requirements
@@ -106,9 +105,7 @@ def simulate(
     """
     known = None
     if posterior is not None:
-        if calibration is not None or not calibrated:
-            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        known = read_posterior(posterior, *([] if model == AUTO else [model]))
+        known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
     check_draws(draws)

@@ -12,7 +12,7 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 __all__ = ["LEFTOVER", "Busy", "locked", "private_folder", "scratch_folder", "sweep"]
@@ -135,11 +135,9 @@ def private_folder(parent: Path) -> Iterator[Path]:
         _release(handle)
 
 
-@contextmanager
-def scratch_folder() -> Iterator[Path]:
+def scratch_folder() -> AbstractContextManager[Path]:
     """A folder as `private_folder` gives it, where the system keeps temporary files."""
-    with private_folder(Path(tempfile.gettempdir())) as folder:
-        yield folder
+    return private_folder(Path(tempfile.gettempdir()))
 
 
 def sweep(parent: Path, *, again: bool = False) -> None:

@@ -13,6 +13,7 @@ from spirillum.live.observation import Observation
 from spirillum.live.watch import CameraWatch, Readings, motion_flags
 from spirillum.live.windows import Window, periodic_error
 from spirillum.measurement.flags import SYNTHETIC, says_synthetic
+from spirillum.measurement.statistics import NORMAL
 from spirillum.measurement.systematic import (
     DRIFT_ANGLE,
     DRIFT_BARE,
@@ -45,7 +46,6 @@ _LOOKED_BACK = 10.0
 """Time over which that looks back, s."""
 _MOST_FRAMES = 36_000
 """Frames that the summary keeps: twenty minutes at 30 a second."""
-_NORMAL = 1.959964
 _VELOCITY, _BODY, _TAIL, _MOTOR = RATE_NAMES
 _NOT_SEEN = "the robot is not seen where it should be"
 _NOT_WHOLE = "the robot is partly out of view"
@@ -211,7 +211,7 @@ class Following:
             errors = [periodic_error(*returning[part], span) for part in parts]
             errors += [drifts[part] / span for part in parts]
             errors += [scale * value] if name == _VELOCITY else []
-            half = math.hypot(half, _NORMAL * math.hypot(*errors))
+            half = math.hypot(half, NORMAL * math.hypot(*errors))
             found[name] = Measured(value, value - half, value + half, unit)
         return found
 

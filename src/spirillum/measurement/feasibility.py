@@ -11,6 +11,7 @@ from typing import Any
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.measurement.depth import depth_shares
+from spirillum.measurement.statistics import NORMAL
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
@@ -36,7 +37,6 @@ _CORRELATION = 4.0
 """Correlation time of errors of position and wire, frames."""
 _EDGE_CORRELATION = 20.0
 """Correlation time of errors of the stripes' edges, frames."""
-_NORMAL = 1.959964
 _FEWEST = 4
 """Fewest frames that give a rate."""
 _FOREVER = 1e9
@@ -365,6 +365,6 @@ def _intervals(
     waves = max(robot.tail.length / robot.tail.wavelength, 1.0)
     found["tail_rotation_rate"] = _WAVE_ERROR * pixel / robot.tail.amplitude / math.sqrt(waves) * slope
     return {
-        name: (_NORMAL * error, _NORMAL * error / abs(expected[name][0]) if expected[name][0] else math.nan)
+        name: (NORMAL * error, NORMAL * error / abs(expected[name][0]) if expected[name][0] else math.nan)
         for name, error in found.items()
     }

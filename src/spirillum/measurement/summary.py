@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from spirillum.measurement.outliers import GRUBBS_LEVEL, outlying_trial
-from spirillum.measurement.statistics import mean_with_interval
+from spirillum.measurement.statistics import NORMAL, mean_with_interval
 from spirillum.measurement.trials import LEVEL, MEASURED, RATE_NAMES, WOBBLES, Measured, Trial
 from spirillum.vision.flag import Flag
 
 __all__ = ["Summary", "compared", "summary_of"]
 
-_NORMAL = 1.959964
 _LENGTHS = ("forward_velocity", "lateral_position")
 
 
@@ -65,7 +64,7 @@ def _mean(name: str, measured: Sequence[Measured], trials: Sequence[Trial], shar
     mean = mean_with_interval([item.value for item in measured], LEVEL)
     reach = mean.half_width
     if name in _LENGTHS:
-        reach = math.hypot(reach, _NORMAL * shared * mean.value)
+        reach = math.hypot(reach, NORMAL * shared * mean.value)
     if name in WOBBLES:  # the error of tracking is common to all trials
         reach = max(reach, float(np.mean([item.high - item.value for item in measured])))
     low = mean.value - reach

@@ -14,6 +14,7 @@ from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
+from spirillum.measurement.statistics import NORMAL
 from spirillum.measurement.systematic import (
     AMPLITUDE_ERROR,
     DRIFT_ANGLE,
@@ -55,7 +56,6 @@ WOBBLES = (
 """Amplitudes of lateral motion and heading at the rotation rates of tail and body."""
 MEASURED = (*RATE_NAMES, "lateral_position", "heading", *WOBBLES)
 """All quantities of a trial, and of a summary over trials."""
-_NORMAL = 1.959964
 _FEW_TURNS = 2.0
 """Fewest turns over which a wobble is fitted."""
 _DEGREE = 5
@@ -254,7 +254,7 @@ def _with_errors(rate: Rate, unit: str, *errors: float) -> Measured:
         return Measured.missing(unit, _TOO_FEW if rate.frames else "it was not read on any frame")
     if not math.isfinite(rate.low):
         return Measured(rate.value, math.nan, math.nan, unit, "two readings leave no errors to tell it from")
-    reach = _NORMAL * math.hypot(*errors)
+    reach = NORMAL * math.hypot(*errors)
     low = rate.value - math.hypot(rate.value - rate.low, reach)
     return Measured(rate.value, low, rate.value + math.hypot(rate.high - rate.value, reach), unit)
 
@@ -304,7 +304,7 @@ def _mean(track: Track, values: Samples, unit: str, systematic: float) -> Measur
     if not math.isfinite(low):
         return Measured(value, low, high, unit, "few readings do not tell how their errors hang together")
     shared = track.scale.relative_uncertainty * abs(value) if unit == "m" else 0.0
-    reach = _NORMAL * math.hypot(shared, systematic)
+    reach = NORMAL * math.hypot(shared, systematic)
     return Measured(value, value - math.hypot(value - low, reach), value + math.hypot(high - value, reach), unit)
 
 
@@ -326,7 +326,7 @@ def _wobble(size: float, error: float, unit: str, part: str) -> Measured:
     """An amplitude with its 95 % interval."""
     if not math.isfinite(size):
         return Measured.missing(unit, f"the {part} was not seen to turn {_FEW_TURNS:g} times")
-    return Measured(size, max(size - _NORMAL * error, 0.0), size + _NORMAL * error, unit)
+    return Measured(size, max(size - NORMAL * error, 0.0), size + NORMAL * error, unit)
 
 
 def _amplitude(time: Samples, values: Samples, angle: Samples) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from spirillum.robot.actuation import Drive, Motor
 from spirillum.robot.parts import Body, Channel, Coupling, Fluid, Tail
 from spirillum.robot.robot import Robot
-from spirillum.studies.ranking import StudyRanking
+from spirillum.studies.ranking import StudyRanking, robot_dims
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.robot import robot_figure, robot_words
 
@@ -33,10 +33,10 @@ def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
         return None
     place = ranking.robots[0].place if ranking.robots else 0
     if "channel" in dataset.dims:  # of a grid the settings name a robot for each channel
-        grid = ("wavelength", "amplitude")
-        channel, *tail = np.unravel_index(place, [dataset.sizes[name] for name in ("channel", *grid)])
+        grid = robot_dims(dataset)
+        channel, *tail = np.unravel_index(place, [dataset.sizes[name] for name in grid])
         table = dict(dumps[int(channel)])
-        own = {name: float(dataset[name].values[at]) for name, at in zip(grid, tail, strict=True)}
+        own = {name: float(dataset[name].values[at]) for name, at in zip(grid[1:], tail, strict=True)}
         table["tail"] = {**table["tail"], **own}
     else:
         table = dumps[place]

@@ -206,7 +206,7 @@ def _extended(
     changed = _touched(table)
     if not own:
         below, layers = _extended(tomllib.loads(preset_text(base)), f"preset {base}", folder, above)
-        return _merged(_described(below, base, table), table), [*layers, changed]
+        return _laid_over(below, base, table), [*layers, changed]
     path = folder / base
     if len(above) >= _MOST_LAYERS or _resolved(path, source) in above:
         raise InputError(
@@ -214,15 +214,15 @@ def _extended(
             f"allowed: a chain of files that ends at a whole robot or a preset ({', '.join(preset_names())})"
         )
     below, layers = _extended(read_toml(path, _WHAT), str(path), path.parent, (*above, _resolved(path, source)))
-    return _merged(_described(below, base, table), table), [*layers, changed]
+    return _laid_over(below, base, table), [*layers, changed]
 
 
-def _described(below: dict[str, Any], base: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables below, with a description that holds for a robot with other values; its own goes on top."""
+def _laid_over(below: dict[str, Any], base: str, table: dict[str, Any]) -> dict[str, Any]:
+    """A robot's tables over those of its base, with a description that holds for a robot with other values."""
     changed = _touched(table) | {name for name, value in table.items() if not isinstance(value, Mapping)} - _WORDS
-    if not changed:
-        return below
-    return {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
+    if changed:
+        below = {**below, "description": f"{base} with other {', '.join(sorted(changed))}"[:2000]}
+    return _merged(below, table)
 
 
 def _resolved(path: Path, source: str) -> Path:

@@ -34,6 +34,7 @@ __all__ = [
     "best_in_words",
     "can_be_ranked",
     "ranking_of",
+    "robot_dims",
 ]
 
 _ALIKE = 0.01
@@ -183,11 +184,11 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
     """
     chosen, indexes = ("model", "friction"), dataset.indexes
     named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
-    over = {*chosen, *_robot_dims(dataset)}
+    over = {*chosen, *robot_dims(dataset)}
     return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED)
 
 
-def _robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
+def robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
     """Dimensions over which the robots go, in the flat order of the study."""
     return ("robot",) if "robot" in dataset.dims else ("channel", "wavelength", "amplitude")
 
@@ -252,7 +253,7 @@ def _names(dataset: xr.Dataset) -> Iterator[str]:
 
 
 def _flat(chosen: xr.Dataset, name: str, names: list[str]) -> Values:
-    found: Values = chosen[name].transpose(*_robot_dims(chosen)).values.astype(float).reshape(len(names))
+    found: Values = chosen[name].transpose(*robot_dims(chosen)).values.astype(float).reshape(len(names))
     return found
 
 
@@ -281,7 +282,7 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     places = chosen.get(f"{name}_at_place")
     if places is None:
         return Best(word, name, ranked[winner], 0, 0, spread)
-    there = sign * places.transpose(*_robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
+    there = sign * places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(np.argmax(there, axis=0) == winner)) if there.shape[1] else 0
     return Best(word, name, ranked[winner], wins, there.shape[1], spread)

@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.robot.robot import Robot
 
-__all__ = ["PosteriorFor", "drawn_discrepancy", "posterior_for_of"]
+__all__ = ["PosteriorFor", "drawn_discrepancy", "error_of_mean", "posterior_for_of"]
 
 PosteriorFor = Literal["new", "measured"]
 """Whose discrepancy an interval holds: of a tail like those that were fitted, or of a fitted one."""
@@ -80,7 +80,7 @@ def drawn_discrepancy(
         return found
     values = np.stack([_compared(name, predicted, tail) for name in names])
     spread = np.stack([posterior.discrepancy[name] for name in names]) * values
-    errors = np.stack([_error_of_mean(posterior.error[name], tail["seen"][name]) for name in names])
+    errors = np.stack([_error_of(posterior.error[name], tail["seen"][name]) for name in names])
     noise = np.einsum("qd,rd->dqr", errors, errors) * _correlations(names, float(tail["correlation"]))
     floor = np.array([float(tail["floor"]) * tail["seen"][name]["scale"] for name in names]) ** 2
     noise = noise + np.diag(floor)
@@ -94,6 +94,23 @@ def drawn_discrepancy(
     return found | {name: 1.0 + moved[n] / values[n] for n, name in enumerate(names)}
 
 
+def error_of_mean(
+    error: Samples | float, stated: Samples | float, scale: Samples | float, trials: Samples | float
+) -> Samples:
+    """Standard error of a mean over trials, SI: that of one trial over the root of the number of trials.
+
+    The scatter of trials holds the error of each measurement. So a trial's error is the larger of both, not their sum.
+
+    Args:
+        error: relative error of one trial by the scatter of trials; NaN where unknown.
+        stated: relative error of one trial by its measurement; NaN where it was not stated.
+        scale: what both are relative to, SI.
+        trials: number of trials of the mean.
+    """
+    found: Samples = np.fmax(error, np.nan_to_num(stated)) * scale / np.sqrt(np.maximum(trials, 1.0))
+    return found
+
+
 def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, object]) -> Samples:
     """What was compared: the advance is over the motor's rate where no tail rate was observed."""
     if name == "advance" and tail["by_motor"]:
@@ -101,9 +118,8 @@ def _compared(name: str, predicted: Mapping[str, Samples], tail: Mapping[str, ob
     return predicted[name]
 
 
-def _error_of_mean(error: Samples, seen: Mapping[str, float]) -> Samples:
-    found: Samples = np.maximum(error, seen.get("stated", 0.0)) * seen["scale"] / np.sqrt(max(seen["trials"], 1.0))
-    return found
+def _error_of(error: Samples, seen: Mapping[str, float]) -> Samples:
+    return error_of_mean(error, seen.get("stated", 0.0), seen["scale"], seen["trials"])
 
 
 def _correlations(names: list[str], correlation: float) -> Samples:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
-from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
@@ -21,7 +21,17 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import requirements
 
-__all__ = ["AUTO", "TABLE_TAKES", "UNBOUNDED", "WALLED", "ModelChoice", "choose_model", "fitted_models", "has_table"]
+__all__ = [
+    "AUTO",
+    "TABLE_TAKES",
+    "UNBOUNDED",
+    "WALLED",
+    "ModelChoice",
+    "choose_model",
+    "fitted_models",
+    "has_table",
+    "posterior_alone",
+]
 
 AUTO = "auto"
 """Name that leaves the choice of the model to `choose_model`."""
@@ -43,6 +53,25 @@ class ModelChoice:
     """What to be careful about: a sentence where the robot has a channel that the model does not know, else empty."""
     fitted: bool = False
     """Whether it is the model of a calibration or a posterior."""
+
+
+def posterior_alone(
+    posterior: str | Path, model: str, calibration: str | Path | None, *, calibrated: bool
+) -> PosteriorFile:
+    """A posterior, read for the model that is asked for; it stands in place of every other calibration.
+
+    Args:
+        posterior: path of its file.
+        model: name of a model, or `auto` for any.
+        calibration: path of another calibration, which is refused.
+        calibrated: whether calibration factors are wanted at all; without them a posterior is refused.
+
+    Raises:
+        InputError: for another calibration beside it, a file that is no posterior, or one of another model.
+    """
+    if calibration is not None or not calibrated:
+        raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
+    return read_posterior(posterior, *([] if model == AUTO else [model]))
 
 
 def choose_model(

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.actuation import FrictionReading
@@ -32,7 +32,7 @@ from spirillum.swimming.dry_friction import swim_on_floor
 from spirillum.swimming.freedom import Motion, motion_of
 from spirillum.swimming.loading import prepared
 from spirillum.swimming.lying import Lying
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option
@@ -230,9 +230,7 @@ def predict(
     robot = load(robot)
     names_friction = robot.friction.effective is not None
     if posterior is not None:
-        if calibration is not None or not calibrated:
-            raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
-        drawn = read_posterior(posterior, *([] if model == AUTO else [model]))
+        drawn = posterior_alone(posterior, model, calibration, calibrated=calibrated)
         robot = drawn.central(robot)
         where = drawn.placed(robot, given)
     choice = choose_model(model, robot, placement=where, calibration=calibration, posterior=drawn, motion=motion)

@@ -13,7 +13,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from spirillum.arrays import Values
 from spirillum.quantities import unit_of
-from spirillum.studies.ranking import StudyRanking
+from spirillum.studies.ranking import StudyRanking, robot_dims
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain
@@ -64,8 +64,7 @@ def _readings(dataset: xr.Dataset, name: str) -> Values:
     values = dataset[f"{name}_at_run"]
     if "inferred_by" in values.dims:
         values = values.isel(inferred_by=0)
-    robots = [dim for dim in ("robot", "channel", "wavelength", "amplitude") if dim in values.dims]
-    found: Values = np.abs(values.transpose(*robots, "run", "window").values.astype(float))
+    found: Values = np.abs(values.transpose(*robot_dims(dataset), "run", "window").values.astype(float))
     return found.reshape(-1, values.sizes["run"] * values.sizes["window"])
 
 
