@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -11,6 +12,10 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 
 from spirillum import __version__, arrays
 from spirillum.robot import fields as robot_fields
+
+# Trees of all pages live until the end: a third of the time would go into looking for cycles in them.
+gc.freeze()
+gc.set_threshold(200_000, 50, 100)
 
 project = "spirillum"
 author = "The Spirillum developers"

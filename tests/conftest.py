@@ -1,5 +1,6 @@
 """Settings of all tests, and robots that many of them share."""
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -16,6 +17,10 @@ from spirillum.cli import main
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in a shell's background job: children would never see Ctrl-C
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# What is collected lives as long as the tests do. To look for cycles in it again and again takes half of the time that
+# collecting takes, and a thirtieth of all that follows.
+gc.disable()
 
 # Without the phase that explains a failure: it can take a minute.
 phases = (Phase.explicit, Phase.generate, Phase.shrink)
@@ -41,6 +46,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest tests first: workers end at about the same time, and do not compile the same loops side by side."""
     rank = {name: place for place, name in enumerate(_FIRST)}
     items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
+
+
+def pytest_collection_finish() -> None:
+    """From here on the collector looks at what tests make, and not at each few hundred of new objects."""
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 50)
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
