@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
-SLOW = ("from_video_to_prediction", "one_piece_swimmer_in_tubes")  # half a minute each
+SLOW = ("from_video_to_prediction", "learn_to_hold_a_speed", "one_piece_swimmer_in_tubes")  # up to half a minute each
 
 
 @pytest.mark.parametrize(

@@ -141,6 +141,7 @@ def test_a_robot_that_friction_holds_hardly_moves_and_one_without_is_free() -> N
     assert stuck[0, 0, 0] == pytest.approx(1.0 / (1e-4 * radius[0] * rate[0]), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_gap_solved_without_any_table_lies_in_the_interval(one_gap: Path) -> None:
     found = sp.calibrate(one_gap / "o.csv", WIDE, model="tube", free="gap", method="least-squares")
     assert found.values["gap"].low < GAP < found.values["gap"].high

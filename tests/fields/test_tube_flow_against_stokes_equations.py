@@ -29,6 +29,10 @@ def placed(batch_of: Callable[..., Any]) -> Callable[..., Any]:
     return make
 
 
+SLOW = [pytest.param(which, marks=pytest.mark.slow) for which in ("pitched", "yawed")]
+"""Fields that take some seconds to solve for."""
+
+
 @pytest.fixture(scope="module")
 def closed(placed: Callable[..., Any]) -> TubeFlowField:
     """The paper's robot, 1 mm above the floor of a closed tube."""
@@ -68,7 +72,12 @@ def glass(count: int, distance: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("which", "median"), [("closed", 2e-4), ("pitched", 2e-4), pytest.param("yawed", 1e-3, marks=pytest.mark.slow)]
+    ("which", "median"),
+    [
+        ("closed", 2e-4),
+        pytest.param("pitched", 2e-4, marks=pytest.mark.slow),
+        pytest.param("yawed", 1e-3, marks=pytest.mark.slow),
+    ],
 )
 def test_no_slip_on_the_glass(request: pytest.FixtureRequest, which: str, median: float) -> None:
     """The yawed robot is resolved to a tolerance that is five times that of the first."""
@@ -78,7 +87,7 @@ def test_no_slip_on_the_glass(request: pytest.FixtureRequest, which: str, median
     assert np.median(speed) < median * FASTEST
 
 
-@pytest.mark.parametrize("which", ["closed", "pitched", pytest.param("yawed", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("which", ["closed", *SLOW])
 def test_no_slip_on_the_body(request: pytest.FixtureRequest, which: str) -> None:
     """As good as the square root of the tolerance: the wrenches are as good as the tolerance."""
     field = request.getfixturevalue(which)
@@ -102,7 +111,7 @@ def through(field: TubeFlowField, x: float, count: int = 20) -> tuple[float, flo
     return tuple(float(share @ v.reshape(count, -1).mean(axis=1)) for v in (along, pressure))  # type: ignore[return-value]
 
 
-@pytest.mark.parametrize("which", ["closed", "pitched", pytest.param("yawed", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("which", ["closed", *SLOW])
 def test_the_mean_flow_passes_every_section(request: pytest.FixtureRequest, which: str) -> None:
     field = request.getfixturevalue(which)
     for x in (-0.15, -0.105, 0.03, 0.06):
@@ -130,6 +139,7 @@ def test_pressure_far_away_is_what_the_reciprocal_theorem_says(closed: TubeFlowF
     assert behind == pytest.approx(-0.5 * rise, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_far_flow_is_carried_on(pitched: TubeFlowField) -> None:
     """Where sums over waves end, what they give is what is said beyond."""
     reach, middle = pitched._wall.reach, pitched._wall.middle
@@ -164,7 +174,7 @@ def gradients(field: TubeFlowField, points: np.ndarray, h: float) -> tuple[np.nd
     return first, np.einsum("ndoc,o->nc", velocity, bend), np.einsum("ndo,o->nd", pressure, slope)
 
 
-@pytest.mark.parametrize("which", ["closed", "pitched"])
+@pytest.mark.parametrize("which", ["closed", SLOW[0]])
 def test_stokes_equations(request: pytest.FixtureRequest, which: str) -> None:
     """To the tolerance at which waves are left out."""
     field = request.getfixturevalue(which)

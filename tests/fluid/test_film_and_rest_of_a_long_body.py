@@ -42,6 +42,7 @@ def film_and_rest(tube: float, gap: float, nodes: tuple[float, ...], tolerance: 
     return film(tube, gap) + np.vander([gap], len(nodes))[0] @ found
 
 
+@pytest.mark.slow
 def test_narrow_tube_far_below_the_nodes() -> None:
     found = film_and_rest(15.0, 0.2, (0.8, 1.5, 2.88), 3e-3)
     assert found == pytest.approx([140.99, 826.51, 16460.0, 7.5116], rel=0.01)

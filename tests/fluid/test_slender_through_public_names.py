@@ -246,6 +246,7 @@ def test_what_would_fill_the_memory_is_refused_at_once(overrides: dict[str, str]
     assert words in refused(lambda: sp.predict(sp.load(PRESET, channel="none", **overrides), model="slender"))
 
 
+@pytest.mark.slow
 def test_without_memory_for_a_check_there_is_no_estimate() -> None:
     """A thousand stations are too many for the check's first moments."""
     answer = sp.predict(sp.load(PRESET, **{"tail.wire_diameter": "0.14 mm"}), model="slender", tail_rate=7.5)
