@@ -34,8 +34,10 @@ def swimmer(flat_pictures, tmp_path_factory):
     return film, path
 
 
-def test_speed_and_direction_from_the_side_and_to_the_left(swimmer):
-    film, path = swimmer
+@pytest.fixture(scope="module")
+def followed(swimmer):
+    """Its track, what was seen on each frame, and the progress that was told."""
+    _, path = swimmer
     setup, robot = load_setup(path.with_name("a.setup.toml"))
     seen: list[Seen] = []
     done: list[int] = []
@@ -46,6 +48,12 @@ def test_speed_and_direction_from_the_side_and_to_the_left(swimmer):
         progress=lambda count, total: done.append(count),
         on_frame=lambda index, image, state: seen.append(state),
     )
+    return found, seen, done
+
+
+def test_speed_and_direction_from_the_side_and_to_the_left(swimmer, followed):
+    film, _ = swimmer
+    found, seen, done = followed
     true = film.truth(found.time)
     assert slope(found.time, found.position[:, 0]) == pytest.approx(1e-3, rel=5e-3)
     assert found.heading == pytest.approx(0.0, abs=0.02)
@@ -69,11 +77,11 @@ def test_only_the_scale(swimmer):
     assert video.size == (320, 240)
 
 
-def test_an_end_beyond_the_film_changes_nothing_and_a_start_beyond_it_is_refused(swimmer):
+def test_an_end_beyond_the_film_changes_nothing_and_a_start_beyond_it_is_refused(swimmer, followed):
     _, path = swimmer
     setup, robot = load_setup(path.with_name("a.setup.toml"))
-    found, later = (follow(path, setup.model_copy(update={"end": end}), robot) for end in (None, 1000.0))
-    assert later.position.tolist() == found.position.tolist()
+    later = follow(path, setup.model_copy(update={"end": 1000.0}), robot)
+    assert later.position.tolist() == followed[0].position.tolist()
     with pytest.raises(InputError, match=r"start = 8 s, but a.mp4 ends at 6 s; allowed: a start before its end"):
         follow(path, setup.model_copy(update={"start": 8.0}), robot)
 
