@@ -18,12 +18,16 @@ from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import YAW_SHARES, Places, rings_of
 from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.rest import (
+    HARMONICS,
+    PHASES,
     Solution,
     even_phases,
     factor_of,
     fourier,
+    matrices_at,
     matrix_of,
     mirrored,
+    rest_at,
     seen_in_mirror,
     solutions,
 )
@@ -66,9 +70,9 @@ def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.nda
     return kernel.packed(R, places.rings, *parts, *turned, film)
 
 
-def smooth(t: float, f: float) -> np.ndarray:
+def smooth(t: float, f: float, phases: int = 5) -> np.ndarray:
     """Something of low degree in sqrt(t) and log(1.3 - f) on either side of level."""
-    draw = np.random.default_rng(3).normal(size=(4, 5, kernel.PARAMETERS))
+    draw = np.random.default_rng(3).normal(size=(4, phases, kernel.PARAMETERS))
     s, f = np.sqrt(t), np.log(1.3 - abs(f)) - np.log(1.3)
     return 0.2 * (draw[0] + draw[1] * s + draw[2] * s**2 * abs(f) + draw[3] * f**2)
 
@@ -78,17 +82,23 @@ def at(table: np.ndarray, e: float, pitch: float, yaw: float = 0.0, phase: float
     return out, kernel.resistance_at(table, e, pitch, yaw, phase, out)
 
 
+def sum_at(coefficients: np.ndarray, phase: float) -> np.ndarray:
+    turns = phase * np.arange(1, (len(coefficients) + 1) // 2)
+    wave = np.concatenate([[1.0], np.stack([np.cos(turns), np.sin(turns)], axis=1).ravel()])
+    return wave @ coefficients
+
+
 def lower(coefficients: np.ndarray, phase: float) -> np.ndarray:
-    wave = np.array([1.0, np.cos(phase), np.sin(phase), np.cos(2 * phase), np.sin(2 * phase)])
     found = np.zeros((8, 8))
-    found[np.tril_indices(8)] = wave @ coefficients
+    found[np.tril_indices(8)] = sum_at(coefficients, phase)
     found[np.diag_indices(8)] = np.exp(np.diag(found))
     return found
 
 
-def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.ndarray) -> None:
-    """Of degree 2 in sqrt(t) and in log(1.3 - f), with the film added back."""
-    table = packed(places, film, smooth)
+@pytest.mark.parametrize("phases", [5, PHASES])
+def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.ndarray, phases: int) -> None:
+    """Of degree 2 in sqrt(t) and in log(1.3 - f), with all harmonics of the phase, and the film added back."""
+    table = packed(places, film, lambda t, f: smooth(t, f, phases))
     draw = np.random.default_rng(0)
     for _ in range(40):
         t, row = draw.uniform(places.gaps[0], 1.0), places
@@ -107,7 +117,7 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
         assert left == kernel.INSIDE
         thin = np.zeros((6, 6))
         kernel.film_at(film, e, pitch, 0.0, thin)
-        factor = lower(smooth(t, f), phase)
+        factor = lower(smooth(t, f, phases), phase)
         expected = factor @ factor.T
         expected[:6, :6] += kernel.cut_of_film(t) * thin
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
@@ -214,11 +224,34 @@ def test_a_tail_much_wider_than_its_body_has_no_table(geometry: RobotGeometry) -
     assert Places(geometry._replace(amplitude=0.0095), R).gaps[0] > 0.1
 
 
-def test_fourier_sums_give_the_values_back() -> None:
-    values = np.random.default_rng(2).normal(size=(5, 3))
-    phases = np.array(even_phases())
-    waves = np.stack([np.ones(5), np.cos(phases), np.sin(phases), np.cos(2 * phases), np.sin(2 * phases)], axis=1)
-    np.testing.assert_allclose(waves @ fourier(values), values, atol=1e-13)
+@pytest.mark.parametrize("harmonics", [2, 3, HARMONICS])
+def test_as_many_phases_as_it_has_coefficients_give_a_function_of_the_phase_back(harmonics: int) -> None:
+    """What so few phases do not give is zero, and the function is met at any other phase, too."""
+    planted = np.random.default_rng(2).normal(size=(2 * harmonics + 1, kernel.PARAMETERS))
+    phases = even_phases(len(planted))
+    found = fourier(np.stack([sum_at(planted, phase) for phase in phases]), PHASES)
+    np.testing.assert_allclose(found[: len(planted)], planted, atol=1e-13)
+    assert found.shape == (PHASES, kernel.PARAMETERS)
+    assert not np.any(found[len(planted) :])
+
+
+def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
+    """A factor of three harmonics and its film, from seven phases; five are not enough."""
+    planted = 0.3 * np.random.default_rng(8).normal(size=(7, kernel.PARAMETERS))
+    film, seat = np.diag(np.arange(1.0, 7.0)), Seat(R, 0.004, 0.0)
+
+    def full(phase: float) -> np.ndarray:
+        factor = lower(planted, phase)
+        matrix = factor @ factor.T
+        matrix[:6, :6] += kernel.cut_of_film(0.3) * film
+        return matrix
+
+    for count, enough in ((5, False), (7, True), (PHASES, True)):
+        found = rest_at(np.stack([full(phase) for phase in even_phases(count)]), film, 0.3, seat)
+        assert found.shape == (PHASES, kernel.PARAMETERS)
+        back = matrices_at(found, np.array([1.234]))[0]
+        back[:6, :6] += kernel.cut_of_film(0.3) * film
+        assert np.allclose(back, full(1.234), rtol=1e-10, atol=1e-12) is enough
 
 
 def test_yawed_nodes_are_met() -> None:

@@ -291,6 +291,13 @@ def _place(table: Samples, e: float, pitch: float, of_gap: Samples) -> tuple[flo
 
 
 @compiled
+def _add(weight: float, values: Samples, out: Samples) -> None:
+    """Add weighted values: an index from 0, which cannot be negative, lets several be added at a time."""
+    for n in range(out.size):
+        out[n] += weight * values[n]
+
+
+@compiled
 def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Samples) -> tuple[int, float]:
     """Fill the Fourier coefficients of the rest's factor, (phases, 36); how the range was left, and t."""
     gaps, up, down = int(table[_GAPS]), int(table[_UP]), int(table[_DOWN])
@@ -311,9 +318,7 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
         for j in range(pitches):
             column = up + j - 1 if lowered and j > 0 else j
             here = at_rest + (i * (up + down - 1) + column) * block
-            share = of_gap[i] * of_pitch[j]
-            for n in range(block):
-                flat[n] += share * table[here + n]
+            _add(of_gap[i] * of_pitch[j], table[here : here + block], flat)
     if yaw != 0.0 and table[_YAW_GAPS] > 0 and not _add_yaw(table, t, f, yaw / largest_yaw(table, e, pitch), flat):
         left = TOO_FAR_YAWED
     return left, t
@@ -381,8 +386,7 @@ def _add_yaw(table: Samples, t: float, f: float, share: float, out: Samples) -> 
             weight = of_gap[i] * of_pitch[j]
             for _ in range(YAW_ORDERS):
                 weight *= s
-                for n in range(out.size):
-                    out[n] += weight * table[here + n]
+                _add(weight, table[here : here + out.size], out)
                 here += out.size
     return within
 

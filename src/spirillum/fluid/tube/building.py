@@ -20,6 +20,7 @@ from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, YAW_SHARES, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import (
+    PHASES,
     Progress,
     Solution,
     even_phases,
@@ -41,6 +42,10 @@ __all__ = ["built_tables"]
 
 _TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
 """How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
+_NEAR_GLASS = 0.9
+"""Share of the largest pitch, or yaw, from which all harmonics of the tail's phase matter."""
+_FAR, _YAWED = 5, 7
+"""Phases at nodes further from the glass, without yaw and with it."""
 _HELD_OUT = 6
 _SEED = 20121
 
@@ -85,10 +90,12 @@ def _tabulated_film(body: Outline, radius: float) -> Samples:
 
 def _nodes(places: Places) -> list[Solution]:
     """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
-    own = places.geometry, even_phases()
-    level = [Solution((own,), place.seat, fineness_at(place.seat)) for place in _level(places)]
-    yawed = [Solution((own, mirrored(*own)), place.seat, fineness_at(place.seat)) for place in _yawed(places)]
-    return level + yawed
+    found = []
+    for place in _level(places) + _yawed(places):
+        own = places.geometry, even_phases(place.phases)
+        tails = (own, mirrored(*own)) if place.seat.yaw else (own,)
+        found.append(Solution(tails, place.seat, fineness_at(place.seat)))
+    return found
 
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:
@@ -103,6 +110,8 @@ class _Place(NamedTuple):
     t: float
     f: float
     seat: Seat
+    phases: int
+    """Of the tail, evenly spread: a tail near the glass has more harmonics over a turn."""
 
 
 def fineness_at(seat: Seat) -> Fineness:
@@ -113,7 +122,7 @@ def fineness_at(seat: Seat) -> Fineness:
 def _level(places: Places) -> list[_Place]:
     """Nodes without yaw that are solved for: for each t those nose up, then, off the axis, those nose down."""
     return [
-        _Place(float(t), float(f), places.seat(float(t), float(f)))
+        _Place(float(t), float(f), places.seat(float(t), float(f)), PHASES if abs(f) > _NEAR_GLASS else _FAR)
         for t in places.gaps
         for f in (*places.up, *(-places.down[1:] if t < 1.0 else ()))
     ]
@@ -122,7 +131,12 @@ def _level(places: Places) -> list[_Place]:
 def _yawed(places: Places) -> list[_Place]:
     """Nodes with yaw that are solved for, those off the axis, one after the other for each share of the largest yaw."""
     return [
-        _Place(float(t), float(f), places.seat(float(t), float(f), share * float(most)))
+        _Place(
+            float(t),
+            float(f),
+            places.seat(float(t), float(f), share * float(most)),
+            PHASES if share > _NEAR_GLASS else _YAWED,
+        )
         for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
         for f, most in zip(places.yaw_pitches, row, strict=True)

@@ -23,6 +23,7 @@ from spirillum.robot.seat import Seat
 from spirillum.units import show
 
 __all__ = [
+    "HARMONICS",
     "PHASES",
     "Solution",
     "even_phases",
@@ -37,8 +38,10 @@ __all__ = [
     "solved_as_one",
 ]
 
-PHASES = 5
-"""Phases of the tail at every place: two harmonics."""
+HARMONICS = 4
+"""Harmonics of the tail's phase that a table keeps."""
+PHASES = 2 * HARMONICS + 1
+"""Phases of the tail that give them all."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -145,13 +148,19 @@ def factor_of(matrix: Samples, where: str) -> Samples:
     return found
 
 
-def fourier(values: Samples) -> Samples:
-    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0."""
+def fourier(values: Samples, size: int = 0) -> Samples:
+    """Coefficients 1, cos, sin, cos 2, sin 2, ... of values at evenly spread phases from 0, an odd number, axis 0.
+
+    Args:
+        values: (phases, ...).
+        size: least number of coefficients: those that so few phases do not give are zero.
+    """
     count = len(values)
     phase = 2.0 * np.pi * np.arange(count) / count
     rows = [np.full(count, 1.0 / count)]
     for harmonic in range(1, (count - 1) // 2 + 1):
         rows += [np.cos(harmonic * phase) * 2.0 / count, np.sin(harmonic * phase) * 2.0 / count]
+    rows += [np.zeros(count)] * (size - count)
     found: Samples = np.tensordot(np.stack(rows), values, axes=1)
     return found
 
@@ -187,10 +196,10 @@ def seen_in_mirror(matrices: Samples) -> Samples:
 
 
 def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
-    """Fourier coefficients of the factor of what is left without the film, (phases, 36).
+    """Fourier coefficients of the factor of what is left without the film, (`PHASES`, 36).
 
     Args:
-        matrices: (phases, 8, 8).
+        matrices: at evenly spread phases from 0, as many as matter there, (phases, 8, 8).
         film: of the body at that seat, (6, 6).
         t: of the place.
         seat: named where the rest is not positive definite.
@@ -198,4 +207,4 @@ def rest_at(matrices: Samples, film: Samples, t: float, seat: Seat) -> Samples:
     rest = matrices.copy()
     rest[:, :6, :6] -= cut_of_film(t) * film
     where = f"at an offset of {show(seat.offset, 'mm')} and a pitch of {show(seat.pitch, 'deg')}"
-    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where))
+    return fourier(factor_of(0.5 * (rest + np.swapaxes(rest, 1, 2)), where), PHASES)
