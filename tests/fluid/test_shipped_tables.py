@@ -18,7 +18,8 @@ from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import INSIDE, YAW_SLACK, largest_yaw
+from spirillum.kernels.tube_places import PHASES
+from spirillum.kernels.tube_table import INSIDE, YAW_SLACK, largest_yaw, mean_resistance_at
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
@@ -84,6 +85,19 @@ def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None
         assert left == INSIDE
         assert np.array_equal(matrix, matrix.T)
         assert np.linalg.eigvalsh(matrix / np.outer(scale, scale))[0] > 1e-4
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_means_over_a_turn_need_no_more_phases(name: str) -> None:
+    """Where the tail is nearest to the glass, too."""
+    table, places = shipped(name)
+    for t, f, yaw in ((0.1, 1.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.3, 1.0)):
+        seat = places.seat_between(t, f, yaw * places.largest_yaw(t, f))
+        few, many = np.empty((8, 8)), np.empty((8, 8))
+        for count, out in ((PHASES, few), (45, many)):
+            mean_resistance_at(table.packed, seat.offset, seat.pitch, seat.yaw, count, out)
+        scale = np.sqrt(np.diag(many))
+        assert np.abs((few - many) / np.outer(scale, scale)).max() < 2e-6
 
 
 @pytest.mark.parametrize("name", PRESETS)

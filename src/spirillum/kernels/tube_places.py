@@ -11,8 +11,8 @@ from spirillum.kernels.tube_table import INSIDE, MOTIONS, film_start, mean_resis
 
 __all__ = ["PHASES", "mean_resistances", "offset_at_gap"]
 
-PHASES = 5
-"""Phases that a mean is taken over: a table has two harmonics, and what five phases leave of them is below 1e-7."""
+PHASES = 9
+"""Phases that a mean is taken over: what they leave of a table's four harmonics is below 1e-6, five up to 5e-4."""
 _STEPS = 30
 _ACCURACY = 1e-12  # of the gap, over the radius of the tube
 
