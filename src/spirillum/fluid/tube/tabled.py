@@ -62,8 +62,9 @@ def mean_resistances_along(tables: Samples, gap: Samples, pitch: Samples, yaw: S
         Against U, Omega, omega and the mean flow, closed ends; NaN where a place is outside the robot's table.
     """
     found = np.empty((gap.size, MOTIONS, MOTIONS))
-    which = np.ravel(np.broadcast_to(np.arange(len(tables)), gap.shape))
-    mean_resistances(tables, which, np.ravel(gap), np.ravel(pitch), np.ravel(yaw), found)
+    which = np.broadcast_to(np.arange(len(tables)), gap.shape)
+    # Copies: for arrays that cannot be written to the loop would be compiled again.
+    mean_resistances(tables, which.flatten(), gap.flatten(), pitch.flatten(), yaw.flatten(), found)
     axes = along_the_tube(pitch, yaw)
     whole: Samples = np.swapaxes(axes, -1, -2) @ found.reshape(*gap.shape, MOTIONS, MOTIONS) @ axes
     return whole
