@@ -1,6 +1,6 @@
 """Make the tables of the paper's robots anew and put them into the package.
 
-Robots of one channel and amplitude share all places: some 25 min of one core for four tails. What
+Robots of one channel and amplitude share all places: some 25 to 30 min of one core for four tails. What
 was solved for is kept in the cache, as for `spirillum prepare`, until the solver's source changes.
 
     OMP_NUM_THREADS=1 python tools/ship_tables.py [--channel wide] [--amplitude 2.5] [--wavelength 25]
