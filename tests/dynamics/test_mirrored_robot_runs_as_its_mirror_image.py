@@ -29,7 +29,9 @@ def test_mirrored_run_is_the_mirror_image(polarity: str) -> None:
         for hand, side in (("right", 1), ("left", -1))
     )
     assert float(there["contact_force"].max()) > 0.0
-    _mirrored(there, back, 2e-8)
+    # Ten times the integrator's tolerance of 1e-8: its differences for the Jacobian are not mirrored, and the force of
+    # asperities, steep in the gap, magnifies what that leaves. It depends on the order in which the compiler adds.
+    _mirrored(there, back, 1e-7)
 
 
 def test_mirrored_run_without_walls_is_the_mirror_image() -> None:
