@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.fluid.tube import tube
+from spirillum.errors import InputError
+from spirillum.fluid.tube import library, tube
 from spirillum.fluid.tube.building import _powers
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
@@ -33,6 +36,7 @@ from spirillum.fluid.tube.rest import (
 )
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
+from spirillum.fluid.tube.table_file import packed_from, to_bytes
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 from spirillum.robot.batch import RobotBatch
@@ -436,3 +440,25 @@ def test_on_the_axis_every_tilt_is_a_pitch() -> None:
     raised = OnAxis.of(pitches, np.stack([coefficients(pitch, 0.0) for pitch in pitches]))
     for pitch, yaw in ((0.1, 0.0), (-0.13, 0.0), (0.05, 0.08), (-0.1, 0.06), (0.0, -0.07), (0.07, -0.1)):
         np.testing.assert_allclose(raised.coefficients(pitch, yaw), coefficients(pitch, yaw), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "change", [{"radius": -0.02}, {"radius": "x"}, {"error_without_yaw": {"forward_velocity": "NaN"}}]
+)
+def test_a_table_whose_head_is_wrong_is_none(change: dict[str, Any], tmp_path: Path) -> None:
+    path = next((Path(library.__file__).parent / "tables").glob("*.table"))
+    head, packed = packed_from(path.read_bytes())
+    (tmp_path / "a.table").write_bytes(to_bytes(json.dumps(json.loads(head) | change).encode(), packed))
+    with pytest.raises(InputError, match="no table"):
+        TubeTable.read(tmp_path / "a.table")
+
+
+def test_a_table_with_an_even_number_of_phases_is_none(tmp_path: Path) -> None:
+    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    nodes = table.packed.copy()
+    nodes[kernel._PHASES] = 4.0
+    parts = kernel.parts_of(table.packed)
+    even = parts._replace(nodes=nodes[: parts.nodes.size], rest=parts.rest[:, :, :4], yawed=parts.yawed[:, :, :, :4])
+    replace(table, packed=even.packed()).write(tmp_path / "a.table")
+    with pytest.raises(InputError, match="no table"):
+        TubeTable.read(tmp_path / "a.table")

@@ -1,13 +1,14 @@
 """Large pictures are looked at as a whole after they were reduced: where things lie, and which rulers survive it."""
 
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 
 from spirillum.vision.camera.camera import background, ruler_of
-from spirillum.vision.camera.optics import Optics
+from spirillum.vision.camera.optics import BodyPose, Optics
 from spirillum.vision.camera.ruler import lines_in, resolved
+from spirillum.vision.track.scouting import _walls
 from spirillum.vision.track.search import searched_at
 from spirillum.vision.video.frames import Frame
 from spirillum.vision.video.pictures import reduced, reduction
@@ -43,6 +44,22 @@ def test_a_reduced_camera_sees_a_point_where_its_block_is(centre: tuple[float, f
 @pytest.mark.parametrize(("width", "factor"), [(300.0, 3), (100.0, 2), (30.0, 1)])
 def test_a_small_body_is_looked_for_in_less_reduced_pictures(width: float, factor: int) -> None:
     assert searched_at(width, 3) == factor
+
+
+@pytest.mark.parametrize("factor", [1, 3])
+def test_walls_are_found_in_a_reduced_picture(factor: int) -> None:
+    """Of a tube 40 mm wide, 1200 pixels of 0.1 mm across."""
+    optics = Optics((1200, 900), 2000.0, 0.2, 0.0, 0.2, 1.0)
+    pixel = optics.length_per_pixel
+    picture = np.full((900, 1200, 3), 120, dtype=np.uint8)
+    edges = [round(450 + side * 0.02 / pixel) for side in (-1, 1)]
+    picture[edges[0] : edges[1]] = 180
+    body = SimpleNamespace(optics=optics, robot=SimpleNamespace(body=SimpleNamespace(diameter=0.018)))
+    path = [(0.1 * n, BodyPose(0.001 * n, 0.0, 0.0)) for n in range(5)]
+    known = SimpleNamespace(start=SimpleNamespace(body=body, path=path))
+    found = _walls(reduced(picture, factor).astype(float), known, None)
+    assert found is not None
+    assert found.distance * 0.018 == pytest.approx(0.04, abs=3.0 * factor * pixel)
 
 
 def ruled(spacing: float) -> Frame:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -113,9 +114,23 @@ def _read(path: Path) -> TubeTable | None:
         if head.pop("format") != _FORMAT:
             return None
         geometry = RobotGeometry(**head.pop("geometry"))
-        return TubeTable(geometry=geometry, packed=packed, **head)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return _checked(TubeTable(geometry=geometry, packed=packed, **head))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         return None
+
+
+def _checked(table: TubeTable) -> TubeTable:
+    """A table whose numbers are finite, of an odd number of phases and a tube that has a radius.
+
+    Raises:
+        ValueError: if it is not.
+    """
+    stated = (table.radius, table.seconds, table.places, *table.error.values(), *table.error_without_yaw.values())
+    parts = kernel.parts_of(table.packed)
+    finite = all(map(math.isfinite, stated)) and all(np.isfinite(part).all() for part in parts[:3])
+    if not finite or table.radius <= 0.0 or parts.rest.shape[2] % 2 == 0:
+        raise ValueError("not the numbers of a table")
+    return table
 
 
 def key_of(geometry: RobotGeometry, radius: float) -> str:

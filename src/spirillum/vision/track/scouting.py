@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
-from spirillum.vision.camera.ruler import Lines
+from spirillum.vision.camera.ruler import Lines, ruler_in
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
@@ -120,16 +120,19 @@ def _ruler(
     stills: _Stills, bounds: tuple[int, int, int, int], most: int
 ) -> tuple[tuple[Lines | None, int], tuple[str, ...]]:
     """The ruler and a factor by which pictures may be reduced that show it, and where the nose may point."""
-    along = {
-        side: ruler_of(stills.at(most), bounds, -DIRECTIONS[side], most, stills.frames) for side in ("right", "down")
-    }
-    known = [(len(lines.number), side, lines, factor) for side, (lines, factor) in along.items() if lines is not None]
-    if not known:
-        left, top, right, bottom = bounds
-        sides = ("right", "left", "up", "down")
-        return (None, most), sides if right - left >= bottom - top else sides[::-1]
-    _, side, lines, factor = max(known, key=lambda one: one[0])
-    return (lines, factor), (side, opposite(side))
+    still, (left, top, right, bottom) = stills.at(most), bounds
+    small = left // most, top // most, right // most, bottom // most
+    found = {side: ruler_in(still, small, -DIRECTIONS[side]) for side in ("right", "down")}
+    count = {side: 0 if lines is None else len(lines.number) for side, lines in found.items()}
+    # A full picture takes long at all rolls: first the way along which a reduced one shows more lines.
+    for side in sorted(found, key=lambda one: -count[one]):
+        lines, factor = (
+            (found[side], 1) if most == 1 else ruler_of(still, bounds, -DIRECTIONS[side], most, stills.frames)
+        )
+        if lines is not None:
+            return (lines, factor), (side, opposite(side))
+    sides = ("right", "left", "up", "down")
+    return (None, most), sides if right - left >= bottom - top else sides[::-1]
 
 
 def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) -> Setup:
@@ -234,7 +237,7 @@ def _walls(still: Samples, known: Identified, lines: Lines | None) -> Walls | No
     step = factor * optics.length_per_pixel
     reach = SCOUTING.widest * diameter
     across = np.arange(-reach, reach, step)
-    along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * step
+    along = np.linspace(-0.5, 0.5, SCOUTING.along) * 0.9 * max(optics.size) * optics.length_per_pixel
     grid = centre + along[:, None, None] * way + across[None, :, None] * side
     points = np.concatenate([grid, np.full((*grid.shape[:2], 1), optics.axis_height)], axis=2)
     pixels = np.nan_to_num(optics.pixels(points.reshape(-1, 3)), nan=-9.0).round().astype(int)
