@@ -90,12 +90,15 @@ def _tabulated_film(body: Outline, radius: float) -> Samples:
 
 def _nodes(places: Places) -> list[Solution]:
     """What is solved for: nodes without yaw, then those with it, of the robot and of its mirror image."""
-    found = []
-    for place in _level(places) + _yawed(places):
-        own = places.geometry, even_phases(place.phases)
-        tails = (own, mirrored(*own)) if place.seat.yaw else (own,)
-        found.append(Solution(tails, place.seat, fineness_at(place.seat)))
-    return found
+
+    def tail(place: _Place) -> tuple[RobotGeometry, tuple[float, ...]]:
+        return places.geometry, even_phases(place.phases)
+
+    level = [Solution((tail(place),), place.seat, fineness_at(place.seat)) for place in _level(places)]
+    yawed = [
+        Solution((tail(place), mirrored(*tail(place))), place.seat, fineness_at(place.seat)) for place in _yawed(places)
+    ]
+    return level + yawed
 
 
 def _packed(places: Places, found: Sequence[Sequence[Samples]]) -> Samples:

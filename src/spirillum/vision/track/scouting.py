@@ -18,7 +18,7 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.vision.camera.camera import background, bounds_of, ruler_of, samples_of
 from spirillum.vision.camera.optics import DIRECTIONS, Optics, opposite
-from spirillum.vision.camera.ruler import Lines, ruler_in
+from spirillum.vision.camera.ruler import Lines
 from spirillum.vision.camera.scale import first_rotation, given_camera
 from spirillum.vision.setup import Setup, stripes_of
 from spirillum.vision.track.body import BodyFinder
@@ -120,17 +120,17 @@ def _ruler(
     stills: _Stills, bounds: tuple[int, int, int, int], most: int
 ) -> tuple[tuple[Lines | None, int], tuple[str, ...]]:
     """The ruler and a factor by which pictures may be reduced that show it, and where the nose may point."""
-    still, (left, top, right, bottom) = stills.at(most), bounds
-    small = left // most, top // most, right // most, bottom // most
-    found = {side: ruler_in(still, small, -DIRECTIONS[side]) for side in ("right", "down")}
-    count = {side: 0 if lines is None else len(lines.number) for side, lines in found.items()}
+    still = stills.at(most)
+    found = {side: ruler_of(still, bounds, -DIRECTIONS[side], most) for side in ("right", "down")}
+    count = {side: 0 if lines is None else len(lines.number) for side, (lines, _) in found.items()}
     # A full picture takes long at all rolls: first the way along which a reduced one shows more lines.
     for side in sorted(found, key=lambda one: -count[one]):
-        lines, factor = (
-            (found[side], 1) if most == 1 else ruler_of(still, bounds, -DIRECTIONS[side], most, stills.frames)
-        )
+        lines, factor = found[side]
+        if most > 1:
+            lines, factor = ruler_of(still, bounds, -DIRECTIONS[side], most, stills.frames)
         if lines is not None:
             return (lines, factor), (side, opposite(side))
+    left, top, right, bottom = bounds
     sides = ("right", "left", "up", "down")
     return (None, most), sides if right - left >= bottom - top else sides[::-1]
 
