@@ -166,6 +166,10 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     values = extensions(k, distance, orders)
     found = np.empty((6, 3, 2, 2, orders, 3))
     station_waves(values, angle, k * x, found)
+    some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
+    scale = ive(0, k * distance) / ive(0, k) * np.exp(k * (distance - 1.0))
+    station_waves(wave_extensions(k, 1.0, distance, scale, orders, 2), angle, k * x, some, 2)
+    np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
     even, odd = np.empty((2, 3, 6, orders, 3))
     circle_waves(values, angle, angle - theta, even, odd)
     points = np.stack([x, y, z], axis=1)

@@ -80,15 +80,15 @@ def _invert(a: Samples, inverse: Samples) -> None:
 
 @compiled
 def _extension(
-    scale: float, z: float, wall: float, orders: int, inverses: Samples, r: Samples, v: Samples, out: Samples
+    scale: float, z: float, wall: float, first: int, inverses: Samples, r: Samples, v: Samples, out: Samples
 ) -> None:
-    """Fill out (orders, 3, 3) with the extensions from the wall k R = `wall` to k rho = z.
+    """Fill out (orders - first, 3, 3) with the extensions from the wall k R = `wall` to k rho = z.
 
     Args:
         scale: I_0(z)/I_0(wall).
         z: k rho.
         wall: k R.
-        orders: number of orders p.
+        first: the first order p.
         inverses: of the flows at the wall, and ratios there in the last row: (orders, 10).
         r: work space, (orders + 2,).
         v: work space, (3, 3).
@@ -96,14 +96,16 @@ def _extension(
     """
     z = max(z, 1e-12 * wall)
     _ratios(z, r)
-    for p in range(orders):
+    for p in range(first):
+        scale *= r[p] / inverses[p, 9]
+    for p in range(first, len(inverses)):
         _flows(p, z, wall, r, v)
         for i in range(3):
             for j in range(3):
                 total = 0.0
                 for c in range(3):
                     total += v[i, c] * inverses[p, 3 * c + j]
-                out[p, i, j] = scale * total
+                out[p - first, i, j] = scale * total
         scale *= r[p] / inverses[p, 9]
 
 
@@ -122,21 +124,22 @@ def _wall_inverses(wall: float, orders: int, inverses: Samples) -> None:
 
 
 @compiled
-def wave_extensions(k: float, radius: float, rho: Samples, scale: Samples, orders: int) -> Samples:
-    """Velocities (X, u_rho, v) at rho for unit velocities at the radius, (n, orders, 3, 3).
+def wave_extensions(k: float, radius: float, rho: Samples, scale: Samples, orders: int, first: int = 0) -> Samples:
+    """Velocities (X, u_rho, v) at rho for unit velocities at the radius, (n, orders - first, 3, 3).
 
     Args:
         k: wave number, above 0.
         radius: of the cylinder on which the waves are one.
         rho: where, (n,).
         scale: I_0(k rho)/I_0(k radius), (n,).
-        orders: number of orders p.
+        orders: the order p after the last.
+        first: the first order p.
     """
     inverses, r, v = np.empty((orders, 10)), np.empty(orders + 2), np.empty((3, 3))
     _wall_inverses(k * radius, orders, inverses)
-    out = np.empty((rho.size, orders, 3, 3))
+    out = np.empty((rho.size, orders - first, 3, 3))
     for n in range(rho.size):
-        _extension(scale[n], k * rho[n], k * radius, orders, inverses, r, v, out[n])
+        _extension(scale[n], k * rho[n], k * radius, first, inverses, r, v, out[n])
     return out
 
 
@@ -216,20 +219,21 @@ def circle_waves(extensions: Samples, angle: Samples, turn: Samples, even: Sampl
 
 
 @compiled
-def station_waves(extensions: Samples, angle: Samples, phase: Samples, out: Samples) -> None:
-    """Velocities (x, y, z) of all waves at points: real and imaginary part, even and odd, order and wall component.
+def station_waves(extensions: Samples, angle: Samples, phase: Samples, out: Samples, first: int = 0) -> None:
+    """Velocities (x, y, z) of waves at points: real and imaginary part, even and odd, order and wall component.
 
     Args:
         extensions: at points, (n, orders, 3, 3).
         angle: polar angles of the points about the tube's axis, (n,).
         phase: k x, (n,).
         out: to be filled, (n, 3, 2, 2, orders, 3).
+        first: the first order p.
     """
     for n in range(angle.size):
         c, s = math.cos(angle[n]), math.sin(angle[n])
         real, imaginary = math.cos(phase[n]), math.sin(phase[n])
         for p in range(extensions.shape[1]):
-            cos, sin = math.cos(p * angle[n]), math.sin(p * angle[n])
+            cos, sin = math.cos((first + p) * angle[n]), math.sin((first + p) * angle[n])
             for w in range(3):
                 x, rho, v = extensions[n, p, 0, w], extensions[n, p, 1, w], extensions[n, p, 2, w]
                 for parity in range(2):
@@ -246,9 +250,9 @@ def station_waves(extensions: Samples, angle: Samples, phase: Samples, out: Samp
 
 @compiled
 def tilted_waves(
-    extensions: Samples, angle: Samples, phase: Samples, theta: Samples, rotation: Samples, out: Samples
+    extensions: Samples, angle: Samples, phase: Samples, theta: Samples, rotation: Samples, out: Samples, first: int
 ) -> None:
-    """Velocities (x, rho, theta) of all waves on rings about a tilted axis, in cylindrical components about it.
+    """Velocities (x, rho, theta) of waves on rings about a tilted axis, in cylindrical components about it.
 
     Args:
         extensions: at the rings' points, (angles, n, orders, 3, 3).
@@ -257,6 +261,7 @@ def tilted_waves(
         theta: angles about the rings' axis, (angles,).
         rotation: from the rings' axes to the tube's, (3, 3).
         out: to be filled: component; even, odd; angle; ring; real, imaginary; order; wall component.
+        first: the first order p.
     """
     for t in range(theta.size):
         cos_t, sin_t = math.cos(theta[t]), math.sin(theta[t])
@@ -269,7 +274,7 @@ def tilted_waves(
             cos_a, sin_a = math.cos(angle[t, n]), math.sin(angle[t, n])
             real, imaginary = math.cos(phase[t, n]), math.sin(phase[t, n])
             for p in range(extensions.shape[2]):
-                cos, sin = math.cos(p * angle[t, n]), math.sin(p * angle[t, n])
+                cos, sin = math.cos((first + p) * angle[t, n]), math.sin((first + p) * angle[t, n])
                 for w in range(3):
                     u = extensions[t, n, p, 0, w]
                     rho, v = extensions[t, n, p, 1, w], extensions[t, n, p, 2, w]

@@ -13,27 +13,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import System
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.wall import Waves, each, point_waves
+from spirillum.fluid.tube.wall import Waves, components_of, distances_of, each, point_waves
 from spirillum.fluid.wire.interaction import share
 from spirillum.fluid.wire.sources import Sources
 
 __all__ = ["Answers", "Reduced"]
 
-_LEAST = 2e-8
-"""Fields below this share of the largest are left out."""
+_LEAST, _MOST_LEAST = 2e-8, 2e-6
+"""Fields below this share of the largest are left out: the square of a tenth of the tolerance, between these."""
 _SNAPSHOTS = 300
 """Least number of points on what the wires sweep from which the wall's fields are found; two at each station."""
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 """Angle between the phases of neighbouring stations: together they cover what the wire sweeps."""
-_SKETCH, _WALL_SKETCH = 96, 256
-"""Random combinations from which fields of a mode, and of the wall, are found; twice as many if they do not suffice."""
+_SKETCH, _WALL_SKETCH = 96, 128
+"""Random combinations from which fields of a mode, and of the wall (for each parity), are found; more if need be."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,8 @@ class Reduced:
     """The wires, at any phase."""
     waves: Waves
     """Between wires and solids."""
+    away: float
+    """Smallest distance of the solids from the wall, m."""
     answers: tuple[Answers, ...]
     """For each system."""
 
@@ -105,7 +107,7 @@ class Reduced:
             found.append(_answers(solids, number, crossing, wall, fields))
         edges = np.cumsum([0, *(tail.x.size for tail in tails)]).tolist()
         return [
-            cls(tail, waves, tuple(answers.only(low, high, sources.x.size) for answers in found))
+            cls(tail, waves, solids.gap, tuple(answers.only(low, high, sources.x.size) for answers in found))
             for tail, (low, high) in zip(tails, pairwise(edges), strict=True)
         ]
 
@@ -121,21 +123,36 @@ class Reduced:
             placed: their stations about the tube's axis, (n, 3), m.
             along: from forces in the robot's axes to the tube's, (3 n, 3 n).
         """
-        at_stations = each(lambda k: point_waves(placed, self.waves, k), range(self.waves.k.size))
         found = []
-        for answers in self.answers:
+        for answers, wall in zip(self.answers, self._reflected(placed), strict=True):
             free: list[Samples] = [np.zeros((0, len(placed) * (3 + sources.torques.shape[2])))]
             for parity, m, coefficients in answers.free:
                 turn = sources.turn(m, coefficients.shape[1])
                 free.append(sources.columns(coefficients * (turn.imag if parity else turn.real)))
             both = np.concatenate(free)
-            wall = np.zeros((answers.wall[0].shape[0], len(along)))
-            for matrix, values in zip(answers.wall, at_stations, strict=True):
-                sent = values[:, :, answers.parities, : matrix.shape[3]].reshape(len(values), -1)
-                wall += matrix.reshape(len(matrix), sent.shape[1]) @ sent.T
             padded = np.zeros((len(wall), both.shape[1]))
             padded[:, : len(along)] = -wall @ along
             found.append(np.concatenate([both, padded]))
+        return found
+
+    def _reflected(self, placed: Samples) -> list[Samples]:
+        """Fields that the wall reflects of unit forces at points about its axis, for each system, (fields, 3 n)."""
+        distances = distances_of(placed, self.waves.radius)
+        found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+
+        def products(number: int) -> list[tuple[int, np.ndarray, Samples]]:
+            parts = []
+            for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
+                here = components_of(there)
+                at_points = point_waves(placed[there], self.waves, number, low, high)
+                for system, answers in enumerate(self.answers):
+                    matrix = answers.wall[number][:, :, :, low:high]
+                    sent = at_points[:, :, answers.parities, : matrix.shape[3]].reshape(here.size, -1)
+                    parts.append((system, here, matrix.reshape(len(matrix), -1) @ sent.T))
+            return parts
+
+        for system, here, product in (part for parts in each(products, range(self.waves.k.size)) for part in parts):
+            found[system][:, here] += product
         return found
 
 
@@ -162,21 +179,30 @@ def _unbounded(solids: Solids, sources: Sources) -> list[Samples]:
 
 def _reflected(solids: Solids, waves: Waves, placed: Samples, away: float) -> list[Samples]:
     """Basis of what the wall reflects of forces at points, with roots of surface elements, for each system."""
-    count = _WALL_SKETCH
-    while True:
-        forces = _mixing(3 * len(placed), count)
-        sent = solids.rings.sent(waves, solids.systems, placed, forces, away)
-        found = [_basis(np.sqrt(_duals(s))[:, None] * fields) for s, fields in zip(solids.systems, sent, strict=True)]
-        if count >= 3 * len(placed) or max(basis.shape[1] for basis in found) < count:
-            return found
-        count *= 2
+    systems, size = solids.systems, 3 * len(placed)
+    step = _WALL_SKETCH * len(systems[0])
+    fields: list[Samples] = [np.zeros((_duals(system).size, 0)) for system in systems]
+    for seed in count():
+        forces = _mixing(size, step, seed) if fields[0].shape[1] + step < size else np.eye(size)
+        sent = solids.rings.sent(waves, systems, placed, forces, away)
+        sent = [np.sqrt(_duals(system))[:, None] * some for system, some in zip(systems, sent, strict=True)]
+        whole = forces.shape[1] == size
+        fields = sent if whole else [np.concatenate(both, axis=1) for both in zip(fields, sent, strict=True)]
+        found = [_basis(some, _least(solids)) for some in fields]
+        if whole or max(basis.shape[1] for basis in found) < fields[0].shape[1]:
+            break
+    return found
 
 
-def _mixing(size: int, count: int) -> Samples:
-    """Random combinations, (size, count); the unit matrix where they are no fewer."""
-    if count >= size:
+def _least(solids: Solids) -> float:
+    return min(max((0.1 * solids.fineness.tolerance) ** 2, _LEAST), _MOST_LEAST)
+
+
+def _mixing(size: int, columns: int, seed: int = 0) -> Samples:
+    """Random combinations, (size, columns); the unit matrix where they are no fewer."""
+    if columns >= size:
         return np.eye(size)
-    mixed: Samples = np.random.default_rng(0).standard_normal((size, count)) / np.sqrt(count)
+    mixed: Samples = np.random.default_rng(seed).standard_normal((size, columns)) / np.sqrt(columns)
     return mixed
 
 
@@ -210,7 +236,7 @@ def _answers(
     largest = max(float(np.max(np.linalg.norm(values, axis=0), initial=0.0)) for values in weighted)
     blocks, free = [], []
     for (parity, m, here), values in zip(places, weighted, strict=True):
-        fields = _basis(values, largest)
+        fields = _basis(values, _least(solids), largest)
         block = np.zeros((dual.size, fields.shape[1]))
         block[here] = fields
         blocks.append(block)
@@ -233,22 +259,22 @@ def _answers(
     )
 
 
-def _basis(fields: Samples, largest: float | None = None) -> Samples:
+def _basis(fields: Samples, least: float, largest: float | None = None) -> Samples:
     """Orthonormal columns that span fields, but for what is small against the largest, (n, fields)."""
     from scipy.linalg import qr
 
     size = largest or float(np.max(np.linalg.norm(fields, axis=0), initial=0.0))
-    count = _SKETCH
+    columns = _SKETCH
     while True:
         if not fields.size or size == 0.0:
             return fields[:, :0]
-        sketched = fields @ _mixing(fields.shape[1], count) if 2 * count < fields.shape[1] else fields
+        sketched = fields @ _mixing(fields.shape[1], columns) if 2 * columns < fields.shape[1] else fields
         basis, upper, _ = qr(sketched, mode="economic", pivoting=True)
-        kept = int(np.count_nonzero(np.abs(np.diag(upper)) > _LEAST * size))
+        kept = int(np.count_nonzero(np.abs(np.diag(upper)) > least * size))
         if kept < sketched.shape[1] or sketched is fields:
             found: Samples = basis[:, :kept]
             return found
-        count *= 2
+        columns *= 2
 
 
 def _rows(basis: Samples) -> np.ndarray:

@@ -18,7 +18,9 @@ from functools import cached_property
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.fluid.tube.rings import LevelRings, Rings, Rows, System, TiltedRings
+from spirillum.fluid.tube.level_rings import LevelRings
+from spirillum.fluid.tube.rings import Rings, Rows, System
+from spirillum.fluid.tube.tilted_rings import TiltedRings
 from spirillum.fluid.tube.wall import Waves, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
@@ -55,11 +57,18 @@ class Fineness:
         """At which waves to and from wires are cut off: what pushes the robot needs more of them than what holds it."""
         return _damping(min(self.tolerance, _WIRES))
 
+    @property
+    def precision(self) -> type[np.floating]:
+        """Of the wall's part of tilted solids: single precision is far below a coarse tolerance, and twice as fast."""
+        return np.float32 if self.tolerance >= _SINGLE else np.float64
+
 
 def _damping(tolerance: float) -> float:
     return float(min(10.0 * tolerance, 0.2 * np.sqrt(tolerance)))
 
 
+_SINGLE = 5e-3
+"""Finest tolerance at which single precision will do."""
 _WIRES = 1e-3
 """Coarsest tolerance of waves to and from wires."""
 
@@ -133,7 +142,7 @@ class Solids:
         """How the rings of the solids meet the wall's waves."""
         if self.seat.level:
             return LevelRings(self.panels, self.seat.offset, self.modes)
-        return TiltedRings(self.panels, self.seat, self.counts)
+        return TiltedRings(self.panels, self.seat, self.counts, self.fineness.precision)
 
     def waves(self, distance: float, wires: Samples | None = None) -> Waves:
         """The waves that matter between the solids, or solids and wires.

@@ -10,17 +10,21 @@ Axes here: x along the tube, y up, z to the right; angles count from y.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
+from itertools import pairwise
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
 from spirillum.arrays import Samples
 
 __all__ = [
+    "Band",
     "Waves",
+    "components_of",
+    "distances_of",
     "each",
     "extensions",
     "point_reflection",
@@ -36,6 +40,12 @@ _LOWEST = 1e-5
 """First node in k, over the step."""
 _CROWD = 1.5
 """Where nodes in k begin to crowd towards 0, over the step."""
+_BANDS = (0.35, 0.65)
+"""Orders over all of them at which a new band begins."""
+_FURTHER = 3.0
+"""Damping, as an exponent over that at which waves are cut, from which things are out of reach while others are not."""
+_AT_WALL = 1e-9
+"""Distance over the radius below which things are at the wall, where every wave reaches them."""
 _THREADS = 2
 
 _T = TypeVar("_T")
@@ -63,6 +73,35 @@ class Waves:
         if k > steepest:
             return 0
         return min(int(np.ceil(self.radius * np.sqrt(steepest**2 - k**2)) + 3.0), self.orders[number])
+
+    def bands(self, number: int, distances: Samples, other: float, orders: int) -> Iterator[Band]:
+        """Which of some things the waves of one k reach: the steeper the wave, the fewer of them.
+
+        Args:
+            number: of the node in k.
+            distances: of the things from the wall, (n,), m.
+            other: smallest distance from the wall of what is at the other end of the waves, m.
+            orders: number of all orders.
+        """
+        steepest = _FURTHER * self.cut / np.maximum(distances + other, _AT_WALL * self.radius)
+        k = float(self.k[number])
+        around = self.radius * np.sqrt(np.maximum(steepest**2 - k**2, 0.0))
+        reached = np.where(k > steepest, 0.0, np.ceil(around) + 3.0)
+        for low, high in pairwise(sorted({0, *(int(np.ceil(share * orders)) for share in _BANDS), orders})):
+            there = np.flatnonzero(reached > low)
+            if there.size:
+                yield Band(low, high, there)
+
+
+class Band(NamedTuple):
+    """Some orders of waves of one k, and what they reach."""
+
+    low: int
+    """First order."""
+    high: int
+    """Order after the last."""
+    there: np.ndarray
+    """Indices of what they reach before they are damped."""
 
 
 def waves_between(radius: float, reach: float, distance: float, tolerance: float) -> Waves:
@@ -97,14 +136,22 @@ def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
         return list(pool.map(function, items))
 
 
-def extensions(k: float, radius: float, rho: Samples, orders: int) -> Samples:
-    """Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders, 3, 3)."""
+def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 0) -> Samples:
+    """Velocities (X, u_rho, v) at rho for unit velocities on the cylinder of that radius, (n, orders - first, 3, 3).
+
+    Args:
+        k: wave number, 1/m.
+        radius: of the cylinder, m.
+        rho: where, (n,), m.
+        orders: the order after the last.
+        first: the first order.
+    """
     from scipy.special import i0e
 
     from spirillum.kernels.tube_waves import wave_extensions
 
     scale = i0e(k * rho) / i0e(k * radius) * np.exp(k * (rho - radius))
-    found: Samples = wave_extensions(k, radius, rho, scale, orders)
+    found: Samples = wave_extensions(k, radius, rho, scale, orders, first)
     return found
 
 
@@ -121,41 +168,60 @@ def weighted_layers(waves: Waves, number: int) -> Samples:
     return layers
 
 
-def times_layers(waves_at: Samples, waves: Waves, number: int) -> Samples:
-    """Waves (..., orders, 3) times the wall's single layer; the first orders will do."""
+def times_layers(waves_at: Samples, waves: Waves, number: int, first: int = 0) -> Samples:
+    """Waves (..., orders, 3) times the wall's single layer; some of the orders, from the first one, will do."""
     flat = np.moveaxis(waves_at, -2, 0)
     orders = len(flat)
-    product = np.matmul(flat.reshape(orders, -1, 3), weighted_layers(waves, number)[:orders])
+    product = np.matmul(flat.reshape(orders, -1, 3), weighted_layers(waves, number)[first : first + orders])
     pressed: Samples = np.moveaxis(product.reshape(flat.shape), 0, -2)
     return pressed
 
 
-def point_waves(points: Samples, waves: Waves, number: int, orders: int | None = None) -> Samples:
-    """Velocities of the waves of one k at points, (3 n, 2, 2, orders, 3): real, imaginary; even, odd.
+def point_waves(points: Samples, waves: Waves, number: int, first: int = 0, last: int | None = None) -> Samples:
+    """Velocities of waves of one k at points, (3 n, 2, 2, last - first, 3): real, imaginary; even, odd.
 
     Args:
         points: about the tube's axis, (n, 3), m.
         waves: which.
         number: of the node in k.
-        orders: None: all that are kept.
+        first: the first order.
+        last: the order after the last; None: of all that are kept.
     """
     from spirillum.kernels.tube_waves import station_waves
 
-    k, orders = float(waves.k[number]), waves.orders[number] if orders is None else orders
-    values = extensions(k, waves.radius, np.hypot(points[:, 1], points[:, 2]), orders)
-    out = np.empty((len(points), 3, 2, 2, orders, 3))
-    station_waves(values, np.arctan2(points[:, 2], points[:, 1]), k * points[:, 0], out)
-    return out.reshape(3 * len(points), 2, 2, orders, 3)
+    k, last = float(waves.k[number]), waves.orders[number] if last is None else last
+    values = extensions(k, waves.radius, np.hypot(points[:, 1], points[:, 2]), last, first)
+    out = np.empty((len(points), 3, 2, 2, last - first, 3))
+    station_waves(values, np.arctan2(points[:, 2], points[:, 1]), k * points[:, 0], out, first)
+    return out.reshape(3 * len(points), 2, 2, last - first, 3)
+
+
+def components_of(points: np.ndarray) -> np.ndarray:
+    """Rows of the three components of some points."""
+    rows: np.ndarray = (3 * points[:, None] + np.arange(3)).ravel()
+    return rows
+
+
+def distances_of(points: Samples, radius: float) -> Samples:
+    """Distances of points from the wall, (n,), m."""
+    distances: Samples = radius - np.hypot(points[:, 1], points[:, 2])
+    return distances
 
 
 def point_reflection(points: Samples, waves: Waves) -> Samples:
     """Velocities at points from forces at the same points, symmetric, (3 n, 3 n); without the minus sign."""
+    distances = distances_of(points, waves.radius)
 
-    def product(number: int) -> Samples:
-        found = point_waves(points, waves, number)
-        rows = len(found)
-        matrix: Samples = times_layers(found, waves, number).reshape(rows, -1) @ found.reshape(rows, -1).T
-        return matrix
+    def products(number: int) -> list[tuple[np.ndarray, Samples]]:
+        found = []
+        for low, high, there in waves.bands(number, distances, float(distances.min()), waves.orders[number]):
+            here = components_of(there)
+            at_points = point_waves(points[there], waves, number, low, high)
+            onto_wall = times_layers(at_points, waves, number, low)
+            found.append((here, onto_wall.reshape(here.size, -1) @ at_points.reshape(here.size, -1).T))
+        return found
 
-    total: Samples = np.sum(each(product, range(waves.k.size)), axis=0)
+    total = np.zeros((3 * len(points),) * 2)
+    for here, product in (pair for pairs in each(products, range(waves.k.size)) for pair in pairs):
+        total[np.ix_(here, here)] += product
     return total

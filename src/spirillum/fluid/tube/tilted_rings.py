@@ -1,0 +1,274 @@
+"""Solids of revolution in a tube whose axis is tilted against the tube's: the wall's waves on their rings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.rings import Rings, System, finer, midpoints, projectors, sent_to_wall
+from spirillum.fluid.tube.wall import Waves, distances_of, each, extensions, times_layers
+from spirillum.fluid.wire.revolution import Panels
+from spirillum.robot.seat import Seat
+
+__all__ = ["TiltedRings"]
+
+_FINER = 2
+"""Nodes that average waves over a panel, over its own: bodies come close to the wall in one place only."""
+_TIER = 1.6
+"""Ratio of the distances from the wall in one tier of panels."""
+_AVERAGED_TIERS = 3
+"""Tiers near the wall in which waves are averaged over panels."""
+_MOST_VALUES = 500_000
+"""Values of waves around rings that are held at a time: they stay in the cache, and their memory is used again."""
+
+
+def _add_product(left: Samples, right: Samples, total: Samples) -> None:
+    """Add left @ right.T to a matrix in column-major order, in place: products of few columns cost their memory."""
+    from scipy.linalg.blas import dgemm, sgemm
+
+    if total.size:
+        product = sgemm if total.dtype == np.float32 else dgemm
+        product(1.0, left.T, right.T, 1.0, total, trans_a=True, overwrite_c=True)
+
+
+class _Tier(NamedTuple):
+    """Panels at about one distance from the wall: steep waves do not reach those further away."""
+
+    distance: float
+    """Smallest distance from the wall, m."""
+    modes: int
+    """Fourier modes that they bear."""
+    sample: _Sample
+    """Their nodes."""
+    averaged: _Sample
+    """More nodes, and averages over them; near the wall only."""
+    rows: tuple[tuple[np.ndarray, ...], ...]
+    """[parity][mode]: which of their 3 nodes bear it."""
+    unknowns: tuple[np.ndarray, ...]
+    """[system]: the unknowns that these are."""
+
+
+class _Sample(NamedTuple):
+    """Rings on which waves are evaluated."""
+
+    x: Samples
+    """(panels, q), m."""
+    rho: Samples
+    """(panels, q), m."""
+    average: Samples | None
+    """From them to the nodes, (panels, p, q); None where they are the nodes."""
+
+
+class TiltedRings(Rings):
+    """Rings about an axis that is tilted against the tube's: every wave is projected on every ring that it reaches.
+
+    Without yaw, rings and waves are mirror images of themselves, and half circles suffice. With yaw, waves of either
+    parity move unknowns of both.
+    """
+
+    def __init__(self, panels: Panels, seat: Seat, counts: np.ndarray, precision: type[np.floating]) -> None:
+        """Rings of solids.
+
+        Args:
+            panels: of the solids.
+            seat: where their axis runs in the tube.
+            counts: Fourier modes about it that each node bears.
+            precision: of the wall's part of their single layer.
+        """
+        self.panels, self.seat, self.counts, self.precision = panels, seat, counts, precision
+
+    def _tiers(self, systems: Sequence[System], bearing: np.ndarray | None = None) -> list[_Tier]:
+        """Panels sorted by their distance from the wall; with `bearing` some of their nodes only, never averaged."""
+        fine = finer(self.panels, _FINER)
+        distances = self.seat.distances(*fine[:2]).min(axis=1)
+        step = np.floor(np.log(distances / distances.min()) / np.log(_TIER))
+        tiers = []
+        for number in np.unique(step):
+            here = step == number
+            nodes = np.repeat(here, self.panels.order)
+            if bearing is not None:
+                nodes &= bearing
+                if not np.any(nodes):
+                    continue
+            place = np.full(3 * self.panels.size, -1)
+            place[np.repeat(nodes, 3)] = np.arange(3 * np.count_nonzero(nodes))
+            modes = int(self.counts[nodes].max())
+            of_mode, unknowns = [], []
+            for system in systems:
+                local = [[place[bearing] for bearing in family.of_mode] for family in system]
+                of_mode += [tuple(part[part >= 0] for part in family[:modes]) for family in local]
+                unknowns.append(np.flatnonzero(np.concatenate([part for family in local for part in family]) >= 0))
+            if bearing is None:
+                sample = _Sample(self.panels.x[here], self.panels.rho[here], None)
+            else:
+                sample = _Sample(self.panels.x.ravel()[nodes, None], self.panels.rho.ravel()[nodes, None], None)
+            near = bearing is None and number < _AVERAGED_TIERS
+            averaged = _Sample(*(values[here] for values in fine)) if near else sample
+            tiers.append(_Tier(float(distances[here].min()), modes, sample, averaged, tuple(of_mode), tuple(unknowns)))
+        return tiers
+
+    def subtract(self, waves: Waves, systems: Sequence[System], matrices: Sequence[Samples]) -> None:
+        """See `Rings.subtract`."""
+        tiers = self._tiers(systems)
+        alike = [tier.averaged is tier.sample for tier in tiers]  # among those the wall's part is symmetric
+        blocks = {
+            (a, b, s): np.zeros((tiers[a].unknowns[s].size, tiers[b].unknowns[s].size), order="F", dtype=self.precision)
+            for a in range(len(tiers))
+            for b in range(len(tiers))
+            for s in range(len(systems))
+            if not (alike[a] and alike[b] and a > b)
+        }
+        locks = {where: Lock() for where in blocks}
+        nearest = min(tier.distance for tier in tiers)
+
+        def lessen(number: int) -> None:
+            orders = [waves.orders_between(number, 0.5 * (tier.distance + nearest)) for tier in tiers]
+            reached = [(t, tier, count) for t, (tier, count) in enumerate(zip(tiers, orders, strict=True)) if count]
+            sides = []
+            for t, tier, count in reached:
+                targets = self._on_rings(waves, number, tier.sample, tier, count, nearest)
+                averages = targets if alike[t] else self._on_rings(waves, number, tier.averaged, tier, count, nearest)
+                sides.append((targets, averages))
+            for (a, tier_a, count_a), (targets, _) in zip(reached, sides, strict=True):
+                pressed = [times_layers(target, waves, number) for target in targets]
+                for (b, tier_b, count_b), (_, sources) in zip(reached, sides, strict=True):
+                    if (a, b, 0) not in blocks:
+                        continue
+                    far = waves.orders_between(number, 0.5 * (tier_a.distance + tier_b.distance))
+                    count = min(count_a, count_b, far)
+                    for s in range(len(systems)) if count else ():
+                        left, right = (
+                            some[s][..., :count, :].astype(self.precision, copy=False) for some in (pressed, sources)
+                        )
+                        with locks[a, b, s]:
+                            _add_product(left.reshape(len(left), -1), right.reshape(len(right), -1), blocks[a, b, s])
+
+        each(lessen, range(waves.k.size))
+        duals = [np.concatenate([family.dual for family in system]) for system in systems]
+        for (a, b, s), block in blocks.items():
+            rows, columns = tiers[a].unknowns[s], tiers[b].unknowns[s]
+            matrices[s][np.ix_(rows, columns)] -= block * duals[s][columns]
+            if a != b and (b, a, s) not in blocks:
+                matrices[s][np.ix_(columns, rows)] -= block.T * duals[s][rows]
+
+    def _flat(self, values: Samples) -> Samples:
+        return values.astype(self.precision, copy=False).reshape(len(values), -1)
+
+    def sent(
+        self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float
+    ) -> list[Samples]:
+        """See `Rings.sent`."""
+        tiers = self._tiers(systems)
+        sizes = [sum(family.dual.size for family in system) for system in systems]
+        found: list[Samples] = [np.zeros((size, forces.shape[1])) for size in sizes]
+        parities = [[family.parity for family in system] for system in systems]
+        lock = Lock()
+
+        def add(number: int) -> None:
+            onto_wall = sent_to_wall(waves, number, points, forces)
+            for tier in tiers:
+                count = waves.orders_between(number, 0.5 * (tier.distance + away))
+                for s, target in enumerate(
+                    self._on_rings(waves, number, tier.sample, tier, count, away) if count else ()
+                ):
+                    right = onto_wall[:, :, parities[s], :count].reshape(len(onto_wall), -1)
+                    block = target.reshape(len(target), -1) @ right.T
+                    with lock:
+                        found[s][tier.unknowns[s]] += block
+
+        each(add, range(waves.k.size))
+        return found
+
+    def received(self, waves: Waves, systems: Sequence[System], away: float) -> list[list[Samples]]:
+        """See `Rings.received`."""
+        bearing = np.zeros(self.panels.size, dtype=bool)
+        for family in (family for system in systems for family in system):
+            bearing[np.concatenate(family.of_mode) // 3] = True
+        tiers = self._tiers(systems, bearing)
+        sizes = [sum(family.dual.size for family in system) for system in systems]
+
+        def on(number: int) -> list[Samples]:
+            counts = [waves.orders_between(number, 0.5 * (tier.distance + away)) for tier in tiers]
+            shapes = [(size, 2, len(system), max(1, *counts), 3) for size, system in zip(sizes, systems, strict=True)]
+            found = [np.zeros(shape) for shape in shapes]
+            for tier, count in zip(tiers, counts, strict=True):
+                fields = self._on_rings(waves, number, tier.sample, tier, count, away) if count else []
+                for values, unknowns, field in zip(found, tier.unknowns, fields, strict=False):
+                    values[unknowns, :, :, :count] = field
+            return [times_layers(values, waves, number) for values in found]
+
+        return each(on, range(waves.k.size))
+
+    def _on_rings(
+        self, waves: Waves, number: int, sample: _Sample, tier: _Tier, orders: int, away: float
+    ) -> list[Samples]:
+        """Waves of one k on the unknowns of a tier, for each system, (unknowns, 2, parities, orders, 3).
+
+        The 2 stands for the real and the imaginary part; parities of waves are those of the system's families. Steep
+        waves are damped but where a ring nears the wall: they are evaluated on that arc only.
+        """
+        symmetric = self.seat.yaw == 0
+        theta = midpoints(orders, tier.modes, whole=not symmetric)
+        onto = [projectors(theta, tier.modes, parity) for parity in (0, 1)]
+        sources = [(0,), (1,)] if symmetric else [(0, 1)] * 2  # waves that move the even and the odd family
+        panels, order = len(sample.x), sample.x.shape[1] if sample.average is None else sample.average.shape[1]
+        modes = [np.zeros((tier.modes, panels * order, 3, 2, len(waved), orders, 3)) for waved in sources]
+        some = max(1, _MOST_VALUES // (36 * theta.size * sample.x.shape[1] * orders))
+        for first in range(0, panels, some):
+            chunk = slice(first, first + some)
+            nodes = slice(first * order, (first + some) * order)
+            average = None if sample.average is None else sample.average[chunk]
+            rings = self._around(sample.x[chunk].ravel(), sample.rho[chunk].ravel(), theta)
+            distances = distances_of(rings.reshape(-1, 3), waves.radius).reshape(rings.shape[:2]).min(axis=1)
+            for low, high, arc in waves.bands(number, distances, away, orders):
+                field = self._waves(waves, number, theta[arc], rings[arc], low, high)
+                for family, waved in enumerate(sources):
+                    for column, parity in enumerate(waved):
+                        for component, projector in enumerate(onto[family]):
+                            part = projector[:, arc] @ field[component, parity].reshape(arc.size, -1)
+                            if average is not None:
+                                part = np.matmul(average, part.reshape(tier.modes, *average.shape[::2], -1))
+                            shaped = part.reshape(tier.modes, -1, 2, high - low, 3)
+                            modes[family][:, nodes, component, :, column, low:high] = shaped
+        flat = [values.reshape(tier.modes, -1, *values.shape[3:]) for values in modes]
+        families = [
+            np.concatenate([values[rows] for values, rows in zip(family, of_mode, strict=True)])
+            for family, of_mode in zip(flat, tier.rows, strict=True)
+        ]
+        return families if symmetric else [np.concatenate(families)]
+
+    def _around(self, x: Samples, rho: Samples, theta: Samples) -> Samples:
+        """Points around rings, about the tube's axis, (angles, rings, 3), m."""
+        shape = theta.size, x.size
+        up, right = np.cos(theta)[:, None] * rho, np.sin(theta)[:, None] * rho
+        points = np.stack([np.broadcast_to(x, shape), up, right], axis=-1)
+        return self.seat.placed(points.reshape(-1, 3)).reshape(*shape, 3)
+
+    def _waves(self, waves: Waves, number: int, theta: Samples, placed: Samples, low: int, high: int) -> Samples:
+        """Waves of one k and some orders on arcs of rings.
+
+        Args:
+            waves: which.
+            number: of the node in k.
+            theta: angles about the rings' axis, (angles,).
+            placed: points there, about the tube's axis, (angles, rings, 3), m.
+            low: first order.
+            high: order after the last.
+
+        Returns:
+            component; even, odd; angle; ring; real, imaginary; order; wall component.
+        """
+        from spirillum.kernels.tube_waves import tilted_waves
+
+        shape, k = placed.shape[:2], float(waves.k[number])
+        x, y, z = np.moveaxis(placed, -1, 0)
+        values = extensions(k, waves.radius, np.hypot(y, z).ravel(), high, low)
+        out = np.empty((3, 2, *shape, 2, high - low, 3))
+        tilted_waves(
+            values.reshape(*shape, high - low, 3, 3), np.arctan2(z, y), k * x, theta, self.seat.rotation, out, low
+        )
+        return out
