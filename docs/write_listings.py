@@ -288,11 +288,9 @@ def reference_list() -> str:
 
 def command_options(words: str) -> str:
     """Arguments and options of a command."""
-    import typer
+    from spirillum.cli.app import command_line
 
-    from spirillum.cli.app import app
-
-    command: Any = typer.main.get_command(app)
+    command = command_line()
     for name in words.split():
         command = command.commands[name]
     rows = [row for parameter in command.params if (row := _parameter(parameter)) is not None]

@@ -9,10 +9,9 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-import typer
 
 import spirillum
-from spirillum.cli.app import app
+from spirillum.cli.app import command_line
 from spirillum.measurement.observations import COLUMNS
 
 ROOT = Path(__file__).parent.parent
@@ -49,7 +48,7 @@ def _commands(command: Any, path: str = "spirillum") -> dict[str, Any]:
     return found
 
 
-COMMANDS = _commands(typer.main.get_command(app))
+COMMANDS = _commands(command_line())
 
 
 def _options(path: str) -> set[str]:

@@ -77,13 +77,13 @@ def _not_lost(found: sys.UnraisableHookArgs) -> None:
 
 def _run(arguments: Sequence[str] | None) -> int:
     try:
-        from spirillum.cli.app import app
+        from spirillum.cli.app import command_line
 
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="replace")  # a terminal without box characters shows others instead
         _check_names(sys.argv[1:] if arguments is None else arguments)
-        code = app(args=arguments, prog_name="spirillum", standalone_mode=False)
+        code = command_line()(args=arguments, prog_name="spirillum", standalone_mode=False)
         if sys.stdout is not None:
             sys.stdout.flush()
     except BrokenPipeError:  # the reader of our output has left, as `| head` does

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -57,7 +58,7 @@ from spirillum.cli.show_commands import film, show
 from spirillum.cli.track_commands import track
 from spirillum.cli.virtual_commands import render, virtual_experiment
 
-__all__ = ["app"]
+__all__ = ["app", "command_line"]
 
 app = typer.Typer(
     name="spirillum",
@@ -389,3 +390,9 @@ for _task, _commands in _TASKS.items():
 app.add_typer(robot_app, name="robot", rich_help_panel="Files")
 app.add_typer(setup_app, name="setup", rich_help_panel="Files")
 app.add_typer(observations_app, name="observations", rich_help_panel="Files")
+
+
+@cache
+def command_line() -> Any:
+    """The tree of commands and their parameters, made once in a process: that takes as long as a short command."""
+    return typer.main.get_command(app)
