@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -115,10 +116,7 @@ class Flat:
         import cv2
 
         width, height = self.size
-        canvas = np.empty((height * self.fine, width * self.fine, 3), dtype=np.uint8)
-        canvas[:] = self.floor
-        if self.ruler:
-            self._draw_ruler(canvas)
+        canvas = self._still.copy()
         self._draw_rotor(canvas, time)
         self._draw_body(canvas, time)
         picture = cv2.resize(canvas, (width, height), interpolation=cv2.INTER_AREA).astype(float)
@@ -129,12 +127,24 @@ class Flat:
             picture += rng.normal(0.0, self.noise, picture.shape)
         return np.clip(np.rint(picture), 0, 255).astype(np.uint8)
 
+    @cached_property
+    def _still(self) -> np.ndarray:
+        """What stays from picture to picture: floor and ruler, on the fine canvas."""
+        width, height = self.size
+        canvas = np.empty((height * self.fine, width * self.fine, 3), dtype=np.uint8)
+        canvas[:] = self.floor
+        if self.ruler:
+            self._draw_ruler(canvas)
+        return canvas
+
     def _fill(self, canvas: np.ndarray, corners: np.ndarray, colour: Any) -> None:
-        """Fill a polygon given in pixels; a fine cell is centred where its share of the pixel is."""
+        """Fill a polygon given in pixels; of several, (n, corners, 2), one after the other."""
         import cv2
 
-        fine = (corners + 0.5) * self.fine - 0.5
-        cv2.fillPoly(canvas, [np.rint(fine * 2**_SHIFT).astype(np.int32)], [int(c) for c in colour], shift=_SHIFT)
+        # A fine cell is centred where its share of the pixel is.
+        fine = np.rint(((corners + 0.5) * self.fine - 0.5) * 2**_SHIFT).astype(np.int32)
+        for polygon in fine.reshape(-1, *fine.shape[-2:]):
+            cv2.fillPoly(canvas, [polygon], [int(c) for c in colour], shift=_SHIFT)
 
     def _draw_ruler(self, canvas: np.ndarray) -> None:
         reach = 0.5 * max(self.size) * (self.camera_height - self.ruler_height) / self.focal
@@ -166,10 +176,11 @@ class Flat:
         across = np.column_stack([-along[:, 1], along[:, 0]])
         circle = np.linspace(0.0, 2 * np.pi, 17)[:-1]
         disc = np.column_stack([np.cos(circle), np.sin(circle)])
-        for index in range(len(along)):
-            ends = middle[index : index + 2], half[index : index + 2, None] * across[index]
-            self._fill(canvas, np.concatenate([ends[0] + ends[1], (ends[0] - ends[1])[::-1]]), self.wire)
-            self._fill(canvas, middle[index + 1] + half[index + 1] * disc, self.wire)
+        # The wire has one colour, so that pieces and discs may come in any order.
+        sides = half[:-1, None] * across, half[1:, None] * across
+        pieces = (middle[:-1] + sides[0], middle[1:] + sides[1], middle[1:] - sides[1], middle[:-1] - sides[0])
+        self._fill(canvas, np.stack(pieces, axis=1), self.wire)
+        self._fill(canvas, middle[1:, None] + half[1:, None, None] * disc, self.wire)
 
     def _silhouette(self, outline: Any, time: float) -> np.ndarray:
         """What a solid of revolution covers: convex hull of rings on its surface."""
