@@ -47,6 +47,16 @@ def battery_voltage(motor: Electrics, current: Values) -> Values:
     return motor.voltage - motor.internal_resistance * np.abs(current)
 
 
+def _excess(motor: Electrics, i: Values, linear: Values, drive: Values) -> Values:
+    """Voltage that a current takes less the one that drives it, V: zero at the steady current."""
+    return (winding_resistance(motor, i) + linear) * i - drive
+
+
+def _newton_step(motor: Electrics, i: Values, linear: Values, f: Values) -> Values:
+    """The next current of Newton's method where the excess is f, A."""
+    return i - f / (winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i)
+
+
 def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
     """Steady root of (17): R(I) I = duty V(I) - (back_emf + back_emf_per_current I).
 
@@ -65,30 +75,25 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
     drive = np.abs(open_voltage)
     linear = back_emf_per_current + sense * motor.duty * motor.internal_resistance
 
-    def excess(i: Values) -> Values:
-        return (winding_resistance(motor, i) + linear) * i - drive
-
-    def newton_step(i: Values, f: Values) -> Values:
-        return i - f / (winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i)
-
     low = np.zeros(np.broadcast_shapes(drive.shape, linear.shape, motor.constant.shape))
     at_rest = motor.constant + motor.decay + motor.growth + np.maximum(linear, 0.0)
     # A winding almost without resistance at rest would start beyond what 200 halvings come back from.
     i = low + np.minimum(drive / np.where(at_rest > 0, at_rest, 1.0), _LARGEST_START)
     high = 2.0 * i + 1e-12
     for _ in range(60):
-        short = excess(high) < 0
+        short = _excess(motor, high, linear, drive) < 0
         if not np.any(short):
             break
         high = np.where(short, 2.0 * high, high)
-    high = np.where(excess(high) < 0, np.nan, high)  # driven too fast: V(|I|) falls faster than R(I) I rises
+    # Driven too fast: V(|I|) falls faster than R(I) I rises.
+    high = np.where(_excess(motor, high, linear, drive) < 0, np.nan, high)
     last = high - low
     # scipy.optimize.elementwise.find_root is as fast for a million robots, but six times slower for one robot and five
     # times slower for the few hundred currents that every step of a posterior's sampler asks for.
     for _ in range(200):
-        f = excess(i)
+        f = _excess(motor, i, linear, drive)
         low, high = np.where(f < 0, i, low), np.where(f < 0, high, i)
-        newton = newton_step(i, f)
+        newton = _newton_step(motor, i, linear, f)
         # Newton creeps along an exponential: a step that is not half the one before gives way to bisection.
         good = (newton >= low) & (newton <= high) & (np.abs(newton - i) <= 0.5 * last)
         new = np.where(good, newton, 0.5 * (low + high))
@@ -96,7 +101,7 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
         if not np.any(last > 1e-9 * np.abs(i)):
             break
     # Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it.
-    newton = newton_step(i, excess(i))
+    newton = _newton_step(motor, i, linear, _excess(motor, i, linear, drive))
     i = np.where(np.isfinite(newton), np.clip(newton, low, high), i)
     return np.where(battery_voltage(motor, i) < 0, np.nan, sense * i)
 
