@@ -29,6 +29,7 @@ def test_a_small_disk_is_said() -> None:
 def limited(folder: Path, command: list[str], limit: int) -> subprocess.CompletedProcess[str]:
     """A command whose files may not grow beyond a size, as on a full disk."""
     script = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)\n"
+    script += "sys.dont_write_bytecode = True\n"  # else modules are kept cut off, and no other process can import them
     script += "from spirillum.cli import main; sys.argv[:2] = ['spirillum']; main()"
     return subprocess.run(
         [sys.executable, "-c", script, str(limit), *command], cwd=folder, capture_output=True, text=True, check=False

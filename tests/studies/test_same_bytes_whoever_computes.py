@@ -176,6 +176,7 @@ def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(tmp_path: Path)
     (tmp_path / "study.toml").write_text('models = ["rft"]\nrobots = ["biorob2012-wide"]\n')
     limited = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "sys.dont_write_bytecode = True;"  # else modules are kept cut off, and no other process can import them
         "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000));"
         "from spirillum.cli import main; main(['study', 'study.toml', '--store', 'study.zarr'])"
     )
@@ -188,7 +189,10 @@ def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(tmp_path: Path)
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "here", "tcp://"])
-def test_a_scheduler_that_is_not_there_gets_a_sentence(address: str, tmp_path: Path) -> None:
+def test_a_scheduler_that_is_not_there_gets_a_sentence(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spirillum.crews._PATIENCE", 0.5)
     begun = time.monotonic()
     with pytest.raises(sp.InputError, match=r"cluster = .*allowed: the address of a Dask scheduler"):
         sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr", workers=address)
