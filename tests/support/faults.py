@@ -105,7 +105,9 @@ def started(command: list[str], folder: Path, limit: int | None = None) -> subpr
         errors="replace",
         preexec_fn=limited,  # noqa: PLW1509 - this process only waits for others
         start_new_session=True,
-        env=os.environ | ({"TMPDIR": str(folder)} if command[0] == "page" else {}),
+        env=os.environ
+        | ({"TMPDIR": str(folder)} if command[0] == "page" else {})
+        | ({} if limit is None else {"PYTHONDONTWRITEBYTECODE": "1"}),  # else modules are kept cut off
     )
     if command[0] == "page":
         threading.Timer(_PAGE, process.send_signal, [signal.SIGINT]).start()
