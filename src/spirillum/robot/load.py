@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from copy import deepcopy
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,7 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         except RecursionError as error:
             raise InputError(f"the robot's tables are nested without end; allowed: {_WHAT}") from error
     if isinstance(robot, str) and robot in preset_names():
-        return tomllib.loads(preset_text(robot)), f"preset {robot}"
+        return deepcopy(_preset_table(robot)), f"preset {robot}"
     try:
         path = Path(robot)
     except TypeError as error:
@@ -105,6 +105,12 @@ def raw_table(robot: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], st
         hint = did_you_mean(str(robot), preset_names())
         raise InputError(f"'{robot}' is neither a preset nor a file{hint}; presets: {presets}")
     return read_toml(path, _WHAT), str(path)
+
+
+@cache
+def _preset_table(preset: str) -> dict[str, Any]:
+    """The raw tables of a preset, which its callers may not change."""
+    return tomllib.loads(preset_text(preset))
 
 
 def new_robot_file(path: str | Path, preset: str, *, overwrite: bool = False) -> None:
