@@ -186,9 +186,16 @@ def test_a_wide_channel_gives_slender(batch: Any) -> None:
 def test_error_estimate(robot: Any) -> None:
     """There is one, and it is not nothing, at the smallest and the largest tolerance that it takes to be quick."""
     for tolerance in (0.05, 0.01):
-        answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 1})
+        answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 3})
         assert 0 < answer.error_estimate < 2 * tolerance, tolerance
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
+
+
+def test_error_estimate_holds_what_few_phases_miss(robot: Any) -> None:
+    """The second harmonic of the tail's phase stays in a mean over two of them."""
+    few, many = (predicted(robot, resolution={"tolerance": 0.05, "phases": phases}) for phases in (2, 7))
+    missed = abs(few.forward_velocity / many.forward_velocity - 1.0)
+    assert 5 * many.error_estimate < missed < few.error_estimate
 
 
 def test_placement_of_an_answer(robot: Any) -> None:

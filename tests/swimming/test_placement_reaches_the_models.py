@@ -146,7 +146,7 @@ def test_wrong_options_exit_with_two(
 
 def test_options_of_the_tube() -> None:
     robot = sp.load(WIDE)
-    assert (robot.model.tube.tolerance, robot.model.tube.phases) == (0.005, 2)
+    assert (robot.model.tube.tolerance, robot.model.tube.phases) == (0.005, 3)
     changed = with_resolution(robot, {"accuracy": "high", "tolerance": 0.02, "phases": 6}, "tube")
     assert (changed.model.tube.tolerance, changed.model.tube.phases) == (0.02, 6)
     assert changed.model.slender.accuracy == "high"

@@ -105,7 +105,7 @@ class TubeOptions(Section):
 
     tolerance: Tolerance = 0.005
     """Relative tolerance of the speed per turn, from which the resolution follows."""
-    phases: Phases = 2
+    phases: Phases = 3
     """Number of phases of the tail, evenly over a turn, that an answer is averaged over."""
 
 

@@ -194,9 +194,14 @@ class Tube(SwimmerModel):
     form = "direct"
     placed = True
 
-    def __init__(self, coarser: float = 1.0) -> None:
-        """Resolve the flow to each robot's `model.tube.tolerance`, or more coarsely by a factor."""
-        self._coarser = coarser
+    def __init__(self, coarser: float = 1.0, *, between: bool = False) -> None:
+        """Resolve the flow to each robot's `model.tube.tolerance`, or more coarsely, at evenly spread phases.
+
+        Args:
+            coarser: factor of the tolerance.
+            between: average over the phases halfway between those that start at 0.
+        """
+        self._coarser, self._first = coarser, 0.5 if between else 0.0
 
     def own_error(self, batch: RobotBatch) -> str:
         """See `ResistanceModel.own_error`: the numerics state theirs; what is left is the place that nobody gave."""
@@ -214,8 +219,8 @@ class Tube(SwimmerModel):
         return Fineness(options.slender.accuracy, min(_CUT * self._coarser * options.tube.tolerance, _COARSEST))
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
-        """See `SwimmerModel.checked_by`."""
-        return Tube(_COARSER)
+        """See `SwimmerModel.checked_by`: other phases tell what the mean over a turn misses, too."""
+        return Tube(_COARSER, between=True)
 
     def placement_of(self, batch: RobotBatch) -> dict[str, Any]:
         """See `ResistanceModel.placement_of`."""
@@ -263,7 +268,8 @@ class Tube(SwimmerModel):
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         """R and load along the tube and about the motor axis, (n, 5, 5), and the mean flow, (n, 5)."""
-        phases = 2.0 * np.pi * np.arange(batch.options.tube.phases) / batch.options.tube.phases
+        count = batch.options.tube.phases
+        phases = 2.0 * np.pi * (np.arange(count) + self._first) / count
         along = np.zeros((5, MOTIONS))
         along[[1, 3, 4], [3, 9, 12]] = 1.0
         tilt = Seat(0.0, 0.0, batch.placement.pitch or 0.0, yaw=batch.placement.yaw)
