@@ -69,6 +69,8 @@ class Flat:
     paints: dict[str, tuple[int, int, int]] = field(default_factory=lambda: dict(PAINTS))
     stripes: Sequence[str] | None = None
     """Order of the stripes as they are drawn, if not that of the robot."""
+    edges: tuple[float, ...] | None = None
+    """Angles of the edges between stripes, from the first one's on, rad, one more than stripes; None: even ones."""
     noise: float = 0.0
     """Standard deviation of the noise, of 255."""
     lamp: float = 0.0
@@ -229,6 +231,10 @@ class Flat:
         canvas[v[hit], u[hit]] = self.seal
         if stripes:
             place = (np.arctan2(-y, z) - float(true["body_angle"])) * len(stripes) / (2 * np.pi) + 0.5
+            if self.edges is not None:
+                edges = np.array(self.edges)
+                angle = (np.arctan2(-y, z) - float(true["body_angle"]) - edges[0]) % (2 * np.pi) + edges[0]
+                place = np.searchsorted(edges, angle, side="right") - 1
             paints = np.array([self.paints[name] for name in stripes], dtype=np.uint8)
             canvas[v[hit], u[hit]] = paints[np.floor(place[hit]).astype(int) % len(stripes)]
 
