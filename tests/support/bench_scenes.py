@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
 from backlit_pictures import INKS, Backlit
 from flat_pictures import PAINTS, Flat
-
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.robot.robot import Robot

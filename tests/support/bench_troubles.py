@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+
 from bench_scenes import DURATION, FPS, Scene
 
 SPEED, BODY, TAIL, MOTOR = "forward_velocity", "body_rotation_rate", "tail_rotation_rate", "motor_rotation_rate"
@@ -80,9 +81,7 @@ def _none(film: Film, _scene: Scene, _rng: np.random.Generator) -> Film:
 def _kept(film: Film, kept: np.ndarray, *, even: bool) -> Film:
     """Some of the frames; `even`: the film counts them on without gaps."""
     numbers = list(range(len(kept))) if even else [film.numbers[index] for index in kept]
-    return replace(
-        film, images=[film.images[k] for k in kept], numbers=numbers, times=[film.times[k] for k in kept]
-    )
+    return replace(film, images=[film.images[k] for k in kept], numbers=numbers, times=[film.times[k] for k in kept])
 
 
 def _lost(share: float, *, even: bool) -> Change:
@@ -295,7 +294,5 @@ TROUBLES = (
     ),
     Trouble("frame rate wrong", "the setup says 30 for 25 frames a second", _wrong_rate, known=()),
     Trouble("direction wrong", "the setup says left for right", _wrong_direction, known=()),
-    Trouble(
-        "tail too fast", "0.55 to 0.95 turns from frame to frame", _none, variant="fast-tail", known=(SPEED, BODY)
-    ),
+    Trouble("tail too fast", "0.55 to 0.95 turns from frame to frame", _none, variant="fast-tail", known=(SPEED, BODY)),
 )
