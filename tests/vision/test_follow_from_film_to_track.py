@@ -11,6 +11,9 @@ from spirillum.vision.track.follow import Seen, follow
 pytest.importorskip("av")
 pytest.importorskip("cv2")
 
+from bench_scenes import FPS, scene
+from bench_troubles import Film
+
 
 def track(film, folder, *, name="a.mp4", **changes):
     setup, robot = load_setup(film.write(folder / name, **changes))
@@ -162,3 +165,13 @@ def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
     setup.write_text(flat_pictures.Flat().setup_text())
     with pytest.raises(InputError, match="shows no ruler"):
         follow(tmp_path / "b.mp4", *load_setup(setup))
+
+
+def test_clutter_that_fits_the_other_way_round_does_not_name_the_direction(tmp_path):
+    """A body in the floor's brightness is not found; what stands out instead is now here, now there."""
+    scenery = scene("virtual", 0, "bare")
+    frames = range(0, 76, 5)
+    film = Film([scenery.draw(k / FPS) for k in frames], list(frames), [k / FPS for k in frames], dict(scenery.setup))
+    path, setup = film.write(tmp_path, scenery.robot_text)
+    with pytest.raises(InputError, match="no robot like"):
+        follow(path, *load_setup(setup))

@@ -153,6 +153,9 @@ class FirstLookConstants:
     """Least score of the best place over the third best one on a frame that counts as clear."""
     clear_share: float = 0.25
     """Least share of such frames."""
+    bend: float = 0.2
+    """Second difference of the places on the frames searched over the body's length, below which, in the median, what
+    stands out the other way round is one thing that goes along."""
     faint: float = 0.4
     """Score over that on the best frames below which a frame is not learnt from: the robot is partly out of view."""
     doubtful: float = 0.6

@@ -95,7 +95,8 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     images, shape = [frames[k].reduced(factor) for k in every], body.shape(factor)
     found = _places(shape, images, still)
     if not _clear(found):
-        if _clear(_places(shape, images, still, turn=np.pi)):
+        turned = _places(shape, images, still, turn=np.pi)
+        if _clear(turned) and _goes_along(turned, body.robot.body.length):
             side, other = body.optics.direction, opposite(body.optics.direction)
             raise InputError(
                 f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
@@ -214,6 +215,13 @@ def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
     if len(known) == 1:
         return BodyPose(*poses[0].tolist())
     if times[0] <= time <= times[-1]:
+def _goes_along(found: Sequence[list[Candidate]], length: float) -> bool:
+    """Whether what stands out is one thing that goes along, not clutter now here, now there."""
+    places = np.array([(some[0].pose.x, some[0].pose.y) for some in found if some])
+    bends = np.hypot(*np.diff(places, 2, axis=0).T) if len(places) > 2 else np.zeros(1)
+    return float(np.median(bends)) < FIRST_LOOK.bend * length
+
+
         return BodyPose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
     few = slice(0, 4) if time < times[0] else slice(-4, None)
     slope = least_squares_line(times[few], poses[few]).slope
