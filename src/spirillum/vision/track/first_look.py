@@ -109,10 +109,12 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     known = [(frames[k].time, one.pose) for k, one in zip(every, chosen, strict=True) if one is not None]
     learnt = _learnt(name, body, _roughly(body, known, frames, still))
     outline = outline_seen(body, learnt.typical)
+    stated = True
     for _ in range(FIRST_LOOK.relearning):
-        if outline.fits(body.optics.length_per_pixel):
+        if outline.fits(body.optics.length_per_pixel, stated=stated):
             break
-        body, learnt = _relearnt(name, body, learnt, outline)
+        stated = stated and not outline.resizes
+        body, learnt = _relearnt(name, body, learnt, outline, stated=stated)
         outline = outline_seen(body, learnt.typical)
     size = body.optics.focal / focal * outline.size
     every = range(len(learnt.poses))
@@ -191,9 +193,14 @@ def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
     return _Learnt([frame for frame, _ in good], [one.pose for _, one in good], about.score, whole)
 
 
-def _relearnt(name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit) -> tuple[BodyFinder, _Learnt]:
-    """Learn again where the outline lies, in front of a camera that shows it as large as it looks."""
-    other = resized(body, outline.size) if outline.resizes else body
+def _relearnt(
+    name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit, *, stated: bool
+) -> tuple[BodyFinder, _Learnt]:
+    """Learn again where the outline lies, in front of a camera that shows it as large as it looks.
+
+    A `stated` size is kept.
+    """
+    other = body if stated else resized(body, outline.size)
     moved = np.array(learnt.poses) + np.array(outline.move)
     there = places_seen_by(other.optics, body.optics, moved[:, :2])
     poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
@@ -208,13 +215,6 @@ def _clear(found: Sequence[list[Candidate]]) -> bool:
     return float(np.mean(clear)) >= FIRST_LOOK.clear_share
 
 
-def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
-    """Where the body should be at a time, by straight lines between and beyond known places."""
-    times = np.array([at for at, _ in known])
-    poses = np.array([pose for _, pose in known])
-    if len(known) == 1:
-        return BodyPose(*poses[0].tolist())
-    if times[0] <= time <= times[-1]:
 def _goes_along(found: Sequence[list[Candidate]], length: float) -> bool:
     """Whether what stands out is one thing that goes along, not clutter now here, now there."""
     places = np.array([(some[0].pose.x, some[0].pose.y) for some in found if some])
@@ -222,6 +222,13 @@ def _goes_along(found: Sequence[list[Candidate]], length: float) -> bool:
     return float(np.median(bends)) < FIRST_LOOK.bend * length
 
 
+def on_the_way(known: list[tuple[float, BodyPose]], time: float) -> BodyPose:
+    """Where the body should be at a time, by straight lines between and beyond known places."""
+    times = np.array([at for at, _ in known])
+    poses = np.array([pose for _, pose in known])
+    if len(known) == 1:
+        return BodyPose(*poses[0].tolist())
+    if times[0] <= time <= times[-1]:
         return BodyPose(*(float(np.interp(time, times, poses[:, k])) for k in range(3)))
     few = slice(0, 4) if time < times[0] else slice(-4, None)
     slope = least_squares_line(times[few], poses[few]).slope

@@ -121,10 +121,15 @@ class OutlineFit(NamedTuple):
         """Whether the size differs from 1 beyond the bias of shading and glare."""
         return bool(abs(self.size - 1.0) > SIZE.tolerance[0])
 
-    def fits(self, pixel: float) -> bool:
-        """Whether size and pose are correct within the bias of shading and glare; `pixel`: m per pixel."""
+    def fits(self, pixel: float, *, stated: bool = True) -> bool:
+        """Whether size and pose are correct within the bias of shading and glare.
+
+        Args:
+            pixel: m per pixel.
+            stated: whether the size is the stated one; one that was found by outlines alone has to agree better.
+        """
         off = np.abs([self.size - 1.0, self.move.x / pixel, self.move.y / pixel, self.move.heading])
-        return bool(np.all(off <= SIZE.tolerance))
+        return bool(np.all(off <= SIZE.tolerance)) and (stated or bool(off[0] <= SIZE.found))
 
 
 def outline_seen(body: BodyFinder, pose: BodyPose) -> OutlineFit:
