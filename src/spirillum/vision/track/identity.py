@@ -38,7 +38,8 @@ class Identified(NamedTuple):
     size: float
     """Apparent size over the size of the robot file at the stated scale."""
     robot: bool
-    """Whether stripes or tail match the robot; both have to where size or contrast are unexpected."""
+    """Whether stripes or tail match the robot; both have to where the size is unexpected, the whole tail where the
+    contrast is."""
 
     @property
     def whole(self) -> bool:
@@ -130,8 +131,10 @@ def identified_at(
     read = float(np.mean([np.isfinite(stripes.read(image, pose)[0]) for image, pose in start.seen]))
     striped = stripes.fits and read > IDENTITY.least_share
     total = size * start.size
-    if abs(np.log(total)) <= IDENTITY.size_tolerance and start.clearness > SIZE.clearness:
-        return Identified(start, stripes, wire, total, striped or wire.readable > IDENTITY.least_share)
-    return Identified(
-        start, stripes, wire, total, wire.readable > IDENTITY.sure_share and (striped or not stripes.stripes)
-    )
+    found = Identified(start, stripes, wire, total, robot=False)
+    as_stated = abs(np.log(total)) <= IDENTITY.size_tolerance
+    if as_stated and start.clearness > SIZE.clearness:
+        return found._replace(robot=striped or wire.readable > IDENTITY.least_share)
+    # A whole tail behind a body of the stated size is no chance, though glare or a bare seal hides the stripes.
+    sure = wire.readable > IDENTITY.sure_share and (striped or not stripes.stripes)
+    return found._replace(robot=sure or (as_stated and found.whole))
