@@ -223,6 +223,9 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
 
 def _smooth(time: Samples, angle: Samples) -> Samples:
     """A smoothed angle: a regressor with its own noise would explain that noise.
+    for rate in of_both:  # what is left out of one angle is left out of their difference
+        if rate.residual.size == time.size:
+            difference = np.where(np.isfinite(rate.residual), difference, np.nan)
 
     A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
     """
