@@ -1,12 +1,14 @@
 """What a trial measures, what a flag spoils, and what all trials share."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
+from spirillum.measurement.lead import without_lead
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.summary import compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, trial_of
@@ -163,3 +165,36 @@ def test_what_cannot_be_believed_at_all_gives_no_number(make_track: Make, robot:
     flag = Flag("turned", "all is wrong", RATE_NAMES[:3])
     trial = trial_of(make_track(flags=(flag,)), robot)
     assert all(np.isnan(item.value) and item.reason == flag.sentence for item in trial.quantities.values())
+
+
+def test_a_stray_frame_of_the_tail_is_left_out_of_the_motor(make_track: Make, robot: Any) -> None:
+    """It is far off for a tail, and not for a difference in which the body's errors are."""
+    track = make_track(span=3.0)
+    tail = track.tail_phase.copy()
+    tail[-1] += 0.3
+    body = track.body_angle + 0.1 * np.random.default_rng(1).normal(size=tail.size)
+    found = trial_of(replace(track, tail_phase=tail, body_angle=body), robot)
+    assert found.fits["tail_rotation_rate"].outliers == 1
+    assert np.isnan(found.fits["motor_rotation_rate"].residual[-1])
+    assert np.isfinite(found.fits["body_rotation_rate"].residual[-1])
+
+
+def test_first_frames_that_are_ahead_do_not_slow_the_robot(make_track: Make, robot: Any) -> None:
+    """As in a compressed film: a tenth of a millimetre and some degrees, gone within five frames."""
+    track = make_track(span=3.0)
+    ahead = np.exp(-np.arange(track.time.size) / 1.5)
+    position = track.position.copy()
+    position[:, 0] += 1e-4 * ahead
+    lagging = replace(track, position=position, tail_phase=track.tail_phase + 0.2 * ahead)
+    found, clean = trial_of(lagging, robot), trial_of(track, robot)
+    for name, true in (("forward_velocity", 1e-3), ("tail_rotation_rate", 7.0)):
+        assert found.fits[name].frames == clean.fits[name].frames - 6
+        assert found.quantities[name].low <= true <= found.quantities[name].high
+        assert found.quantities[name].value == pytest.approx(true, rel=2e-3)
+    assert np.isfinite(found.track.position[:3]).all()  # the series keep them
+
+
+def test_a_track_that_begins_as_it_goes_on_keeps_its_first_frames(make_track: Make) -> None:
+    kept = [without_lead(track) is track for track in (make_track(seed=seed) for seed in range(100))]
+    assert sum(kept) > 75  # chance leaves them out 14 times in 100
+    assert without_lead(short := make_track(span=1.0)) is short

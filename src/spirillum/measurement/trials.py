@@ -12,6 +12,7 @@ import numpy as np
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
+from spirillum.measurement.lead import without_lead
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.measurement.statistics import NORMAL
@@ -163,7 +164,14 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     velocity, *rates = RATE_NAMES
     quantities = {velocity: _velocity(fits[velocity], track)}
     quantities |= {
-        name: _with_errors(fits[name], "rad/s", *_drifts(track, name), _timing(fits[name], track)) for name in rates
+        name: _with_errors(
+            fits[name],
+            "rad/s",
+            *_drifts(track, name),
+            0.0 if by_hand else _drift(track, _wander(fits[name])),
+            _timing(fits[name], track),
+        )
+        for name in rates
     }
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     quantities["lateral_position"] = _mean(track, track.position[:, 1], "m", POSITION_ERROR * pixel)
@@ -182,6 +190,8 @@ def _with_interval(item: Measured) -> Measured:
 
 
 def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
+    if read is None:
+        track = without_lead(track)
     time, pixel = track.time, track.scale.length_per_pixel
     body, tail = _smooth(time, track.body_angle), _smooth(time, track.tail_phase)
     x = track.position[:, 0]
