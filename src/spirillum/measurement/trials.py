@@ -223,6 +223,9 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
         rate_of(time, track.tail_phase, track.tail_phase_error, of_tail, read=read),
     )
     unsteady = not all(rate.steady for rate in of_both)
+    for rate in of_both:  # what is left out of one angle is left out of their difference
+        if rate.residual.size == time.size:
+            difference = np.where(np.isfinite(rate.residual), difference, np.nan)
     return {
         "forward_velocity": rate_of(time, x, track.position_error, of_x, read=read),
         "body_rotation_rate": of_both[0],

@@ -12,7 +12,7 @@ from spirillum.vision.camera.anchor import Steadied
 from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen_by
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
-from spirillum.vision.track.constants import LOST_FRAMES
+from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.identity import Identified
@@ -35,6 +35,11 @@ _DOUBTFUL_STRIPES = Flag(
     "the stripes seem uneven on a body that is not as large as it should be: the wrong scale may be the reason; the "
     "body's rotation is not given: correct spacing, heights or robot file first",
     ("body_rotation_rate",),
+)
+_UNDER_GLARE = Flag(
+    "stripes-under-glare",
+    "a reflection hides much of the stripes: the interval of the body's rate is wider; move the lamp, soften its light "
+    "or turn a polariser",
 )
 
 
@@ -78,6 +83,8 @@ def track_of(
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
     even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
+    if known.stripes.under_glare:
+        roll_flags = (*roll_flags, _UNDER_GLARE)
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
     if even.flags and any(flag.spoils for flag in size_flags):
@@ -108,6 +115,7 @@ def track_of(
         words=video.words,
         time_uncertainty=restored.relative_error,
         drift=math.hypot(swayed.drift, glare),
+        body_angle_drift=STRIPES.under_glare if known.stripes.under_glare else 0.0,
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
 

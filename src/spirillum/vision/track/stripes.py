@@ -68,6 +68,7 @@ class Stripes:
         self.order = np.array([self.names.index(name) for name in self.stripes], dtype=np.int64)
         self.appearance: _Appearance | None = None
         self.fits = False
+        self._hidden: list[float] = []
         self.flags: tuple[Flag, ...] = ()
         count = 1 + 2 * round(STRIPES.reach / STRIPES.step)
         self.angles = np.linspace(-STRIPES.reach, STRIPES.reach, count)
@@ -168,6 +169,8 @@ class Stripes:
         if self.appearance is None:
             return unread
         profile, scale = self._profile(image, pose)
+        seen = profile[scale > 0.0]
+        self._hidden.append(float(np.isnan(seen).mean()) if len(seen) else np.nan)
         answer = self._fit(profile, scale, self.appearance)
         loss, other, flat = answer[2:5]
         if not np.isfinite(answer).all() or loss > STRIPES.unreadable * flat or other < STRIPES.ambiguous * loss:
@@ -177,6 +180,12 @@ class Stripes:
         colours, angle = known.palette[self.order], float(answer[0])
         shifts = edge_shifts(profile / answer[5:8], self.angles, blur, known.shade, colours, angle)
         return (angle, float(error)), shifts
+
+    @property
+    def under_glare(self) -> bool:
+        """Whether glare hides much of the stripes on half of the frames that were read so far."""
+        known = [share for share in self._hidden if np.isfinite(share)]
+        return bool(known) and float(np.median(known)) > STRIPES.hidden
 
     def _unreadable(self) -> Flag:
         sentence = "the stripes are in no frame's view, so that the body's rotation is not given"

@@ -54,5 +54,7 @@ class Track:
     """What the video's file says of itself, such as that it is synthetic."""
     drift: float = 0.0
     """Standard uncertainty of the velocity by a camera that drifted along the channel, and by glare, m/s."""
+    body_angle_drift: float = 0.0
+    """Standard uncertainty of the body's angle from end to end, by glare on its stripes, rad."""
     time_uncertainty: float = 0.0
     """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""
