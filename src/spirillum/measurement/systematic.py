@@ -33,7 +33,7 @@ DRIFT_BARE = 0.1
 """Drift of the position error of a body without stripes, pixels; up to 0.12 on rendered films."""
 DRIFT_ANGLE = math.radians(0.1)
 """Least drift of the error of an angle, rad; the standard error of a frame if larger, as highlights move slowly."""
-POSITION_ERROR = 0.15
+POSITION_ERROR = 0.25
 """Systematic standard error of an absolute position, pixels: of outline, light and lens; it cancels in a velocity."""
 HEADING_ERROR = math.radians(0.2)
 """Systematic standard error of the heading of a body that is `LONG` pixels long, rad."""

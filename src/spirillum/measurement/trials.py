@@ -236,9 +236,6 @@ def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate
 
 def _smooth(time: Samples, angle: Samples) -> Samples:
     """A smoothed angle: a regressor with its own noise would explain that noise.
-    for rate in of_both:  # what is left out of one angle is left out of their difference
-        if rate.residual.size == time.size:
-            difference = np.where(np.isfinite(rate.residual), difference, np.nan)
 
     A polynomial of low degree; where its residual is large, the angle itself, linearly interpolated over gaps.
     """
@@ -290,7 +287,10 @@ def _drifts(track: Track, name: str) -> list[float]:
     errors = {"body_rotation_rate": (track.body_angle_error,), "tail_rotation_rate": (track.tail_phase_error,)}
     both = (track.body_angle_error, track.tail_phase_error)
     read = any(flag.name == BY_HAND for flag in track.flags)  # errors of manual readings are independent
-    return [_drift(track, DRIFT_ANGLE if read else _expected(error, DRIFT_ANGLE)) for error in errors.get(name, both)]
+    drifts = [DRIFT_ANGLE if read else _expected(error, DRIFT_ANGLE) for error in errors.get(name, both)]
+    if name != "tail_rotation_rate":
+        drifts.append(track.body_angle_drift)
+    return [_drift(track, drift) for drift in drifts]
 
 
 def _velocity(rate: Rate, track: Track) -> Measured:
