@@ -86,3 +86,21 @@ def test_an_empty_film_says_what_is_missing(flat_pictures, tmp_path, monkeypatch
     assert any("give the right ROBOT" in warning for warning in found.warnings)
     with pytest.raises(InputError, match=r"spacing .* out of range"):
         sp.propose_setup(tmp_path / "a.mp4", spacing=0.0)
+
+
+@pytest.mark.slow
+def test_in_a_large_picture_the_body_lies_at_both_its_ends(tmp_path):
+    """A body 3 % too long lay now at its nose, now at its rear, 14 pixels apart, and its speed was a fifth off."""
+    sp.render(
+        "biorob2012-wide",
+        tmp_path / "large.mp4",
+        motion={"forward_velocity": "1.5 mm/s", "tail_rate": "1.3 Hz", "body_rate": "-0.12 Hz"},
+        trial={"duration": 2.0, "heading": 0.02},
+        camera={"size": "1920x1440", "direction": "left"},
+        seed=3,
+    )
+    found = sp.propose_setup(tmp_path / "large.mp4", spacing="2 mm")
+    pixels_per_metre = 2220.0 / (0.15 + (0.06 - 0.0115) / 1.4)  # lens 150 mm above the oil, axis at 11.5 mm
+    ((rear, nose),) = found.found("robot").pixels
+    assert np.hypot(nose[0] - rear[0], nose[1] - rear[1]) == pytest.approx(35e-3 * pixels_per_metre, rel=5e-3)
+    assert found.found("travel").value == pytest.approx(1.5e-3 * pixels_per_metre, rel=0.02)

@@ -113,8 +113,12 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
     for _ in range(FIRST_LOOK.relearning):
         if outline.fits(body.optics.length_per_pixel, stated=stated):
             break
-        stated = stated and not outline.resizes
-        body, learnt = _relearnt(name, body, learnt, outline, stated=stated)
+        resizes, stated = outline.resizes, stated and not outline.resizes
+        body, about = _moved(body, learnt, outline, stated=stated)
+        if resizes:  # a body of the wrong size lay at one of its ends, now at this one, now at that
+            known = [(frame.time, pose) for frame, pose in zip(about.frames, about.poses, strict=True)]
+            about = _roughly(body, known, frames, still)
+        learnt = _learnt(name, body, about)
         outline = outline_seen(body, learnt.typical)
     size = body.optics.focal / focal * outline.size
     every = range(len(learnt.poses))
@@ -193,18 +197,13 @@ def _learnt(name: str, body: BodyFinder, about: _Learnt) -> _Learnt:
     return _Learnt([frame for frame, _ in good], [one.pose for _, one in good], about.score, whole)
 
 
-def _relearnt(
-    name: str, body: BodyFinder, learnt: _Learnt, outline: OutlineFit, *, stated: bool
-) -> tuple[BodyFinder, _Learnt]:
-    """Learn again where the outline lies, in front of a camera that shows it as large as it looks.
-
-    A `stated` size is kept.
-    """
+def _moved(body: BodyFinder, learnt: _Learnt, outline: OutlineFit, *, stated: bool) -> tuple[BodyFinder, _Learnt]:
+    """Where the outline lies, in front of a camera that shows it as large as it looks; a `stated` size is kept."""
     other = body if stated else resized(body, outline.size)
     moved = np.array(learnt.poses) + np.array(outline.move)
     there = places_seen_by(other.optics, body.optics, moved[:, :2])
     poses = [BodyPose(*row) for row in np.column_stack([there, moved[:, 2]]).tolist()]
-    return other, _learnt(name, other, _Learnt(learnt.frames, poses, learnt.score, learnt.whole))
+    return other, _Learnt(learnt.frames, poses, learnt.score, learnt.whole)
 
 
 def _clear(found: Sequence[list[Candidate]]) -> bool:
