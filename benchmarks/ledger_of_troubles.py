@@ -199,20 +199,18 @@ def table(rows: Sequence[Row]) -> str:
     lines = [
         f"{len(rows)} films, {len(styles)} styles, {seeds} seeds.",
         "",
-        "| Trouble | What is done | Speed given | Flagged | Speed, % | Body rate, % | Tail rate, % | Inside | Far |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| Trouble | What is done | What becomes of it | Speed, % | Body rate, % | Tail rate, % | Inside | Far |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
         own = [row for row in rows if row["trouble"] == trouble.name]
         if not own:
             continue
         count = counts(own)
-        given = sum(off(row["numbers"][SPEED]) is not None for row in own)
         cells = [
             trouble.name,
             trouble.what,
-            f"{given} of {len(own)}",
-            str(sum(flagged(row) for row in own)),
+            becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
             f"{count['inside']} of {count['given']}",
             far(count),
@@ -230,6 +228,20 @@ def table(rows: Sequence[Row]) -> str:
         share = f"{without} of {could} ({100 * without / max(could, 1):.1f} %)"
         lines.append(f"| {style} | {len(own)} | {inside} | {far(count)} | {share} |")
     return "\n".join(lines)
+
+
+def becomes(rows: Sequence[Row]) -> str:
+    """What is given of a trouble's films, and how many are flagged, in words."""
+    words = []
+    for name, what in ((SPEED, "speed"), (BODY, "body rate"), (TAIL, "tail rate")):
+        given = sum(off(row["numbers"][name]) is not None for row in rows)
+        if given < len(rows):
+            words.append(f"{what} {f'given in {given}' if given else 'withheld'}")
+    if len(words) == 3 and all("withheld" in word for word in words):
+        words = ["withheld"]
+    flags = sum(flagged(row) for row in rows)
+    words.append("flagged" if flags == len(rows) else f"flagged in {flags}" if flags else "not flagged")
+    return f"{', '.join(words) if len(words) > 1 else f'given, {words[0]}'} ({len(rows)} films)"
 
 
 def far(count: dict[str, int]) -> str:

@@ -36,11 +36,6 @@ _DOUBTFUL_STRIPES = Flag(
     "body's rotation is not given: correct spacing, heights or robot file first",
     ("body_rotation_rate",),
 )
-_UNDER_GLARE = Flag(
-    "stripes-under-glare",
-    "a reflection hides much of the stripes: the interval of the body's rate is wider; move the lamp, soften its light "
-    "or turn a polariser",
-)
 
 
 def track_of(
@@ -83,8 +78,7 @@ def track_of(
     body_angle, roll_flags = unwrapped(time, roll[:, 0], roll[:, 1], known.stripes.period)
     even = evened(body_angle, roll[:, 0], roll[:, 1], np.array(record.edges), known.stripes.period)
     body_angle, roll_flags = even.angle, (*roll_flags, *even.flags)
-    if known.stripes.under_glare:
-        roll_flags = (*roll_flags, _UNDER_GLARE)
+    roll_flags = (*roll_flags, *_under_glare(known, body_angle))
     tail_phase, tail_flags = unwrapped(time, tail[:, 0], tail[:, 1], 2.0 * np.pi, "tail")
     scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
     if even.flags and any(flag.spoils for flag in size_flags):
@@ -118,6 +112,21 @@ def track_of(
         body_angle_drift=STRIPES.under_glare if known.stripes.under_glare else 0.0,
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )
+
+
+def _under_glare(known: Identified, body_angle: Samples) -> tuple[Flag, ...]:
+    """Flag stripes that glare hides; a body that turned by less than two of them may seem to stand, or to go twice."""
+    if not known.stripes.under_glare:
+        return ()
+    turned = float(np.ptp(body_angle[seen])) if (seen := np.isfinite(body_angle)).any() else 0.0
+    enough = turned > STRIPES.turned_under_glare * 2.0 * np.pi / len(known.stripes.stripes)
+    then = (
+        "the interval of the body's rate is wider"
+        if enough
+        else f"the body seems to have turned by {math.degrees(turned):.0f} deg only, and its rate is not given"
+    )
+    sentence = f"a reflection hides much of the stripes: {then}; move the lamp, soften its light or turn a polariser"
+    return (Flag("stripes-under-glare", sentence, () if enough else ("body_rotation_rate",)),)
 
 
 def _readings(

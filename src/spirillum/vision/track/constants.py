@@ -355,6 +355,9 @@ class StripeConstants:
     """Samples beside wide glare that it makes paler than a lamp does."""
     hidden: float = 0.25
     """Share of what is seen of the seal that glare hides on half of the frames, from which on it is told."""
+    turned_under_glare: float = 2.0
+    """Stripes by which the body has to turn then, so that its rate is given: of three degraded films on which it turned
+    by less than one and a half, two were off by 24 degrees; standing glare seemed to stop another body."""
     under_glare: float = radians(12.0)
     """Standard error of the body's angle from end to end then, rad.
 
