@@ -198,3 +198,13 @@ def test_a_track_that_begins_as_it_goes_on_keeps_its_first_frames(make_track: Ma
     kept = [without_lead(track) is track for track in (make_track(seed=seed) for seed in range(100))]
     assert sum(kept) > 75  # chance leaves them out 14 times in 100
     assert without_lead(short := make_track(span=1.0)) is short
+
+
+def test_a_seal_that_shows_no_stripes_widens_the_velocity(make_track: Make, robot: Any) -> None:
+    """Its edges hold the body's place: without them light and shade move it by a tenth of a pixel from end to end."""
+    flag = Flag("stripes-do-not-fit", "no stripes", ("body_rotation_rate",))
+    sure, unsure = (trial_of(make_track(flags=flags), robot).quantities for flags in ((), (flag,)))
+    half = unsure["forward_velocity"].high - unsure["forward_velocity"].value
+    assert half > 1.95 * 0.1 * 0.25e-3 / 10.0  # a pixel shows a quarter of a millimetre, the film lasts 10 s
+    assert half > 2.0 * (sure["forward_velocity"].high - sure["forward_velocity"].value)
+    assert unsure["tail_rotation_rate"] == sure["tail_rotation_rate"]

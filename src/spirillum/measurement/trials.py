@@ -297,7 +297,7 @@ def _velocity(rate: Rate, track: Track) -> Measured:
     """The forward velocity; its interval includes the uncertainty of the scale."""
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
-    bare = any(flag.name == "no-stripes" for flag in track.flags)
+    bare = any(flag.name in ("no-stripes", "stripes-do-not-fit") for flag in track.flags)  # no edges at the seal
     least = (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel
     read = any(flag.name in (BY_HAND, IMPORTED) for flag in track.flags)
     drift = _drift(track, least if read else max(least, _wander(rate)))
