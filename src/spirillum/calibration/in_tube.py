@@ -15,13 +15,13 @@ from spirillum.calibration.experiment import Experiment
 from spirillum.calibration.forward import DryContact, Forward
 from spirillum.errors import InputError
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.announced import TABLE_TAKES
 from spirillum.fluid.tube.tabled import TabledTube, tables_of
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.placement import Placement
 from spirillum.swimming.band import band_places
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import weights_in_fluid
-from spirillum.swimming.model_choice import TABLE_TAKES
 from spirillum.swimming.preparation import prepare_all
 
 __all__ = ["ROUGHNESS_BAND", "Ranges", "place_ranges", "tube_forward"]

@@ -174,7 +174,7 @@ def rank_models(
         free: free parameters of every model; None: two for each channel, body drag and rotation, or gap and pitch for
             `tube`.
         sampling: how the posteriors are sampled.
-        prepare: for `tube`, make the robots' tables that are not there, 15 to 20 minutes of one core each.
+        prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
         progress: told what is being done.
 
     Raises:

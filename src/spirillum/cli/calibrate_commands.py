@@ -12,6 +12,7 @@ from spirillum.calibration.methods import METHODS
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
+from spirillum.fluid.tube.announced import TABLE_TAKES
 
 __all__ = ["calibrate", "rank_models", "suggest"]
 
@@ -51,9 +52,7 @@ def calibrate(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option(
-            "--prepare", help="With tube, make the tables that are not there, 15 to 20 minutes of one core each."
-        ),
+        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
     ] = False,
     output: Annotated[
         str, typer.Option("--output", "-o", metavar="DIR", help="Folder for the results.")
@@ -129,9 +128,7 @@ def rank_models(
     ] = None,
     prepare: Annotated[
         bool,
-        typer.Option(
-            "--prepare", help="With tube, make the tables that are not there, 15 to 20 minutes of one core each."
-        ),
+        typer.Option("--prepare", help=f"With tube, make the tables that are not there, {TABLE_TAKES} each."),
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
     settings: Settings = None,

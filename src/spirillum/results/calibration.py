@@ -88,7 +88,7 @@ def calibrate(
             `motor.back_emf_constant`, to half of its relative 95 % interval, such as ``"5%"``; what is not stated is
             taken as exact.
         sampling: how the posterior is sampled.
-        prepare: for `tube`, make the robots' tables that are not there, 15 to 20 minutes of one core each.
+        prepare: for `tube`, make the robots' tables that are not there, which takes minutes (see `prepare`).
         figures: draw figures too, which takes some seconds.
         progress: told what is being done.
 

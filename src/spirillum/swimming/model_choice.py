@@ -14,6 +14,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.announced import TABLE_TAKES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -23,7 +24,6 @@ from spirillum.swimming.steady import requirements
 
 __all__ = [
     "AUTO",
-    "TABLE_TAKES",
     "UNBOUNDED",
     "WALLED",
     "ModelChoice",
@@ -37,8 +37,6 @@ AUTO = "auto"
 """Name that leaves the choice of the model to `choose_model`."""
 WALLED, UNBOUNDED = "tube", "slender"
 """What answers for a robot in a channel, and for one without."""
-TABLE_TAKES = "15 to 20 minutes of one core"
-"""What it takes to make the table of one robot, measured for the paper's (`tools/ship_tables.py`)."""
 
 
 @dataclass(frozen=True)
