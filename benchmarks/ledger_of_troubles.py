@@ -182,14 +182,14 @@ def withheld(rows: Sequence[Row]) -> tuple[int, int]:
 
 
 def percents(rows: Sequence[Row], name: str) -> str:
-    """Median error, largest error, and median half width of a quantity, %."""
+    """Median error, largest error, and median half width of a quantity, in words, %."""
     given = [row["numbers"][name] for row in rows if off(row["numbers"][name]) is not None]
     given = [number for number in given if number["true"] != 0.0]
     if not given:
         return "-"
     errors = [100 * abs(number["value"] / number["true"] - 1) for number in given]
     widths = [50 * (number["high"] - number["low"]) / abs(number["true"]) for number in given]
-    return f"{np.median(errors):.2g}, {max(errors):.2g} ({np.median(widths):.2g})"
+    return f"{np.median(errors):.2g}, at most {max(errors):.2g} (± {np.median(widths):.2g}) %"
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -199,8 +199,8 @@ def table(rows: Sequence[Row]) -> str:
     lines = [
         f"{len(rows)} films, {len(styles)} styles, {seeds} seeds.",
         "",
-        "| Trouble | What is done | What becomes of it | Speed, % | Body rate, % | Tail rate, % | Inside | Far |",
-        "|---|---|---|---|---|---|---|---|",
+        "| Trouble | What is done | Films | What becomes of it | Speed | Body rate | Tail rate | Inside | Far |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for trouble in TROUBLES:
         own = [row for row in rows if row["trouble"] == trouble.name]
@@ -210,6 +210,7 @@ def table(rows: Sequence[Row]) -> str:
         cells = [
             trouble.name,
             trouble.what,
+            str(len(own)),
             becomes(own),
             *(percents(own, name) for name in (SPEED, BODY, TAIL)),
             f"{count['inside']} of {count['given']}",
@@ -241,7 +242,7 @@ def becomes(rows: Sequence[Row]) -> str:
         words = ["withheld"]
     flags = sum(flagged(row) for row in rows)
     words.append("flagged" if flags == len(rows) else f"flagged in {flags}" if flags else "not flagged")
-    return f"{', '.join(words) if len(words) > 1 else f'given, {words[0]}'} ({len(rows)} films)"
+    return ", ".join(words) if len(words) > 1 else f"given, {words[0]}"
 
 
 def far(count: dict[str, int]) -> str:

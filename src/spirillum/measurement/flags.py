@@ -30,6 +30,8 @@ _FEWEST_FRAMES = 4
 """Fewest measured frames of a video that give a rate."""
 _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
+_OF_STRIPES = {"uneven-stripes", "stripes-do-not-pass", "short-turn"}
+"""Flags that say nothing where the stripes are not those of the robot file."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
@@ -50,6 +52,8 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag
             flags.append(flag)
     names = {flag.name for flag in flags}
     implied = {"stripes-unreadable"} if "no-stripes" in names else set()
+    if "stripes-do-not-fit" in names:
+        implied |= _OF_STRIPES
     if "not-the-robot" in names:
         implied |= {*_FOLLOWING, "nothing-moves"}
     count = track.time.size

@@ -99,4 +99,5 @@ def no_band_warnings(batch: RobotBatch, model: SwimmerModel) -> list[str]:
     more = "a band over them takes minutes (--band)"
     if not has_table(batch):
         more = f"`spirillum prepare` makes its table, once, in {TABLE_TAKES}; with it a band over them takes a second"
-    return [f"{' and '.join(over)} are not known, and this is the answer at one place: {more}"]
+    known = "is not known" if len(over) == 1 else "are not known"
+    return [f"{' and '.join(over)} {known}, and this is the answer at one place: {more}"]

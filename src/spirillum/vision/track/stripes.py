@@ -188,7 +188,10 @@ class Stripes:
         return bool(known) and float(np.median(known)) > STRIPES.hidden
 
     def _unreadable(self) -> Flag:
-        sentence = "the stripes are in no frame's view, so that the body's rotation is not given"
+        sentence = (
+            "the stripes can be read on no frame, for glare hides them or the seal is out of view, so that the body's "
+            "rotation is not given: soften or move the lamp, and keep the seal in view"
+        )
         return Flag("stripes-unreadable", sentence, ("body_rotation_rate",))
 
     def _profile(self, image: np.ndarray, pose: BodyPose) -> tuple[Samples, Samples]:
