@@ -74,3 +74,10 @@ def test_a_wide_blur_on_a_reduced_picture_is_that_of_the_whole():
     whole = cv2.GaussianBlur(np.clip(picture / ground - 1.0, -0.6, 0.6), (0, 0), 1.0)
     found = anchor._flat(np.repeat(picture[..., None], 3, axis=2))
     assert np.abs(found - whole).max() < 0.005
+
+
+@pytest.mark.parametrize("shade", [0, 255])
+def test_pictures_without_any_edge_do_not_sway(shade):
+    """A film with its lid on: what is wrong with it is told by who looks for ruler and robot."""
+    frames = [Frame(index, 0.1 * index, np.full((240, 320, 3), shade, dtype=np.uint8)) for index in range(4)]
+    assert not sways(frames)

@@ -62,7 +62,7 @@ class Anchor:
     """High-pass filtered brightness, (h, w)."""
 
     def pose(self, flat: Samples, start: Pose) -> Pose:
-        """How a picture lies against the anchor.
+        """How a picture lies against the anchor; `start` where the anchor shows no edge.
 
         Args:
             flat: the picture, high-pass filtered, (h, w).
@@ -70,6 +70,8 @@ class Anchor:
         """
         cv2 = required("cv2", "measuring a video", "video")
         rows, columns, slopes, there = self._edges
+        if not rows.size:
+            return start
         pose = np.array(start)
         for _ in range(_STEPS):
             matrix = _matrix(Pose(*pose.tolist()), (flat.shape[1], flat.shape[0]))
