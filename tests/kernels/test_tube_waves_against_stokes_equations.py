@@ -16,10 +16,10 @@ WAVES = [(0.3, 0), (2.0, 0), (1.0, 1), (3.0, 1), (0.5, 2), (2.0, 5)]
 """k R and order p."""
 
 
-def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0) -> np.ndarray:
+def extensions(k: float, rho: np.ndarray, orders: int, radius: float = 1.0, first: int = 0) -> np.ndarray:
     rho = np.asarray(rho, dtype=float)
     scale = ive(0, k * rho) / ive(0, k * radius) * np.exp(k * (rho - radius))
-    return wave_extensions(k, radius, rho, scale, orders)
+    return wave_extensions(k, radius, rho, scale, orders, first)
 
 
 def layers(z: float, orders: int) -> np.ndarray:
@@ -167,8 +167,7 @@ def test_waves_at_points_and_around_a_second_axis() -> None:
     found = np.empty((6, 3, 2, 2, orders, 3))
     station_waves(values, angle, k * x, found)
     some = np.empty((6, 3, 2, 2, orders - 2, 3))  # the orders from 2
-    scale = ive(0, k * distance) / ive(0, k) * np.exp(k * (distance - 1.0))
-    station_waves(wave_extensions(k, 1.0, distance, scale, orders, 2), angle, k * x, some, 2)
+    station_waves(extensions(k, distance, orders, first=2), angle, k * x, some, 2)
     np.testing.assert_allclose(some, found[..., 2:, :], rtol=1e-12, atol=1e-15)
     even, odd = np.empty((2, 3, 6, orders, 3))
     circle_waves(values, angle, angle - theta, even, odd)

@@ -7,9 +7,9 @@ __all__ = ["ANNOUNCED", "TABLE_TAKES", "announcement"]
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
 TABLE_TAKES = "10 to 15 minutes of one core"
-"""What it takes to make the table of one robot, measured for the paper's (`tools/ship_tables.py`)."""
+"""What it takes to make the table of one robot; estimated from single places of the paper's."""
 _SECONDS = 10.0
-"""Time that a place takes one process, s; measured for the paper's robot, less for short bodies and wide gaps."""
+"""Time that a place takes one process, s: the mean at some places of the paper's robots, more near the glass."""
 
 
 def announcement(places: int, workers: int) -> str:
