@@ -8,13 +8,18 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.robot.load import load
+from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.solids import solids_of
-from spirillum.virtual.troubles import Shake, Troubles, even_times, repainted, stripe_edges
+from spirillum.virtual.troubles import NAMES, Shake, Troubles, View, even_times, repainted, stripe_edges, with_troubles
+
+
+def named(words: str) -> Troubles:
+    return with_troubles(words, Degradation())[0]
 
 
 def test_lost_frames_leave_even_times():
     kept = np.arange(241)
-    left, counted = even_times(Troubles.of("lost-frames"), kept, 3)
+    left, counted = even_times(named("lost-frames"), kept, 3)
     assert left.size == 241 - 7
     assert counted.tolist() == list(range(234))
     assert left[[0, -1]].tolist() == [0, 240]
@@ -22,7 +27,7 @@ def test_lost_frames_leave_even_times():
 
 
 def test_uneven_stripes_go_round_once_and_keep_the_body():
-    edges = stripe_edges(Troubles.of("uneven-stripes"), 8, 1)
+    edges = stripe_edges(named("uneven-stripes"), 8, 1)
     widths = np.diff(edges)
     assert widths.sum() == pytest.approx(2 * np.pi)
     assert 0.05 < np.ptp(widths) / (np.pi / 4) < 0.5
@@ -63,9 +68,35 @@ def test_a_film_states_its_troubles_in_its_truth(tmp_path):
         times = [float(frame.time) for frame in container.decode(video=0)]
     assert len(times) == truth["frames"] == 25
     assert np.diff(times) == pytest.approx(1 / 30, abs=1e-4)
+
+
+def test_names_give_usual_sizes_and_leave_what_was_given():
+    troubles, degradation = with_troubles("blurred, noise,hand,bubbles", Degradation.of({"noise": 3.0}))
+    assert (troubles.blurred, troubles.cables) == (1.0, 0)
+    assert (degradation.noise, degradation.hand, degradation.bubbles, degradation.glare) == (3.0, True, 8, 0.0)
+    every, disturbed = with_troubles(",".join(NAMES), Degradation())
+    assert all(every.model_dump().values())
+    assert not disturbed.glare_moves
     with pytest.raises(InputError, match="trouble ''; allowed"):
-        Troubles.of(",")
+        named(",")
     with pytest.raises(InputError, match=r"trouble 'shaken'.*allowed: lost-frames, handheld, rolled, uneven-stripes"):
-        Troubles.of("shaken")
+        named("shaken")
     with pytest.raises(InputError, match="handheld"):
         Troubles.of({"handheld": 99.0})
+
+
+def test_a_blurred_point_has_the_stated_spread_and_cables_cover_their_share():
+    pytest.importorskip("cv2")
+    light = np.zeros((61, 81, 3), dtype=np.float32)
+    light[30, 40] = 1.0
+    seen = View(Troubles(blurred=2.0), 0, (81, 61)).seen(light, 0.0)[..., 0]
+    v, u = np.mgrid[:61, :81]
+    assert seen.sum() == pytest.approx(1.0, rel=1e-5)
+    assert (seen * (u - 40.0) ** 2).sum() == pytest.approx(4.0, rel=0.02)
+    assert (seen * (v - 30.0) ** 2).sum() == pytest.approx(4.0, rel=0.02)
+    white = np.ones((480, 640, 3), dtype=np.float32)
+    dark = View(Troubles(cables=2), 4, (640, 480)).seen(white, 0.0)[..., 0]
+    assert dark.min() == pytest.approx(0.02, abs=1e-3)
+    across = (dark < 0.5).sum(axis=1)  # each an eightieth of the width, more where it leans
+    assert across.min() >= 2 * 8
+    assert across.max() <= 1.5 * 2 * 8

@@ -101,10 +101,11 @@ _Hand = Annotated[
 ]
 
 _Trouble = Annotated[
-    str,
+    str | None,
     typer.Option(
         metavar="NAME,...",
-        help="Of a real bench: lost-frames, handheld, rolled, uneven-stripes; with commas between them.",
+        help="Of a real bench: lost-frames, handheld, rolled, uneven-stripes, blurred, cables, noise, lamp, "
+        "compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them.",
         rich_help_panel=_DISTURBED,
     ),
 ]
@@ -182,7 +183,7 @@ def render(
     glare_fixed: _Fixed = False,
     bubbles: _Bubbles = None,
     hand: _Hand = False,
-    trouble: _Trouble = "",
+    trouble: _Trouble = None,
     seed: _Seed = 0,
     depth_error: Annotated[
         str,
@@ -222,7 +223,7 @@ def render(
             camera=_fields(CameraOptions, given),
             degradation=_degradation(given),
             setup_errors=_fields(SetupErrors, given),
-            troubles=trouble or None,
+            troubles=trouble,
             seed=seed,
             progress=progress,
         )

@@ -9,7 +9,7 @@ from spirillum.virtual.disturbances import Disturbances
 from spirillum.virtual.label import stamp
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.trajectory import TrialTrajectory
-from spirillum.virtual.troubles import Shake
+from spirillum.virtual.troubles import View
 
 __all__ = ["Frames"]
 
@@ -29,7 +29,7 @@ class Frames:
         disturbances: Disturbances,
         trajectory: TrialTrajectory,
         exposure: float,
-        shake: Shake | None = None,
+        view: View | None = None,
     ) -> None:
         """Prepare.
 
@@ -38,9 +38,9 @@ class Frames:
             disturbances: of the pictures.
             trajectory: of the robot.
             exposure: of a frame, s.
-            shake: of the camera; None: it stands still.
+            view: what lies between robot and picture; None: nothing, and the camera stands still.
         """
-        self._shake = shake
+        self._view = view
         self._painter, self._disturbances, self._trajectory = painter, disturbances, trajectory
         self._exposure = exposure
         width, height = painter.lens.size
@@ -54,8 +54,8 @@ class Frames:
         disturbances = self._disturbances
         light = self._painter.light(self._trajectory, time, self._exposure)
         disturbances.disturb(light, time, self._trajectory.at(time).position)
-        if self._shake is not None:
-            light = self._shake.moved(light, time)
+        if self._view is not None:
+            light = self._view.seen(light, time)
         image = np.empty(light.shape, dtype=np.uint8)
         gain = _BRIGHTNESS * disturbances.gain(time)
         starts = disturbances.starts(light.shape[0])

@@ -29,7 +29,7 @@ from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, Setu
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import tank_of
-from spirillum.virtual.troubles import Shake, Troubles, even_times, stripe_edges
+from spirillum.virtual.troubles import Troubles, View, even_times, stripe_edges, with_troubles
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def render(
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         setup_errors: `SetupErrors`: by how much the setup's height of the robot's axis is wrong on purpose.
-        troubles: of a real bench: `Troubles`, or names such as ``"lost-frames,handheld"``.
+        troubles: of a real bench: `Troubles`, or names such as ``"lost-frames,handheld,noise"``.
         setup: the setup file; None: beside the video.
         seed: of all random numbers.
         progress: told what is done, how many frames are done, and how many there are.
@@ -135,7 +135,8 @@ def render(
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     degradation, setup_errors = Degradation.of(degradation), SetupErrors.of(setup_errors)
-    seed, troubles = Seeded.of({"seed": seed}).seed, Troubles.of(troubles)
+    seed = Seeded.of({"seed": seed}).seed
+    troubles, degradation = with_troubles(troubles, degradation)
     robot = load(robot)
     shown = motion_of(robot, motion, trial, camera) if run is None else motion_of_run(robot, run, trial, camera)
     tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))
@@ -176,8 +177,8 @@ def render(
         texts["robot"] = robot_text(robot)
     stripes = len(robot.seal.stripes) if robot.seal is not None else 0
     edges = stripe_edges(troubles, stripes, seed) if troubles.uneven_stripes and stripes else None
-    shake = Shake(troubles, seed)
-    frames = Frames(Painter(robot, tank, lens, edges), disturbances, trajectory, camera.exposure, shake)
+    view = View(troubles, seed, camera.size)
+    frames = Frames(Painter(robot, tank, lens, edges), disturbances, trajectory, camera.exposure, view)
     tell = progress or (lambda _what, _done, _total: None)
     beside = {names[name]: text for name, text in texts.items()}
     with (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator
@@ -12,13 +12,14 @@ from pydantic import BeforeValidator
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.extras import required
-from spirillum.robot.arguments import Options, in_range, within
+from spirillum.robot.arguments import Options, in_range, whole, within
 from spirillum.robot.fields import Angle
 from spirillum.robot.robot import Robot
+from spirillum.virtual.degradation import Degradation
 
-__all__ = ["USUAL", "Shake", "Troubles", "even_times", "repainted", "stripe_edges"]
+__all__ = ["NAMES", "Shake", "Troubles", "View", "even_times", "repainted", "stripe_edges", "with_troubles"]
 
-_LOST, _SHAKE, _PAINT = range(30, 33)
+_LOST, _SHAKE, _PAINT, _CABLES = range(30, 34)
 _WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2
 """Waves of a hand's sway, and their frequencies, Hz; assumed."""
 _JITTER = 1.0 / 3.0
@@ -40,32 +41,61 @@ class Troubles(Options):
     """Angle by which the camera is turned about its optical axis against the channel."""
     uneven_stripes: Annotated[float, BeforeValidator(in_range(0.0, 0.5))] = 0.0
     """Widths of hand-painted stripes: largest difference from an even one, over it."""
-
-    @classmethod
-    def of(cls, value: str | Self | Mapping[str, Any] | None) -> Self:
-        """Troubles from what a caller may give.
-
-        Args:
-            value: names of troubles with commas between them, at their usual size (`USUAL`), `Troubles`, its fields by
-                name, or None.
-
-        Raises:
-            InputError: for an unknown name, or a value out of range.
-        """
-        if not isinstance(value, str):
-            return super().of(value)
-        chosen: dict[str, Any] = {}
-        for word in (part.strip() for part in value.split(",")):
-            name = word.replace("-", "_")
-            if name not in USUAL:
-                known = [trouble.replace("_", "-") for trouble in USUAL]
-                raise InputError(f"trouble {word[:40]!r}{did_you_mean(word[:40], known)}; allowed: {', '.join(known)}")
-            chosen[name] = USUAL[name]
-        return super().of(chosen)
+    blurred: Annotated[float, BeforeValidator(in_range(0.0, 10.0, " pixels"))] = 0.0
+    """Standard deviation of what a lens out of focus makes of a point, pixels."""
+    cables: Annotated[int, BeforeValidator(whole(0, 8))] = 0
+    """Number of dark cables that hang across the view, between camera and oil."""
 
 
-USUAL: dict[str, Any] = {"lost_frames": 0.03, "handheld": 3.0, "rolled": np.radians(4.0), "uneven_stripes": 0.2}
-"""The usual size of each trouble: 7 frames of 240; 3 pixels; 4 degrees; a fifth."""
+_USUAL: dict[str, dict[str, Any]] = {
+    "lost-frames": {"lost_frames": 0.03},
+    "handheld": {"handheld": 3.0},
+    "rolled": {"rolled": np.radians(4.0)},
+    "uneven-stripes": {"uneven_stripes": 0.2},
+    "blurred": {"blurred": 1.0},
+    "cables": {"cables": 2},
+}
+"""The usual size of each trouble: 7 frames of 240; 3 pixels; 4 degrees; a fifth; one pixel; two."""
+_DISTURBANCES: dict[str, dict[str, Any]] = {
+    "noise": {"noise": 8.0},
+    "lamp": {"lamp_drift": 0.2},
+    "compression": {"crf": 34},
+    "missing-frames": {"dropped": 0.1},
+    "tilted": {"tilt": np.radians(2.0)},
+    "glare": {"glare": 0.2},
+    "standing-glare": {"glare": 0.2, "glare_moves": False},
+    "bubbles": {"bubbles": 8},
+    "hand": {"hand": True},
+}
+"""Troubles that are disturbances of the picture (`Degradation`), and their usual size."""
+NAMES = (*_USUAL, *_DISTURBANCES)
+"""Of all troubles that a rendered film may have."""
+
+
+def with_troubles(
+    value: str | Troubles | Mapping[str, Any] | None, degradation: Degradation
+) -> tuple[Troubles, Degradation]:
+    """Troubles from what a caller may give, and the degradation with those among them that disturb the picture.
+
+    Args:
+        value: names of troubles with commas between them, at their usual size, `Troubles`, its fields by name, or None.
+        degradation: what the caller gave; its own fields stay.
+
+    Raises:
+        InputError: for an unknown name, or a value out of range.
+    """
+    if not isinstance(value, str):
+        return Troubles.of(value), degradation
+    chosen: dict[str, Any] = {}
+    disturbed: dict[str, Any] = {}
+    for word in (part.strip() for part in value.split(",")):
+        if word not in NAMES:
+            raise InputError(f"trouble {word[:40]!r}{did_you_mean(word[:40], NAMES)}; allowed: {', '.join(NAMES)}")
+        chosen |= _USUAL.get(word, {})
+        disturbed |= _DISTURBANCES.get(word, {})
+    given = degradation.model_fields_set
+    disturbed = {name: size for name, size in disturbed.items() if name not in given}
+    return Troubles.of(chosen), degradation.model_copy(update=disturbed)
 
 
 def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -159,3 +189,63 @@ class Shake:
         matrix[:, 2] += u, v
         moved = cv2.warpAffine(light, matrix, (columns, rows), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         return np.ascontiguousarray(np.maximum(moved, 0.0), dtype=light.dtype)
+
+
+_CABLE = 1.0 / 80.0
+"""Width of a cable over that of the picture; assumed."""
+_CABLE_LIGHT = 0.02
+"""Linear light of a cable: black rubber; assumed."""
+
+
+class View:
+    """What lies between the robot and a picture of it: cables, and a camera that is held, or out of focus."""
+
+    def __init__(self, troubles: Troubles, seed: int, size: tuple[int, int]) -> None:
+        """Prepare.
+
+        Args:
+            troubles: of the film.
+            seed: of the random numbers.
+            size: width and height of the picture, pixels.
+        """
+        self._shake, self._blurred = Shake(troubles, seed), troubles.blurred
+        self._cables = _cables(troubles.cables, seed, size) if troubles.cables else None
+
+    def seen(self, light: np.ndarray, time: float) -> np.ndarray:
+        """A picture as the camera sees it at a time.
+
+        Args:
+            light: linear light, (rows, columns, 3).
+            time: s.
+        """
+        if self._cables is not None:
+            light = (light * (1.0 - self._cables) + _CABLE_LIGHT * self._cables).astype(light.dtype)
+        light = self._shake.moved(light, time)
+        if self._blurred:
+            cv2 = required("cv2", "a lens out of focus", "video")
+            light = cv2.GaussianBlur(light, (0, 0), self._blurred)
+        return light
+
+
+def _cables(count: int, seed: int, size: tuple[int, int]) -> Samples:
+    """Share of each pixel that cables cover, which hang from the upper to the lower border, (rows, columns, 1)."""
+    cv2 = required("cv2", "cables", "video")
+    columns, rows = size
+    rng = np.random.default_rng([seed, _CABLES])
+    cover = np.zeros((rows, columns), dtype=np.uint8)
+    along = np.linspace(-0.05, 1.05, 40)
+    for _ in range(count):
+        place, lean, sway, phase = rng.uniform([0.1, -0.2, 0.02, 0.0], [0.9, 0.2, 0.05, 2.0 * np.pi])
+        across = columns * (place + sway * np.sin(2.0 * np.pi * along + phase)) + lean * rows * (along - 0.5)
+        path = np.rint(16.0 * np.column_stack([across, rows * along])).astype(np.int32)
+        cv2.polylines(
+            cover,
+            [path],
+            isClosed=False,
+            color=255,
+            thickness=max(2, round(_CABLE * columns)),
+            lineType=cv2.LINE_AA,
+            shift=4,
+        )
+    found: Samples = (cover / 255.0)[..., None]
+    return found
