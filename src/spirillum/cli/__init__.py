@@ -14,7 +14,7 @@ from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
 from threading import Timer
-from typing import TextIO
+from typing import Any, TextIO
 
 __all__ = ["main"]
 
@@ -131,8 +131,20 @@ def _explained(error: BaseException) -> int | None:
     if isinstance(error, OSError) and (sentence := _of_place(error)):
         return _fail(sentence, 2)
     if hasattr(error, "format_message"):  # a usage error of the command-line library
-        return _fail(str(InputError(error.format_message())), 2)
+        return _fail(str(InputError(_of_usage(error))), 2)
     return None
+
+
+def _of_usage(error: Any) -> str:
+    """What is wrong with the words of a command; where a value was refused, what is allowed instead."""
+    from pydantic import ValidationError
+
+    from spirillum.robot.problems import refused_value
+
+    names = getattr(getattr(error, "param", None), "opts", None)
+    if isinstance(error.__cause__, ValidationError) and names:
+        return refused_value(error.__cause__, names[0])
+    return str(error.format_message())
 
 
 def _of_place(error: OSError) -> str:

@@ -80,13 +80,13 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar on standard error with the time left; silent for `--json` and where nobody watches.
 
-    That a table is made, which takes minutes, and what a large study will take, are lines of their own on standard
-    error in any case.
+    That a table is made or a yawed place solved for, which takes minutes, and what a large study will take, are lines
+    of their own on standard error in any case.
     """
     from spirillum.crews import ESTIMATE
-    from spirillum.fluid.tube.announced import ANNOUNCED
+    from spirillum.fluid.tube.announced import ANNOUNCED, YAWED
 
-    lines = (ANNOUNCED, ESTIMATE)
+    lines = (ANNOUNCED, ESTIMATE, YAWED)
     console = Console(stderr=True, soft_wrap=True)
     if quiet:
 

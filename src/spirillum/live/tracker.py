@@ -120,9 +120,9 @@ class LiveTracker:
             InputError: if the robot was never found.
         """
         if self._following is None:
-            raise InputError(
-                f"{self.name}: {self._reason}; allowed: a robot in view, for longer than {self._learn:g} s"
-            )
+            reason = self._reason if self._reason.startswith(self.name) else f"{self.name}: {self._reason}"
+            joined = ", and" if "; allowed: " in reason else "; allowed:"
+            raise InputError(f"{reason}{joined} a robot in view for longer than {self._learn:g} s")
         return self._following.trial(self.name)
 
     def _check(self, frame: Any, time: Any) -> None:

@@ -311,7 +311,7 @@ def _doubt(findings: tuple[Finding, ...], name: str) -> str:
 
 def _scale_lines(found: Scouted, robot: Robot, spacing: float | None) -> dict[str, tuple[str, str]]:
     """The spacing, where it is known; without a ruler the scale by the robot's own size."""
-    if spacing is not None and found.lines is not None:
+    if spacing is not None and (found.lines is not None or found.known is None):
         return {"markers.spacing": (f'"{1e3 * spacing:.9g} mm"', "as given")}
     if found.lines is not None or found.known is None:
         return {}

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
-__all__ = ["problems_in"]
+__all__ = ["problems_in", "refused_value"]
 
 _OTHERWISE = {
     "tail.turns": "tail.length over tail.wavelength is the number of turns",
@@ -65,11 +65,26 @@ def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -
         allowed = list(_fields_at(model, names[:-1]))
         hint = f": {_OTHERWISE[field]}" if field in _OTHERWISE else did_you_mean(names[-1][:60], allowed)
         return [f"{field[:120]} is not a known field{hint}; allowed: {', '.join(allowed)}"]
+    return [_refused(problem, field)]
+
+
+def refused_value(error: ValidationError, field: str) -> str:
+    """A sentence for a single value that was refused.
+
+    Args:
+        error: of the value.
+        field: what it was given for.
+    """
+    return _refused(error.errors(include_url=False)[0], field)
+
+
+def _refused(problem: Mapping[str, Any], field: str) -> str:
+    """A sentence of field, value, and what is allowed."""
     shown, words = clipped(problem.get("input")), _allowed(problem, field)
     hint = ""
-    if kind == "literal_error":
+    if problem["type"] == "literal_error":
         hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", words))
-    return [f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {words}"]
+    return f"{field or 'the file'} = {shown} is not allowed{hint}; allowed: {words}"
 
 
 def _allowed(problem: Mapping[str, Any], field: str) -> str:
@@ -81,6 +96,11 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
         "list_type": "a list, [...]",
         "too_long": f"at most {_entries(context.get('max_length'))}",
         "too_short": f"at least {_entries(context.get('min_length'))}",
+        "int_parsing": "a whole number",
+        "int_type": "a whole number",
+        "int_from_float": "a whole number",
+        "float_parsing": "a number",
+        "float_type": "a number",
     }
     if kind in words:
         return words[kind]

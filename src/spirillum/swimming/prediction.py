@@ -15,6 +15,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.announced import YAWED
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -94,6 +95,8 @@ class Prediction(Shown):
         """What the model leaves out of this robot, and what that costs it."""
         if self.lying is not None:
             return "walls, weight and contact are computed, nothing is fitted; roughness and dry friction are assumed"
+        if self.model.placed and self.intervals is not None:
+            return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
         return self.model.own_error(self.batch)
 
     @cached_property
@@ -252,7 +255,8 @@ def predict(
         )
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
-        tell(f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+        slow = chosen.form == "direct" and batch.placement.yaw != 0.0
+        tell(YAWED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
     result = case.swim(batch)
     if not result.valid[0]:
         raise InputError(case.why_not())

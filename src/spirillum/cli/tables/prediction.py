@@ -26,6 +26,7 @@ def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
     """Table of `predict`: the five quantities that matter most, or all of them."""
     show_unsteady(answer, console)
     calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
+    calibrated = "fitted (posterior)" if "interval_of" in answer else calibrated
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     only = None if all_of_it else headline(answer)

@@ -25,6 +25,7 @@ from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerR
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.stated import CHECKED, said_of_tail
 from spirillum.fluid.tube.cache import kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
@@ -208,11 +209,14 @@ class Tube(SwimmerModel):
         placement = batch.placement
         unknown = ["the gap under the body"] if placement.gap is None and placement.eccentricity is None else []
         unknown += ["the body's pitch"] if placement.pitch is None else []
-        walls = "walls are computed, nothing is fitted"
-        if not unknown:
-            return f"{walls}; gap and pitch are taken as given: their own uncertainty comes on top"
-        decide = "decides" if len(unknown) == 1 else "decide"
-        return f"{walls}; {' and '.join(unknown)}, not given here, {decide} much of the answer"
+        if unknown:
+            decide = "decides" if len(unknown) == 1 else "decide"
+            place = f"{' and '.join(unknown)}, not given here, {decide} much of the answer"
+        else:
+            place = "gap and pitch are taken as given: their own uncertainty comes on top"
+        standard = batch.options.slender.accuracy == "standard"
+        wire = f"; without walls, {said_of_tail(batch, CHECKED['slender'])}" if standard else ""
+        return f"walls are computed, nothing is fitted; {place}{wire}"
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""

@@ -17,7 +17,10 @@ __all__ = ["ranking_picture"]
 
 MOST = 12
 """Robots in the figure."""
-_ROW, _ENDS = 0.24, 1.0  # inches
+_ROW, _ENDS = 0.24, 1.2  # inches
+
+
+_NO_WALLS = "The channel's walls are not computed"
 
 
 def ranking_picture(ranking: StudyRanking) -> Picture:
@@ -29,7 +32,7 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
     count = len(ranking.robots)
     which = f"The {min(MOST, count)} fastest of {count} robots" if count > MOST else f"All {count} robots"
     lines = f" Lines: {ENDS[ranking.kind]}." if ranking.kind else ""
-    walls = " The channel's walls are not computed." if ranking.walls else ""
+    walls = f" {_NO_WALLS}." if ranking.walls else ""
     caption = (
         f"{which}, by model {ranking.model} with friction reading {ranking.friction}; filled: the best of its column."
         f"{lines}{walls}"
@@ -50,7 +53,9 @@ def _drawn(ranking: StudyRanking) -> Figure:
     first.set_ylim(len(robots) - 0.4, -0.6)
     title = ranking.message[:1].upper() + ranking.message[1:]
     figure.suptitle(plain(title, 90), x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
-    figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.04 / figure.get_figheight()))
+    by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}." if ranking.walls else "")
+    figure.text(0.02, 1.0 - 0.32 / figure.get_figheight(), by, ha="left", va="top", size="small")
+    figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.14 / figure.get_figheight()))
     return figure
 
 
