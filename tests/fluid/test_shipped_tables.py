@@ -13,13 +13,13 @@ from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table
 from spirillum.fluid.tube.places import Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
-from spirillum.fluid.tube.rest import matrix_of
+from spirillum.fluid.tube.rest import even_phases, matrix_of
 from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_places import PHASES
-from spirillum.kernels.tube_table import INSIDE, YAW_SLACK, largest_yaw, mean_resistance_at
+from spirillum.kernels.tube_table import INSIDE, MIRROR, YAW_SLACK, largest_yaw, mean_resistance_at
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
@@ -36,6 +36,10 @@ def shipped(name: str) -> tuple[TubeTable, Places]:
     return table, Places(geometry, radius)
 
 
+def over_a_turn(table: TubeTable, seat: Seat) -> np.ndarray:
+    return np.stack([table.at(seat.offset, seat.pitch, seat.yaw, phase)[0] for phase in even_phases()])
+
+
 @pytest.mark.parametrize("name", PRESETS)
 def test_presets_have_tables_that_state_their_errors(name: str) -> None:
     table, _ = shipped(name)
@@ -46,13 +50,20 @@ def test_presets_have_tables_that_state_their_errors(name: str) -> None:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
-    table, _ = shipped(name)
+    table, places = shipped(name)
     image = find_table(table.geometry._replace(hand=-1.0), table.radius)
     assert image is not None
     assert image.geometry.hand == -1.0
-    own, other = table.at(0.004, 0.02, 0.01, 0.5)[0], image.at(0.004, 0.02, -0.01, np.pi - 0.5)[0]
-    np.testing.assert_allclose(other[0, 6], -own[0, 6], rtol=1e-9)  # thrust of a tail that turns the other way
-    np.testing.assert_allclose(np.diag(other), np.diag(own), rtol=1e-9)
+    draw, sign = np.random.default_rng(5), MIRROR[:, None] * MIRROR
+    for _ in range(50):
+        seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1.0, 1.0))
+        yaw = draw.uniform(-1.0, 1.0) * largest_yaw(table.packed, seat.offset, seat.pitch)
+        phase = draw.uniform(0.0, 2.0 * np.pi)
+        own, left = table.at(seat.offset, seat.pitch, yaw, phase)
+        other, image_left = image.at(seat.offset, seat.pitch, -yaw, np.pi - phase)
+        scale = np.sqrt(np.diag(own))
+        assert (left, image_left) == (INSIDE, INSIDE)
+        assert np.abs((sign * other - own) / np.outer(scale, scale)).max() < 1e-10
 
 
 def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None:
@@ -60,15 +71,15 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
     batches = [RobotBatch.of(study.robot_at(index)) for index in range(study.count)]
     keys = {key_of(RobotGeometry.of(batch), tube_radius(batch)) for batch in batches}
     files = list((Path(library.__file__).parent / "tables").glob("*.table"))
-    assert len(files) >= 2
+    assert len(files) >= 8
     for path in files:
         table = TubeTable.read(path)
         assert path.stem == table.key
         assert table.key in keys
-        # the largest: 4.5 % in a torque at 0.96 of the largest yaw, 0.3 mm from the glass
+        # the largest: 4.8 % in the pitching torque of a tail of 10 mm, yawed, nose down, 0.3 mm from the glass
         assert all(0 < error < 0.05 for error in table.error.values())
         assert all(0 < error < 0.05 for error in table.error_without_yaw.values())
-        assert path.stat().st_size < 90_000
+        assert path.stat().st_size < 120_000
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -116,7 +127,9 @@ def test_on_the_axis_raised_and_lowered_noses_are_mirror_images(name: str) -> No
     pitch = 0.5 * float(places.most[-1].min())
     up, down = table.at(0.0, pitch, 0.0, 0.7)[0], table.at(0.0, -pitch, 0.0, 0.7 + np.pi)[0]
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
-    assert np.all(response_errors(sign[:, None] * down * sign, up) < allowed)
+    assert np.all(
+        response_errors(sign[:, None] * down * sign, up, over_a_turn(table, Seat(places.radius, 0.0, pitch))) < allowed
+    )
 
 
 @pytest.mark.slow
@@ -132,4 +145,4 @@ def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: flo
     found, left = table.at(seat.offset, seat.pitch, seat.yaw, phase)
     assert left == INSIDE
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
-    assert np.all(response_errors(found, true) < allowed)
+    assert np.all(response_errors(found, true, over_a_turn(table, seat)) < allowed)

@@ -91,15 +91,21 @@ def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
     assert pitched.asymmetry < 1e-5
 
 
-def test_a_pitched_capsule() -> None:
-    """Level to rounding where it is hardly pitched; else symmetric, positive, even in the pitch on the axis."""
-    fineness = Fineness(tolerance=1e-3)
-    level, hardly, up, down = (
-        held_in_tube(Solids([(capsule(), 0)], Seat(1.0, offset, pitch), fineness), [])
-        for offset, pitch in ((0.2, 0.0), (0.2, 1e-9), (0.0, 0.12), (0.0, -0.12))
+@pytest.mark.parametrize(("tolerance", "allowed"), [(1e-3, 1e-8), (1e-2, 2e-7)])
+def test_a_capsule_that_is_hardly_pitched_is_level(tolerance: float, allowed: float) -> None:
+    """On rings that meet every wave by themselves, however coarsely waves are cut."""
+    level, hardly = (
+        held_in_tube(Solids([(capsule(), 0)], Seat(1.0, 0.2, pitch), Fineness(tolerance=tolerance)), [])
+        for pitch in (0.0, 1e-9)
     )
-    np.testing.assert_allclose(thirteen(hardly, 6), thirteen(level, 6), atol=3e-3)
-    np.testing.assert_allclose(np.diag(hardly.matrix)[:6], np.diag(level.matrix)[:6], rtol=3e-3)
+    np.testing.assert_allclose(thirteen(hardly, 6), thirteen(level, 6), atol=allowed)
+    np.testing.assert_allclose(np.diag(hardly.matrix)[:6], np.diag(level.matrix)[:6], rtol=2.0 * allowed)
+
+
+def test_a_pitched_capsule() -> None:
+    """Symmetric, positive, even in the pitch on the axis."""
+    fineness = Fineness(tolerance=1e-3)
+    up, down = (held_in_tube(Solids([(capsule(), 0)], Seat(1.0, 0.0, pitch), fineness), []) for pitch in (0.12, -0.12))
     assert np.linalg.eigvalsh(thirteen(up, 6))[0] > 0.002
     assert up.asymmetry < 2e-4
     mirror = np.array([1, 1, -1, -1, -1, 1, 1.0])  # z to -z: the nose falls instead of rising

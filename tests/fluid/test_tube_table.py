@@ -321,6 +321,18 @@ def test_response_errors_are_relative() -> None:
     assert np.all(response_errors(matrix, matrix) == 0)
 
 
+def test_response_errors_over_a_turn_are_over_root_mean_squares() -> None:
+    """Of sizes 1 to 3 times as large: over the root of (1 + 4 + 9)/3."""
+    a = np.random.default_rng(9).normal(size=(8, 8))
+    true = a @ a.T
+    wrong = true + 0.01 * np.diag([0, 0, 1.0, 0, 0, 0, 0, 0])
+    turn = np.stack([true, true, true])
+    turn[1, 2, 2], turn[2, 2, 2] = 2.0 * true[2, 2], 3.0 * true[2, 2]
+    found = response_errors(wrong, true, turn)
+    assert found[5] == pytest.approx(0.01 / true[2, 2] / np.sqrt(14.0 / 3.0))
+    np.testing.assert_allclose(found[:5], 0.0, atol=1e-12)
+
+
 def test_a_table_is_written_and_read(
     tmp_path,
     geometry: RobotGeometry,

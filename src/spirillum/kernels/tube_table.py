@@ -10,9 +10,9 @@ phase phi of the tail. The rest is interpolated over
 The end of a tail of length L is off the axis by L sin(psi) across the plane of the offset and by L sin(p) - e along it,
 so that sin(psi_c)^2 is a quadratic polynomial of sin(p) and e.
 
-Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - f) between the nodes,
-linear in t below the first, quartic in artanh(g/1.2), and a Fourier sum in the phase: the rest is positive definite
-everywhere.
+Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - |f|) between the nodes, one
+nose up and one nose down, linear in t below the first, quartic in artanh(g/1.2), and a Fourier sum in the phase: the
+rest is positive definite everywhere.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def packed(
         rest: parameters of the factor, (gaps, up + down - 1, phases, 36): Fourier coefficients 1, cos, sin, cos 2, ...;
             pitches in the order of `up`, then `down` without its first.
         yaw_gaps: nodes t of the yawed places.
-        yaw_pitches: nodes of signed f of the yawed places.
+        yaw_pitches: nodes of signed f of the yawed places, increasing, 0 one of them.
         yaw_limit: of `yaw_limit_of`, (7,).
         yawed: coefficients of the powers of the stretched yaw, (yaw gaps, yaw pitches, `YAW_ORDERS`, phases, 36).
         film: packed film.
@@ -219,17 +219,6 @@ def cut_of_film(t: float) -> float:
         return 0.0
     left = 1.0 - max(t, 0.0) ** 2
     return left * left
-
-
-@compiled
-def _lagrange(data: Samples, start: int, count: int, x: float, out: Samples) -> None:
-    """Lagrange weights of nodes at x."""
-    for j in range(count):
-        weight = 1.0
-        for m in range(count):
-            if m != j:
-                weight *= (x - data[start + m]) / (data[start + j] - data[start + m])
-        out[j] = weight
 
 
 @compiled
@@ -374,15 +363,22 @@ def _add_yaw(table: Samples, t: float, f: float, share: float, out: Samples) -> 
     """Add what a share of the largest yaw makes of the coefficients; whether it is within the range."""
     gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
     start = _rest_start(table) - _YAW_LIMIT - gaps - pitches
-    of_gap, of_pitch = np.empty(_MOST), np.empty(_MOST)
+    of_gap, of_pitch, nodes = np.empty(_MOST), np.empty(_MOST), np.empty(_MOST)
     _rooted(table, start, gaps, max(t, table[start]), of_gap)
-    _lagrange(table, start + gaps, pitches, f, of_pitch)
+    level = 0
+    while table[start + gaps + level] < 0.0:
+        level += 1
+    step = -1 if f < 0.0 else 1  # nose up and nose down apart: which end is the nearer one changes where it is level
+    count = level + 1 if f < 0.0 else pitches - level
+    for j in range(count):
+        nodes[j] = abs(table[start + gaps + level + step * j])
+    _steep(nodes, 0, count, abs(f), of_pitch)
     within = abs(share) <= YAW_SLACK
     s = stretched_yaw(share if within else math.copysign(YAW_SLACK, share))
     at_yawed = film_start(table) - gaps * pitches * YAW_ORDERS * out.size
     for i in range(gaps):
-        for j in range(pitches):
-            here = at_yawed + (i * pitches + j) * YAW_ORDERS * out.size
+        for j in range(count):
+            here = at_yawed + (i * pitches + level + step * j) * YAW_ORDERS * out.size
             weight = of_gap[i] * of_pitch[j]
             for _ in range(YAW_ORDERS):
                 weight *= s

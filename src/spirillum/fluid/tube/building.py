@@ -224,11 +224,12 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[Solution]:
 
 
 def _largest_errors(table: Samples, places: Sequence[Solution], found: Sequence[Sequence[Samples]]) -> dict[str, float]:
-    """Largest relative error of `RESPONSES` at places whose answers are known."""
+    """Largest error of `RESPONSES` at places whose answers are known, over their sizes in a turn of the tail."""
     errors = []
     for place, answers in zip(places, found, strict=True):
         (_, phases), seat = place.tails[0], place.seat
-        out = np.empty((kernel.MOTIONS, kernel.MOTIONS))
-        kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phases[0], out)
-        errors.append(response_errors(out, answers[0][0]))
+        own, *turn = np.empty((1 + PHASES, kernel.MOTIONS, kernel.MOTIONS))
+        for phase, out in zip((phases[0], *even_phases()), (own, *turn), strict=True):
+            kernel.resistance_at(table, seat.offset, seat.pitch, seat.yaw, phase, out)
+        errors.append(response_errors(own, answers[0][0], np.stack(turn)))
     return dict(zip(RESPONSES, np.max(errors, axis=0).tolist(), strict=True))

@@ -9,7 +9,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import Rings, Rows, System, finer, midpoints, projectors, sent_to_wall
-from spirillum.fluid.tube.wall import Waves, each, extensions, times_layers, weighted_layers
+from spirillum.fluid.tube.wall import SLACK, Waves, each, extensions, times_layers, weighted_layers
 from spirillum.fluid.wire.revolution import Panels
 
 __all__ = ["LevelRings"]
@@ -68,7 +68,7 @@ class LevelRings(Rings):
         edges = np.searchsorted(waves.k, waves.k[-1] * 0.5 ** np.arange(6.0, 0.0, -1.0))
         for low, high in pairwise([0, *edges.tolist(), waves.k.size]):
             if high > low:
-                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + 3.0
+                yield slice(low, high), waves.k[low] * (distance + distance.min()) < waves.cut + SLACK
 
     def sent(
         self, waves: Waves, systems: Sequence[System], points: Samples, forces: Samples, away: float

@@ -42,7 +42,7 @@ LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most places the glass holds the tail before."""
 YAW_SHARES = (0.6, 0.95)
 """Yaws of yawed places over the largest one there."""
-_YAW_PITCHES = (-0.5, 0.0, 0.45, 0.8)
+_YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
 _SWEPT = 121
 """Points along the tail between which it is asked how near it comes to the glass."""
 _LEAST_PITCH = np.radians(0.2)

@@ -38,15 +38,18 @@ def response_of(matrix: Samples) -> Samples:
     return np.array([speed, roll, force[1], force[2], force[4], force[5], matrix[2, 2]])
 
 
-def response_errors(matrix: Samples, true: Samples) -> Samples:
-    """Relative errors of `RESPONSES`, sideways force and torques over the size of what acts on the robot in all.
+def response_errors(matrix: Samples, true: Samples, turn: Samples | None = None) -> Samples:
+    """Errors of `RESPONSES`, over the size of what acts on the robot, sideways force and torques over those in all.
 
     Args:
         matrix: the 8x8 judged.
         true: what it should be.
+        turn: of the place at phases over a turn of the tail, (n, 8, 8): sizes are then root mean squares over them, for
+            a force that nearly vanishes at one phase moves nothing; None: sizes are those of `true`.
     """
     a, b = response_of(matrix), response_of(true)
-    force, torque = np.hypot(b[2], b[3]), np.hypot(b[4], b[5])
-    scale = np.array([abs(b[0]), abs(b[1]), force, torque, torque, b[6]])
-    found: Samples = np.abs(a - b)[[0, 1, 2, 4, 5, 6]] / scale
+    sizes = np.stack([response_of(some) for some in (true[None] if turn is None else turn)])
+    force, torque = (np.hypot(sizes[:, first], sizes[:, first + 1]) for first in (2, 4))
+    of_each = np.stack([sizes[:, 0], sizes[:, 1], force, torque, torque, sizes[:, 6]])
+    found: Samples = np.abs(a - b)[[0, 1, 2, 4, 5, 6]] / np.sqrt(np.mean(of_each**2, axis=1))
     return found

@@ -25,7 +25,7 @@ from spirillum.kernels import tube_table as kernel
 
 __all__ = ["TubeTable", "key_of"]
 
-_FORMAT = "spirillum.tube-table/4"
+_FORMAT = "spirillum.tube-table/5"
 _LARGEST_FILE = 2**21  # bytes
 
 

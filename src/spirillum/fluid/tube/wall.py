@@ -21,6 +21,7 @@ import numpy as np
 from spirillum.arrays import Samples
 
 __all__ = [
+    "SLACK",
     "Band",
     "Waves",
     "components_of",
@@ -44,6 +45,9 @@ _BANDS = (0.35, 0.65)
 """Orders over all of them at which a new band begins."""
 _FURTHER = 3.0
 """Damping, as an exponent over that at which waves are cut, from which things are out of reach while others are not."""
+SLACK = 3.0
+"""Exponent over that at which waves are cut, up to which they are kept between things further from the wall than the
+nearest: there are many of them, and what each lacks adds up to half a percent of what holds and pushes the robot."""
 _AT_WALL = 1e-9
 """Distance over the radius below which things are at the wall, where every wave reaches them."""
 _THREADS = 2
@@ -69,7 +73,7 @@ class Waves:
 
     def orders_between(self, number: int, distance: float) -> int:
         """Orders that matter at one k between things at this mean distance from the wall, m; 0 for none."""
-        steepest, k = self.cut / (2.0 * distance), float(self.k[number])
+        steepest, k = (self.cut + SLACK) / (2.0 * distance), float(self.k[number])
         if k > steepest:
             return 0
         return min(int(np.ceil(self.radius * np.sqrt(steepest**2 - k**2)) + 3.0), self.orders[number])
