@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import spirillum as sp
+from spirillum.dynamics import tube_simulation
 from spirillum.dynamics.free_motion import FreeMotion, _checked_yaw, _said, _yawed_beyond_check, free_motion
 from spirillum.dynamics.resting_film import lubrication_resistance
 from spirillum.dynamics.tube_integration import observed_at
@@ -168,3 +169,15 @@ def test_error_is_stated_up_to_the_yaw_at_which_the_table_was_checked(share: flo
     said = " ".join(_said(run, motion.robot, weight=True))
     assert _yawed_beyond_check(run, motion.robot) is not known
     assert ("there is no error estimate" in said) is not known
+
+
+@pytest.mark.parametrize(("checked", "known"), [(3.2, True), (2.8, False)])
+def test_run_states_an_error_up_to_the_yaw_at_which_the_table_was_checked(
+    monkeypatch: pytest.MonkeyPatch, checked: float, known: bool
+) -> None:
+    monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: np.radians(checked))
+    place = {"gap": "1 mm", "yaw": "3 deg"}
+    run = sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.1 s"}, placement=place)
+    assert np.isfinite(run.attrs["error_estimate"]) == known
+    assert ("there is no error estimate" in run.attrs["warnings"]) != known
+    assert "roughness and dry friction are assumed" in run.attrs["known_error"]

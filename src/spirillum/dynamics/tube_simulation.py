@@ -19,12 +19,13 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels.tube_table import largest_yaw
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.swimming.cautions import flow_limit
-from spirillum.swimming.prediction import Prediction
+from spirillum.swimming.prediction import FREE_IN_TUBE, Prediction
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ def run_in_tube(
     turn = links.turn
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
+    unchecked = _beyond_check(dataset, links)
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
     if asked.flow is not None:
         said += [
@@ -72,8 +74,27 @@ def run_in_tube(
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
     return dataset.assign_attrs(
-        warnings="\n".join(said), error_estimate=error, table=table.key, error_against=TabledTube.error_against
+        warnings="\n".join([*said, *unchecked]),
+        error_estimate=np.nan if unchecked else error,
+        known_error=FREE_IN_TUBE,
+        table=table.key,
+        error_against=TabledTube.error_against,
     )
+
+
+def _beyond_check(dataset: xr.Dataset, links: TubeRobot) -> list[str]:
+    """A sentence where a run yaws further than the places against which its table was checked; else nothing."""
+    offset, pitch, yaw = (dataset[name].values for name in ("offset", "wall_pitch", "wall_yaw"))
+    checked = np.array([largest_yaw(links.table, *place) for place in zip(offset, pitch, strict=True)])
+    beyond = np.flatnonzero(np.abs(yaw) > checked)
+    if not beyond.size:
+        return []
+    first, most = beyond[0], beyond[np.argmax(np.abs(yaw[beyond]))]
+    return [
+        f"from {float(dataset['time'][first]):.3g} s on it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg "
+        f"against the wall, and its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no "
+        "error estimate"
+    ]
 
 
 def links_in_tube(

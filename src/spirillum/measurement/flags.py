@@ -52,6 +52,9 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag
             flags.append(flag)
     names = {flag.name for flag in flags}
     implied = {"stripes-unreadable"} if "no-stripes" in names else set()
+    for name in SEEN:  # what is not given has no mean, and no frames left out of it
+        if any(name in flag.spoils for flag in flags):
+            implied |= {f"{kind}-{name.replace('_', '-')}" for kind in ("not-steady", "stray-frames")}
     if "stripes-do-not-fit" in names:
         implied |= _OF_STRIPES
     if "not-the-robot" in names:

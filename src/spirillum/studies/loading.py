@@ -281,6 +281,7 @@ def _with_models(
             posterior=posterior,
             tables_only=True,
             other_way=f"--model {WALLED} answers without one at one place, in some ten seconds of one core a robot",
+            among=True,
         )
         if choice.fitted or choice.model != WALLED:
             break

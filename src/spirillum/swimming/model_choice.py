@@ -82,6 +82,7 @@ def choose_model(
     tables_only: bool = False,
     motion: str = "held",
     other_way: str = f"so does the first run with --model {WALLED}",
+    among: bool = False,
 ) -> ModelChoice:
     """The model that is asked for, or with `auto` the one that knows most about the robot.
 
@@ -94,6 +95,7 @@ def choose_model(
         tables_only: take a model with walls only where the robot has a table, for what would take minutes without.
         motion: of a steady state, `held` or `free`; the free one in a tube takes a table, too.
         other_way: how else to come to an answer with walls than by `spirillum prepare`, a clause for the caution.
+        among: the robot is one of several that are compared.
 
     Raises:
         InputError: for an unknown model, or a calibration that was fitted with several.
@@ -106,24 +108,26 @@ def choose_model(
     if robot.channel is None:
         return ModelChoice(UNBOUNDED, "the robot has no channel")
     why = _why_without_walls(
-        robot, placement or Placement(), tables_only=tables_only, motion=motion, other_way=other_way
+        robot, placement or Placement(), tables_only=tables_only, motion=motion, other_way=other_way, among=among
     )
     if not why:
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
-    caution = f"the channel's walls are left out, which makes a robot faster than it is (model '{UNBOUNDED}'): {why}"
+    makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
+    caution = f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
     return ModelChoice(UNBOUNDED, why.partition(":")[0], caution)
 
 
-def _why_without_walls(robot: Robot, placement: Placement, *, tables_only: bool, motion: str, other_way: str) -> str:
+def _why_without_walls(
+    robot: Robot, placement: Placement, *, tables_only: bool, motion: str, other_way: str, among: bool
+) -> str:
     """Why a robot in a channel is answered for without its walls; empty where it is not."""
     batch = RobotBatch.of(robot, placement)
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside:  # a place that was asked for is refused by the model that knows places
         return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
     if (tables_only or motion == "free") and not has_table(batch):
-        return (
-            f"the robot has no table for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
-        )
+        lacks = "not every robot has a table" if among else "the robot has no table"
+        return f"{lacks} for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
     return ""
 
 

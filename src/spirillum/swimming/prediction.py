@@ -38,7 +38,10 @@ from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["Prediction", "interval_statement", "predict", "with_middles"]
+__all__ = ["FREE_IN_TUBE", "Prediction", "interval_statement", "predict", "with_middles"]
+
+FREE_IN_TUBE = "walls, weight and contact are computed, nothing is fitted; roughness and dry friction are assumed"
+"""What a free motion in the tube rests on."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,7 @@ class Prediction(Shown):
     def known_error(self) -> str:
         """What the model leaves out of this robot, and what that costs it."""
         if self.lying is not None:
-            return "walls, weight and contact are computed, nothing is fitted; roughness and dry friction are assumed"
+            return FREE_IN_TUBE
         if self.model.placed and self.intervals is not None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
         return self.model.own_error(self.batch)

@@ -98,7 +98,7 @@ _PANELS = (
 _IN_TUBE = (
     _Panel("gap", (("wall_gap", "under the body"), ("tail_gap", "under the tail")), film=True),
     _Panel("azimuth", (("azimuth", ""),)),
-    _Panel("pitch, yaw", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
+    _Panel("pitch, yaw to the wall", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
     _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True),
     _Panel("velocity $U_x$", (("forward_velocity", ""),)),
     _Panel("body rate", (("body_rotation_rate", ""),)),

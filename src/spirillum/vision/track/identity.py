@@ -53,8 +53,8 @@ class Identified(NamedTuple):
         flags = []
         if not self.robot:
             sentence = (
-                "stripes and tail do not look like the robot's: what was followed may be something else, or robot "
-                "file, scale or [region] are wrong; nothing is given"
+                "stripes and tail do not look like the robot's: what was followed may be something else, glare or poor "
+                "light may hide them, or robot file, scale or [region] are wrong; nothing is given"
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals

@@ -185,9 +185,12 @@ def _unread(part: _Part, seen: int, total: int) -> Flag:
     name, what = ("stripes-unreadable", "stripes") if part == "body" else ("tail-unreadable", "tail")
     if seen < max(4, UNWRAPPING.least_share * total):
         return Flag(
-            name, f"the {what} could be read on {seen} of {total} frames; the rotation is not given", _RATES[part]
+            name,
+            f"the {what} could be read on {seen} of {total} frames; the rotation is not given: sharper, larger "
+            "pictures, less compressed, show more",
+            _RATES[part],
         )
-    return Flag(name, f"the {what} could be read on {seen} of {total} frames only")
+    return Flag(name, f"the {what} could be read on {seen} of {total} frames only: sharper, larger pictures show more")
 
 
 def _jumps(part: _Part) -> Flag:

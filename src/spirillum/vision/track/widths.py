@@ -101,8 +101,9 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     surer[known] = np.hypot(error[known], WIDTHS.left * off)
     even = 2.0 * np.pi / count
     sentence = (
-        f"the stripes are uneven: against stripes of {np.degrees(even):.0f} deg their edges lie up to "
-        f"{np.degrees(off):.1f} deg apart; their places were learnt from the film and taken into account"
+        f"the stripes are uneven: against those of even stripes, {np.degrees(even):.0f} deg each, their edges are "
+        f"shifted by amounts that differ by up to {np.degrees(off):.1f} deg; their places were learnt from the film "
+        "and used"
     )
     return Evened(better, surer, (Flag("uneven-stripes", sentence),))
 
