@@ -62,7 +62,7 @@ def synthetic_experiment(
     every = [(n, with_tail(r, 1e-3 * w, 1e-3 * a)) for n, r in enumerate(loaded) for w, a in tails]
     size = len(every)
     one = np.ones(size)
-    nothing = Ratio(one, trials * one, one, 0.0 * one, 0.0 * one)
+    nothing = Ratio(one, trials * one, one, 0.0 * one, 0.0 * one, np.nan * one)
     return Experiment(
         robots=tuple(robot for _, robot in every),
         channels=tuple(channel_of(robot) for robot in loaded),
@@ -144,7 +144,7 @@ def _observed(problem: Problem, truth: Samples, trials: int, rng: np.random.Gene
         scale = np.abs(average)
         squares = np.sum(((trial - average) / scale) ** 2, axis=0)
         one = np.ones(size)
-        found[name] = Ratio(average, trials * one, scale, squares, (trials - 1.0) * one)
+        found[name] = Ratio(average, trials * one, scale, squares, (trials - 1.0) * one, np.nan * one)
     seen = replace(problem.experiment, advance=found["advance"], turning=found["turning"])
     return replace(problem, experiment=seen)
 

@@ -205,7 +205,7 @@ def target_of(share: float, seed: int) -> tuple[float, float, float]:
     found = sp.design(
         table,
         {"tail.wavelength": ("12 mm", "12.0001 mm")},
-        maximise=f"forward_velocity >= {1e3 * fast_enough!r} mm/s",
+        maximise=f"forward_velocity >= {float(1e3 * fast_enough)!r} mm/s",
         unknown={"fluid.viscosity": "1 Pa s:3 Pa s"},
         judged={"draws": 64, "seed": seed},
         model="rft",

@@ -19,7 +19,7 @@ from spirillum.fluid.tube.table import TubeTable, key_of
 from spirillum.fluid.tube.tube import solved
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_places import PHASES
-from spirillum.kernels.tube_table import INSIDE, MIRROR, YAW_SLACK, largest_yaw, mean_resistance_at
+from spirillum.kernels.tube_table import INSIDE, MIRROR, TOO_FAR_PITCHED, YAW_SLACK, largest_yaw, mean_resistance_at
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
@@ -146,3 +146,14 @@ def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: flo
     assert left == INSIDE
     allowed = 1.5 * np.array([table.error[response] for response in RESPONSES])
     assert np.all(response_errors(found, true, over_a_turn(table, seat)) < allowed)
+
+
+def test_nose_down_nothing_is_said_beyond_the_last_node() -> None:
+    """The glass does not end the pitch there, so that no slack is the tail's way to its contact."""
+    table, places = shipped("biorob2012-wide")
+    seat = Seat.at_gap(places.geometry.body, places.radius, 0.72e-3, -np.radians(8.0))
+    assert table.at(seat.offset, seat.pitch)[1] == INSIDE
+    last, left = table.at(seat.offset, 1.05 * seat.pitch)
+    assert left == TOO_FAR_PITCHED
+    assert sp.predict("biorob2012-wide", placement={"gap": "0.72 mm", "pitch": "-8 deg"}).model.form == "table"
+    assert np.isfinite(last).all()

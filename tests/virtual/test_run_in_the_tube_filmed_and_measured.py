@@ -17,7 +17,7 @@ def test_run_in_the_tube_is_measured_within_the_stated_intervals(tmp_path: Path)
     run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})
     late = run.sel(time=slice(START, None))
     film = tmp_path / "film.mp4"
-    sp.render("biorob2012-wide", film, run=late, trial={"duration": LENGTH}, camera={"size": "320x240", "fps": 10.0})
+    sp.render("biorob2012-wide", film, run=late, trial={"duration": LENGTH}, camera={"size": "400x300", "fps": 10.0})
     found = sp.measure(film, film.with_suffix(".setup.toml"), annotated=False, figures=False).trials[0].quantities
 
     ends = float(late["time"][0]) + np.array([0.0, LENGTH])

@@ -74,6 +74,8 @@ def test_names_give_usual_sizes_and_leave_what_was_given():
     troubles, degradation = with_troubles("blurred, noise,hand,bubbles", Degradation.of({"noise": 3.0}))
     assert (troubles.blurred, troubles.cables) == (1.0, 0)
     assert (degradation.noise, degradation.hand, degradation.bubbles, degradation.glare) == (3.0, True, 8, 0.0)
+    _, degraded = with_troubles("missing-frames", {"preset": "degraded", "noise": 3.0, "crf": None})
+    assert (degraded.dropped, degraded.noise, degraded.crf) == (0.1, 3.0, 33)
     every, disturbed = with_troubles(",".join(NAMES), Degradation())
     assert all(every.model_dump().values())
     assert not disturbed.glare_moves

@@ -101,11 +101,12 @@ _Hand = Annotated[
 ]
 
 _Trouble = Annotated[
-    str | None,
+    list[str] | None,
     typer.Option(
         metavar="NAME,...",
         help="Of a real bench: lost-frames, handheld, rolled, uneven-stripes, blurred, cables, noise, lamp, "
-        "compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them.",
+        "compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them, or "
+        "repeated.",
         rich_help_panel=_DISTURBED,
     ),
 ]
@@ -223,7 +224,7 @@ def render(
             camera=_fields(CameraOptions, given),
             degradation=_degradation(given),
             setup_errors=_fields(SetupErrors, given),
-            troubles=trouble,
+            troubles=None if trouble is None else ",".join(trouble),
             seed=seed,
             progress=progress,
         )

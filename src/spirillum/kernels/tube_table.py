@@ -31,6 +31,7 @@ __all__ = [
     "MIRROR",
     "MOTIONS",
     "PARAMETERS",
+    "STEEPEST",
     "TOO_FAR_PITCHED",
     "TOO_FAR_YAWED",
     "YAW_ORDERS",
@@ -62,7 +63,10 @@ MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
 PARAMETERS = MOTIONS * (MOTIONS + 1) // 2
 """Entries of a Cholesky factor."""
 INSIDE, TOO_FAR_PITCHED, TOO_FAR_YAWED = 0, 1, 2
-_PITCH_SLACK = 1.1  # of the largest pitch: the tail's tip touches the glass a little beyond it
+STEEPEST = (math.radians(12.0), math.radians(8.0))
+"""Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
+_PITCH_SLACK = 1.1  # of the largest pitch: where the glass sets it, the tail's tip touches a little beyond it
+_ROUNDING = 1e-9  # of angles given in degrees
 _BEYOND = 1.3  # beyond the largest pitch, so that the logarithm stays finite at contact
 YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it
 YAW_ORDERS = 4
@@ -273,9 +277,9 @@ def _place(table: Samples, e: float, pitch: float, of_gap: Samples) -> tuple[flo
     most = 0.0
     for i in range(gaps):
         most += of_gap[i] * table[at_most + 2 * i + (1 if pitch < 0.0 else 0)]
-    f = pitch / most
-    if abs(f) > _PITCH_SLACK:
-        return t, math.copysign(_PITCH_SLACK, f), False
+    f, steepest = pitch / most, STEEPEST[1 if pitch < 0.0 else 0]
+    if abs(f) > _PITCH_SLACK or abs(pitch) > steepest * (1.0 + _ROUNDING):
+        return t, math.copysign(min(_PITCH_SLACK, steepest / most), f), False
     return t, f, True
 
 

@@ -134,9 +134,8 @@ def render(
     with protected(*inputs):
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
-    degradation, setup_errors = Degradation.of(degradation), SetupErrors.of(setup_errors)
-    seed = Seeded.of({"seed": seed}).seed
     troubles, degradation = with_troubles(troubles, degradation)
+    seed, setup_errors = Seeded.of({"seed": seed}).seed, SetupErrors.of(setup_errors)
     robot = load(robot)
     shown = motion_of(robot, motion, trial, camera) if run is None else motion_of_run(robot, run, trial, camera)
     tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))

@@ -73,19 +73,20 @@ NAMES = (*_USUAL, *_DISTURBANCES)
 
 
 def with_troubles(
-    value: str | Troubles | Mapping[str, Any] | None, degradation: Degradation
+    value: str | Troubles | Mapping[str, Any] | None, degradation: str | Degradation | Mapping[str, Any] | None
 ) -> tuple[Troubles, Degradation]:
     """Troubles from what a caller may give, and the degradation with those among them that disturb the picture.
 
     Args:
         value: names of troubles with commas between them, at their usual size, `Troubles`, its fields by name, or None.
-        degradation: what the caller gave; its own fields stay.
+        degradation: what the caller gave; its own fields stay, those of a preset give way.
 
     Raises:
         InputError: for an unknown name, or a value out of range.
     """
+    whole = Degradation.of(degradation)
     if not isinstance(value, str):
-        return Troubles.of(value), degradation
+        return Troubles.of(value), whole
     chosen: dict[str, Any] = {}
     disturbed: dict[str, Any] = {}
     for word in (part.strip() for part in value.split(",")):
@@ -93,9 +94,10 @@ def with_troubles(
             raise InputError(f"trouble {word[:40]!r}{did_you_mean(word[:40], NAMES)}; allowed: {', '.join(NAMES)}")
         chosen |= _USUAL.get(word, {})
         disturbed |= _DISTURBANCES.get(word, {})
-    given = degradation.model_fields_set
-    disturbed = {name: size for name, size in disturbed.items() if name not in given}
-    return Troubles.of(chosen), degradation.model_copy(update=disturbed)
+    given = degradation.model_dump(exclude_unset=True) if isinstance(degradation, Degradation) else degradation
+    fields = given if isinstance(given, Mapping) else {}
+    disturbed = {name: size for name, size in disturbed.items() if fields.get(name) is None}
+    return Troubles.of(chosen), whole.model_copy(update=disturbed)
 
 
 def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.announced import announcement
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import LARGEST_YAW, STEEPEST, YAW_SHARES, Places
+from spirillum.fluid.tube.places import LARGEST_YAW, YAW_SHARES, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import (
     PHASES,
@@ -85,7 +85,7 @@ def built_tables(
 @lru_cache(maxsize=4)
 def _tabulated_film(body: Outline, radius: float) -> Samples:
     """Packed film of a body in a tube, for all the places that tables have."""
-    return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(STEEPEST)).packed
+    return FilmTable.of(body, radius, yaw=kernel.YAW_SLACK * LARGEST_YAW, pitch=1.1 * max(kernel.STEEPEST)).packed
 
 
 def _nodes(places: Places) -> list[Solution]:

@@ -16,16 +16,14 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.domain import WIRE_FILM
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
-from spirillum.kernels.tube_table import contact_offset, limited_yaw, yaw_limit_of
+from spirillum.kernels.tube_table import STEEPEST, contact_offset, limited_yaw, yaw_limit_of
 from spirillum.robot.geometry import amplitude_envelope
 from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
-__all__ = ["LARGEST_YAW", "STEEPEST", "YAW_SHARES", "Places", "rings_of"]
+__all__ = ["LARGEST_YAW", "YAW_SHARES", "Places", "rings_of"]
 
-STEEPEST = (np.radians(12.0), np.radians(8.0))
-"""Largest pitch of a table nose up and nose down, rad: in a narrow tube the glass holds a robot long before."""
 _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
 _TAIL_FILM = 1.2
