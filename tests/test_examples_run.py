@@ -7,7 +7,13 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
-SLOW = ("from_video_to_prediction", "learn_to_hold_a_speed", "one_piece_swimmer_in_tubes")  # up to half a minute each
+SLOW = (
+    "calibration_on_synthetic_data",
+    "from_video_to_prediction",
+    "learn_to_hold_a_speed",
+    "one_piece_swimmer_in_tubes",
+)
+"""Of ten seconds to half a minute each."""
 
 
 @pytest.mark.parametrize(

@@ -167,6 +167,7 @@ def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
         follow(tmp_path / "b.mp4", *load_setup(setup))
 
 
+@pytest.mark.slow
 def test_clutter_that_fits_the_other_way_round_does_not_name_the_direction(tmp_path):
     """A body in the floor's brightness is not found; what stands out instead is now here, now there."""
     scenery = scene("virtual", 0, "bare")
