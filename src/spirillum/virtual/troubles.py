@@ -84,9 +84,9 @@ def with_troubles(
     Raises:
         InputError: for an unknown name, or a value out of range.
     """
-    whole = Degradation.of(degradation)
+    stated = Degradation.of(degradation)
     if not isinstance(value, str):
-        return Troubles.of(value), whole
+        return Troubles.of(value), stated
     chosen: dict[str, Any] = {}
     disturbed: dict[str, Any] = {}
     for word in (part.strip() for part in value.split(",")):
@@ -97,7 +97,7 @@ def with_troubles(
     given = degradation.model_dump(exclude_unset=True) if isinstance(degradation, Degradation) else degradation
     fields = given if isinstance(given, Mapping) else {}
     disturbed = {name: size for name, size in disturbed.items() if fields.get(name) is None}
-    return Troubles.of(chosen), whole.model_copy(update=disturbed)
+    return Troubles.of(chosen), stated.model_copy(update=disturbed)
 
 
 def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
