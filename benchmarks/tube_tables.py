@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 import spirillum as sp
-from spirillum.fluid.tube.places import Places
+from spirillum.fluid.tube.places import CHECKED_FROM, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import Solution, solutions
 from spirillum.fluid.tube.solids import Fineness
@@ -29,7 +29,6 @@ from spirillum.kernels.tube_table import INSIDE
 from spirillum.robot.seat import Seat
 
 _PHASES = 3
-_LEAST_GAP = 0.4  # of the first nodes, where the robot is pitched
 
 
 class Drawn(NamedTuple):
@@ -49,7 +48,7 @@ def drawn(places: Places, count: int, seed: int) -> list[Drawn]:
         seat = places.seat_between(t, f, share * places.largest_yaw(t, f))
         first = float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
-        if clear and seat.clearance(places.geometry.body) > _LEAST_GAP * places.thinnest:
+        if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
             found.append(
                 Drawn(seat, tuple((first + 2.0 * np.pi * k / _PHASES) % (2.0 * np.pi) for k in range(_PHASES)))
             )

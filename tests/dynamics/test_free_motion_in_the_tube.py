@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -10,12 +9,18 @@ import numpy as np
 import pytest
 
 import spirillum as sp
-from spirillum.dynamics import tube_simulation
-from spirillum.dynamics.free_motion import FreeMotion, _checked_yaw, _said, _yawed_beyond_check, free_motion
+from spirillum.dynamics import table_check
+from spirillum.dynamics.free_motion import FreeMotion, free_motion
 from spirillum.dynamics.resting_film import lubrication_resistance
+from spirillum.dynamics.table_check import held_against_check
 from spirillum.dynamics.tube_integration import observed_at
-from spirillum.dynamics.turn_map import TurnMap
+from spirillum.dynamics.turn_map import STEPS, TurnMap
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.tube.table import least_checked_gap
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_motion as kernel
+from spirillum.kernels.tube_table import largest_yaw
+from spirillum.robot.batch import RobotBatch
 
 ROUGH = "100 um"  # it comes to rest soon
 
@@ -164,18 +169,33 @@ def test_bad_input_is_one_sentence(overrides: dict[str, Any], options: dict[str,
 def test_error_is_stated_up_to_the_yaw_at_which_the_table_was_checked(share: float, known: bool) -> None:
     """Up to the yaw at which the tail is near the glass where the robot lies."""
     motion = found()
-    yaw = share * _checked_yaw(motion.run, motion.robot)
-    run = motion.run._replace(lying=replace(motion.run.lying, yaw=yaw))
-    said = " ".join(_said(run, motion.robot, weight=True))
-    assert _yawed_beyond_check(run, motion.robot) is not known
-    assert ("there is no error estimate" in said) is not known
+    table, steps = motion.robot.table, motion.run.turn.steps
+    gap, offset, pitch = (steps[:, STEPS.index(name)] for name in ("gap", "offset", "pitch"))
+    yaw = share * np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
+    checked = held_against_check(table, gap=np.maximum(gap, 1e-3), offset=offset, pitch=pitch, yaw=yaw)
+    assert checked.known is known
+    assert ("there is no error estimate" in " ".join(checked.said)) is not known
+
+
+def test_a_thin_film_is_told_from_the_places_at_which_the_table_was_checked() -> None:
+    """0.08 of the radius is the gap of the first nodes, 0.4 of that the least of a place that is held out."""
+    table = find_table(RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide"))), 20e-3)
+    assert table is not None
+    assert least_checked_gap(table.packed) == pytest.approx(0.4 * 0.08 * 9e-3, rel=1e-4)
+    thin, wide = (
+        sp.simulate("biorob2012-wide", model="tube", timing={"duration": "0.1 s"}, placement={"gap": gap})
+        for gap in ("0.2 mm", "0.5 mm")
+    )
+    assert "mm, and its table was checked at gaps from 0.29 mm on" in thin.attrs["warnings"]
+    assert "its gap falls" not in wide.attrs["warnings"]
+    assert np.isfinite(thin.attrs["error_estimate"])
 
 
 @pytest.mark.parametrize(("checked", "known"), [(3.2, True), (2.8, False)])
 def test_run_states_an_error_up_to_the_yaw_at_which_the_table_was_checked(
     monkeypatch: pytest.MonkeyPatch, checked: float, known: bool
 ) -> None:
-    monkeypatch.setattr(tube_simulation, "largest_yaw", lambda *_: np.radians(checked))
+    monkeypatch.setattr(table_check, "largest_yaw", lambda *_: np.radians(checked))
     place = {"gap": "1 mm", "yaw": "3 deg"}
     run = sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "0.1 s"}, placement=place)
     assert np.isfinite(run.attrs["error_estimate"]) == known

@@ -82,7 +82,7 @@ def glass(count: int, distance: float = 0.0) -> np.ndarray:
 def test_no_slip_on_the_glass(request: pytest.FixtureRequest, which: str, median: float) -> None:
     """The yawed robot is resolved to a tolerance that is five times that of the first."""
     field = request.getfixturevalue(which)
-    speed = np.linalg.norm(field.velocity(in_body_axes(field, glass(150))), axis=1)
+    speed = np.linalg.norm(field.velocity(in_body_axes(field, glass(50))), axis=1)
     assert np.max(speed) < 5e-3 * FASTEST
     assert np.median(speed) < median * FASTEST
 

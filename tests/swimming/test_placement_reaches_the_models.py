@@ -158,3 +158,20 @@ def test_options_of_the_tube() -> None:
         text = refused(lambda wrong=wrong: with_resolution(robot, {"phases": wrong}, "tube"))
         assert text == f"phases = {wrong!r}; allowed: a whole number from 1 to 64"
     assert "model.tube.tolerance = 1.0" in refused(lambda: sp.load(WIDE, **{"model.tube.tolerance": 1.0}))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ((WIDE, "--gap", "0.0008mm"), "placement.gap = 0.0008 mm; allowed: at least 0.0009 mm"),
+        (("biorob2012-narrow", "--pitch", "30deg"), "there is no more room in the channel at placement.pitch = 30 deg"),
+    ],
+)
+def test_a_gap_outside_a_table_gets_one_limit(
+    run: Callable[..., tuple[int, str, str]], options: tuple[str, ...], words: str
+) -> None:
+    code, out, err = run("predict", *options, "--model", "tube")
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("allowed") == 1
+    assert "here at least" not in err

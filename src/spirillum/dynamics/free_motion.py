@@ -19,18 +19,19 @@ from spirillum.dynamics.integration import Progress, Reach
 from spirillum.dynamics.long_run import LongRun, long_run
 from spirillum.dynamics.record import dataset_of
 from spirillum.dynamics.remote import Switch
+from spirillum.dynamics.table_check import Checked, held_against_check
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, with_contact
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_simulation import check_in_tube, links_in_tube
 from spirillum.dynamics.tube_start import StartPlace, check_in_table, check_roughness, laid_down
+from spirillum.dynamics.turn_map import STEPS
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import contact_offset_of, largest_yaw
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -151,8 +152,9 @@ def free_motion(
     sign = float(np.sign(held.tail_rotation_rate))
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
-    warnings = (*held.warnings, *_said(run, links, weight=weight))
-    known = run.lying.state in ("steady", "orbits") and not _yawed_beyond_check(run, links)
+    checked = _checked(run, links)
+    warnings = (*held.warnings, *checked.said, *_said(run, links, weight=weight))
+    known = run.lying.state in ("steady", "orbits") and checked.known
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
     return FreeMotion(found, run, links, gap, laid)
@@ -197,15 +199,10 @@ def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:
     return replace(links, drive=changed)
 
 
-def _checked_yaw(run: LongRun, links: TubeRobot) -> float:
-    """Yaw up to which the table was checked where it lies, rad."""
-    lying = run.lying
-    return float(largest_yaw(links.table, contact_offset_of(links.table, lying.pitch) - lying.gap, lying.pitch))
-
-
-def _yawed_beyond_check(run: LongRun, links: TubeRobot) -> bool:
-    """Whether it lies yawed further than the places against which its table was checked."""
-    return abs(run.lying.yaw) > _checked_yaw(run, links)
+def _checked(run: LongRun, links: TubeRobot) -> Checked:
+    """How the places of the last turn stand to those at which the table was checked."""
+    names = ("gap", "offset", "pitch", "yaw")
+    return held_against_check(links.table, **{name: run.turn.steps[:, STEPS.index(name)] for name in names})
 
 
 def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
@@ -213,11 +210,6 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     found = []
     if weight and not links.weight.any():
         found.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
-    if run.lying.state in ("steady", "orbits") and _yawed_beyond_check(run, links):
-        found.append(
-            f"it lies at a yaw of {np.degrees(run.lying.yaw):.3g} deg against the wall, and its table was checked up "
-            f"to {np.degrees(_checked_yaw(run, links)):.3g} deg: there is no error estimate"
-        )
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
         found.append(

@@ -9,6 +9,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.start import start_phase, turning_rate
+from spirillum.dynamics.table_check import held_against_check
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
@@ -19,7 +20,6 @@ from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.fluid.tube.tube import END_LOSS
 from spirillum.kernels import tube_motion as kernel
-from spirillum.kernels.tube_table import largest_yaw
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["check_in_tube", "links_in_tube", "run_in_tube"]
+
+_PLACES = {"gap": "wall_gap", "offset": "offset", "pitch": "wall_pitch", "yaw": "wall_yaw"}
+"""Where a run says what a table is asked for."""
 
 
 def run_in_tube(
@@ -65,7 +68,8 @@ def run_in_tube(
     turn = links.turn
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
-    unchecked = _beyond_check(dataset, links)
+    places = {name: dataset[of].values for name, of in _PLACES.items()}
+    checked = held_against_check(links.table, **places, time=dataset["time"].values)
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
     if asked.flow is not None:
         said += [
@@ -74,27 +78,12 @@ def run_in_tube(
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
     return dataset.assign_attrs(
-        warnings="\n".join([*said, *unchecked]),
-        error_estimate=np.nan if unchecked else error,
+        warnings="\n".join([*said, *checked.said]),
+        error_estimate=error if checked.known else np.nan,
         known_error=FREE_IN_TUBE,
         table=table.key,
         error_against=TabledTube.error_against,
     )
-
-
-def _beyond_check(dataset: xr.Dataset, links: TubeRobot) -> list[str]:
-    """A sentence where a run yaws further than the places against which its table was checked; else nothing."""
-    offset, pitch, yaw = (dataset[name].values for name in ("offset", "wall_pitch", "wall_yaw"))
-    checked = np.array([largest_yaw(links.table, *place) for place in zip(offset, pitch, strict=True)])
-    beyond = np.flatnonzero(np.abs(yaw) > checked)
-    if not beyond.size:
-        return []
-    first, most = beyond[0], beyond[np.argmax(np.abs(yaw[beyond]))]
-    return [
-        f"from {float(dataset['time'][first]):.3g} s on it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg "
-        f"against the wall, and its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no "
-        "error estimate"
-    ]
 
 
 def links_in_tube(

@@ -14,7 +14,7 @@ from spirillum.fitted.calibration_file import calibrated_placement, with_calibra
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import check_placement, find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import all_hold, assembly_limits, broken
+from spirillum.robot.limits import Limit, all_hold, assembly_limits, broken
 from spirillum.robot.load import load, with_resolution
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
@@ -73,15 +73,19 @@ def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None
     check_placement(batch.placement, model)
     outside = broken(requirements(batch, quickest(model, batch)))
     if outside:
-        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_least_gap(batch, model)}")
+        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_what_helps(batch, model, outside)}")
     return batch
 
 
-def _least_gap(batch: RobotBatch, model: SwimmerModel) -> str:
+def _what_helps(batch: RobotBatch, model: SwimmerModel, outside: list[Limit]) -> str:
     """Where only a thin film keeps a model from an answer: the least gap that it resolves, and what else helps."""
-    least = least_gap(batch, model) if model.placed else float("nan")
+    if not model.placed or quickest(model, batch).form == "table":
+        return ""
+    least = least_gap(batch, model)
     if not np.isfinite(least):
         return ""
+    if outside[0].field == "placement.gap":  # its bound is named already
+        return "; with a table (`spirillum prepare`) less"
     return f"; here at least placement.gap = {show(least, 'mm')}, or a table (`spirillum prepare`)"
 
 

@@ -53,8 +53,9 @@ def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
     if "band" in answer:
         places = len(answer["band"]["gap"]["value"])
         console.print(
-            f"band: low and high are the least and the largest of {places + 1} places, none of them likelier than "
-            "another; value: the place above",
+            f"band: low and high are the least and the largest of {places + 1} places at which the robot is held, none "
+            "of them likelier than another; value: the place above; let go (--motion free), it may swim outside the "
+            "band",
             highlight=False,
             soft_wrap=True,
         )

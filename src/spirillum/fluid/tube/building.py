@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.announced import announcement
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import LARGEST_YAW, YAW_SHARES, Places
+from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, YAW_SHARES, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import (
     PHASES,
@@ -218,7 +218,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[Solution]:
         f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
         seat, phase = places.seat_between(t, f, yaw if yawed else 0.0), float(draw.uniform(0.0, 2.0 * np.pi))
         clear = places.tail_clearance(seat) > places.least_clearance
-        if clear and seat.clearance(places.geometry.body) > 0.4 * places.thinnest:
+        if clear and seat.clearance(places.geometry.body) > CHECKED_FROM * places.thinnest:
             chosen.append(Solution(((places.geometry, (phase,)),), seat, fineness_at(seat)))
     return chosen
 

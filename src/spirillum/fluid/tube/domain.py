@@ -129,7 +129,7 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             "at most",
             films.largest,
             "mm",
-            "there is no more room in the channel",
+            f"there is no more room in the channel{_pitched(batch.placement.pitch)}",
             "gap-too-wide",
         ),
         Limit.of(
@@ -152,6 +152,10 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             "tail-in-wall",
         ),
     ]
+
+
+def _pitched(pitch: float | None) -> str:
+    return f" at placement.pitch = {show(pitch, 'deg')}" if pitch else ""
 
 
 def _films(batch: RobotBatch, part: str, thinnest_gap: float) -> _Films:

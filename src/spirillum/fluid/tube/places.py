@@ -22,10 +22,12 @@ from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
-__all__ = ["LARGEST_YAW", "YAW_SHARES", "Places", "rings_of"]
+__all__ = ["CHECKED_FROM", "LARGEST_YAW", "YAW_SHARES", "Places", "rings_of"]
 
 _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
+CHECKED_FROM = 0.4
+"""Least gap of the places against which a table is checked over that of the first nodes."""
 _TAIL_FILM = 1.2
 """Clearance of the tail at the first nodes over the least that the model resolves."""
 _GROWTH = 2.0

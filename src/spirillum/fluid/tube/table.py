@@ -19,11 +19,12 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_bytes, whole_file
+from spirillum.fluid.tube.places import CHECKED_FROM
 from spirillum.fluid.tube.table_file import packed_from, to_bytes
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
 
-__all__ = ["TubeTable", "key_of"]
+__all__ = ["TubeTable", "key_of", "least_checked_gap"]
 
 _FORMAT = "spirillum.tube-table/5"
 _LARGEST_FILE = 2**21  # bytes
@@ -137,3 +138,8 @@ def key_of(geometry: RobotGeometry, radius: float) -> str:
     """A digest of robot and tube, numbers to ten digits."""
     words = [*(f"{value:.10g}" if isinstance(value, float) else str(value) for value in geometry), f"{radius:.10g}"]
     return hashlib.sha256(" ".join(words).encode()).hexdigest()[:24]
+
+
+def least_checked_gap(packed: Samples) -> float:
+    """Smallest gap of the places against which a packed table was checked, m."""
+    return CHECKED_FROM * float(kernel.range_of(packed).gaps[0])

@@ -1,0 +1,63 @@
+"""Whether a motion in the tube stays among the places against which its robot's table was checked."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.arrays import Samples
+from spirillum.fluid.tube.table import least_checked_gap
+from spirillum.kernels.tube_table import largest_yaw
+from spirillum.units import show
+
+__all__ = ["Checked", "held_against_check"]
+
+
+class Checked(NamedTuple):
+    """What the stated error of a table says of a motion."""
+
+    known: bool
+    """Whether the motion keeps to yaws at which the table was checked."""
+    said: list[str]
+    """Where it does not, or comes nearer to the glass, a sentence each."""
+
+
+def held_against_check(
+    table: Samples, *, gap: Samples, offset: Samples, pitch: Samples, yaw: Samples, time: Samples | None = None
+) -> Checked:
+    """Hold the places of a motion against those at which its table was checked.
+
+    Args:
+        table: the packed table.
+        gap: smallest distance of body and wall, (n,), m.
+        offset: of the body's mid-length from the tube's axis, (n,), m.
+        pitch: nose up, (n,), rad.
+        yaw: nose to the side, (n,), rad.
+        time: of the places, (n,), s, where one differs from another; None: a motion that repeats itself.
+    """
+    said = []
+    checked = np.array([largest_yaw(table, *place) for place in zip(offset, pitch, strict=True)])
+    beyond = np.flatnonzero(np.abs(yaw) > checked)
+    if beyond.size:
+        most = beyond[np.argmax(np.abs(yaw[beyond]))]
+        said.append(
+            f"{_from(time, beyond[0])}it yaws by up to {np.degrees(np.abs(yaw[most])):.3g} deg against the wall, and "
+            f"its table was checked up to {np.degrees(checked[most]):.3g} deg there: there is no error estimate"
+        )
+    least = least_checked_gap(table)
+    near = np.flatnonzero(gap < least)
+    if near.size and not beyond.size:
+        said.append(
+            f"{_from(time, near[0])}its gap falls to {_length(float(gap[near].min()))}, and its table was checked at "
+            f"gaps from {_length(least)} on: the error estimate is that of such places"
+        )
+    return Checked(not beyond.size, said)
+
+
+def _from(time: Samples | None, first: int) -> str:
+    return "" if time is None else f"from {float(time[first]):.3g} s on "
+
+
+def _length(value: float) -> str:
+    return show(float(f"{value:.2g}"), "mm" if value >= 1e-4 else "um")
