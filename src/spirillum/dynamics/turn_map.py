@@ -174,12 +174,11 @@ def fixed_place(turns: TurnMap, state: Samples, *, heavy: bool) -> FixedPlace | 
         derivative = _derivative(place, x, turn, free)
         if derivative is None:
             return None
-        multipliers = np.linalg.eigvals(derivative)
         step = np.zeros(4)
         step[free] = np.linalg.lstsq(np.eye(free.size) - derivative, change[free], rcond=None)[0]
         if size < _STILL or _size(step[free]) < _SMALLEST:
-            order = np.argsort(-np.abs(multipliers))
-            return FixedPlace(turn, place.state(x), multipliers[order])
+            multipliers = _multipliers(place, x, turn, free, derivative)
+            return FixedPlace(turn, place.state(x), multipliers[np.argsort(-np.abs(multipliers))])
         share = min(1.0, float(np.min(_LONGEST / np.maximum(np.abs(step), 1e-300))))
         for tried in (share, 0.25 * share):
             x_new, found = place.relaxed(x + tried * step)
@@ -200,18 +199,24 @@ def _wrapped(change: Samples) -> Samples:
     return np.array([(change[0] + np.pi) % (2.0 * np.pi) - np.pi, *change[1:]])
 
 
-def _derivative(place: _Place, x: Samples, turn: Turn, free: np.ndarray) -> Samples | None:
-    """Derivative of the map over the free coordinates, by differences."""
+def _derivative(place: _Place, x: Samples, turn: Turn, free: np.ndarray, *, sign: float = 1.0) -> Samples | None:
+    """Derivative of the map over the free coordinates, by differences to one side."""
     after = place.coordinates(turn.state)
     columns = []
     for column in free:
         moved = x.copy()
-        moved[column] += place.step(x)[column]
+        moved[column] += sign * place.step(x)[column]
         found = place.change(moved)
         if found is None:
             return None
         columns.append(_wrapped(place.coordinates(found[0].state) - after)[free] / (moved - x)[column])
     return np.stack(columns, axis=1)
+
+
+def _multipliers(place: _Place, x: Samples, turn: Turn, free: np.ndarray, ahead: Samples) -> np.ndarray:
+    """Eigenvalues of the derivative: one close to 1 needs differences to both sides, `ahead` being those to one."""
+    behind = _derivative(place, x, turn, free, sign=-1.0)
+    return np.linalg.eigvals(ahead if behind is None else 0.5 * (ahead + behind))
 
 
 class _Place:

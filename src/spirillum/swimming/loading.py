@@ -73,7 +73,9 @@ def checked_batch(robot: Robot, model: SwimmerModel, placement: Placement | None
     check_placement(batch.placement, model)
     outside = broken(requirements(batch, quickest(model, batch)))
     if outside:
-        raise InputError(f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_what_helps(batch, model, outside)}")
+        raise InputError(
+            f"{robot.name} with model '{model.name}': {outside[0].sentence()}{_what_helps(batch, model, outside)}"
+        )
     return batch
 
 

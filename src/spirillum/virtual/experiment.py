@@ -38,7 +38,7 @@ from spirillum.units import Hz
 from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
-from spirillum.virtual.motion import steady_rates
+from spirillum.virtual.motion import steady_rates, without_walls
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render
@@ -165,7 +165,7 @@ def virtual_experiment(
     steady, warnings = {}, []
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model)
-        warnings += [f"{name}: {sentence}" for sentence in said]
+        warnings += [*without_walls(robot, motion, default_model), *(f"{name}: {sentence}" for sentence in said)]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.robot import Robot
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.tank import tube_height
@@ -19,7 +20,7 @@ from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_tra
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
+__all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates", "without_walls"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,20 @@ def steady_rates(
     return found, source, tuple(steady.warnings)
 
 
+def without_walls(robot: Robot, motion: MotionOptions, default_model: str = "sbt") -> tuple[str, ...]:
+    """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none.
+
+    Args:
+        robot: a checked robot.
+        motion: the model and the prescribed rates.
+        default_model: where `motion` names none.
+    """
+    model = motion.model or default_model
+    if robot.channel is None or motion.forward_velocity is not None or find_swimmer_model(model).placed:
+        return ()
+    return (f"model '{model}' leaves out the channel's walls: the film shows a faster robot than with model 'tube'",)
+
+
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> Motion:
     """Steady swimming in a trial.
 
@@ -93,7 +108,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         body_angle=trial.body_angle,
         tail_phase=trial.tail_phase,
     )
-    return Motion(trajectory, source, warnings)
+    return Motion(trajectory, source, (*warnings, *without_walls(robot, motion)))
 
 
 def motion_of_run(robot: Robot, run: xr.Dataset | str | Path, trial: TrialOptions, camera: CameraOptions) -> Motion:
