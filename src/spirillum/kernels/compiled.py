@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
-__all__ = ["compiled", "compiled_by_rows", "rows_in_one_thread"]
+__all__ = ["compiled", "compiled_by_rows", "in_one_thread", "rows_in_one_thread"]
 
 _THREADS: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _SHARES = 4
@@ -67,7 +67,7 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
         def call(*arguments: Any) -> None:
             first = arguments[places[0]]
             count = len(first[0] if isinstance(first, tuple) else first)
-            if _THREADS == 1 or _alone.get():
+            if in_one_thread():
                 kernel(*arguments)
                 return
 
@@ -81,6 +81,11 @@ def compiled_by_rows(*places: int) -> Callable[[_F], _F]:
         return cast("_F", call)
 
     return decorate
+
+
+def in_one_thread() -> bool:
+    """Whether the work of this process stays in one thread: the machine has no more, or other processes have them."""
+    return _THREADS == 1 or _alone.get()
 
 
 @contextmanager

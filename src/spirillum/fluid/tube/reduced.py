@@ -20,7 +20,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import System
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.wall import Waves, components_of, distances_of, each, point_waves
+from spirillum.fluid.tube.wall import Waves, distances_of, from_the_wall, point_waves, summed
 from spirillum.fluid.wire.interaction import share
 from spirillum.fluid.wire.sources import Sources
 
@@ -137,23 +137,24 @@ class Reduced:
 
     def _reflected(self, placed: Samples) -> list[Samples]:
         """Fields that the wall reflects of unit forces at points about its axis, for each system, (fields, 3 n)."""
-        distances = distances_of(placed, self.waves.radius)
-        found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+        order, back = from_the_wall(distances_of(placed, self.waves.radius))
+        points = placed[order]
+        distances = distances_of(points, self.waves.radius)
 
-        def products(number: int) -> list[tuple[int, np.ndarray, Samples]]:
-            parts = []
-            for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
-                here = components_of(there)
-                at_points = point_waves(placed[there], self.waves, number, low, high)
-                for system, answers in enumerate(self.answers):
-                    matrix = answers.wall[number][:, :, :, low:high]
-                    sent = at_points[:, :, answers.parities, : matrix.shape[3]].reshape(here.size, -1)
-                    parts.append((system, here, matrix.reshape(len(matrix), -1) @ sent.T))
-            return parts
+        def reflected(numbers: range) -> list[Samples]:
+            found = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+            for number in numbers:
+                for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
+                    here = 3 * there.size
+                    at_points = point_waves(points[: there.size], self.waves, number, low, high)
+                    for total, answers in zip(found, self.answers, strict=True):
+                        matrix = answers.wall[number][:, :, :, low:high]
+                        sent = at_points[:, :, answers.parities, : matrix.shape[3]].reshape(here, -1)
+                        total[:, :here] += matrix.reshape(len(matrix), -1) @ sent.T
+            return found
 
-        for system, here, product in (part for parts in each(products, range(self.waves.k.size)) for part in parts):
-            found[system][:, here] += product
-        return found
+        shares = summed(reflected, self.waves.k.size)
+        return [sum(some)[:, back] for some in zip(*shares, strict=True)]
 
 
 def _swept(sources: Sources) -> Samples:

@@ -115,7 +115,8 @@ def _solutions(places: Sequence[Solution], what: str, progress: Progress | None,
     tell = progress or (lambda _what, _done, _total: None)
     found: list[list[Samples]] = [[] for _ in places]
     tell(what, 0, len(places))
-    answers = as_they_come(_solve_numbered, list(enumerate(places)), workers, besides="; what was solved is kept")
+    numbered, kept = list(enumerate(places)), "; what was solved is kept"
+    answers = as_they_come(_solve_numbered, numbered, workers, besides=kept, single=True)
     for done, ((number, _), answer) in enumerate(answers, start=1):
         found[number] = answer
         tell(what, done, len(places))

@@ -11,7 +11,6 @@ Axes are x along the robot, y up, z to the right; angles count from y.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.level_rings import LevelRings
 from spirillum.fluid.tube.rings import Rings, Rows, System
 from spirillum.fluid.tube.tilted_rings import TiltedRings
-from spirillum.fluid.tube.wall import Waves, waves_between
+from spirillum.fluid.tube.wall import Waves, each, waves_between
 from spirillum.fluid.wire.interaction import one_thread, share, surface_motion
 from spirillum.fluid.wire.revolution import Panels, panels_of
 from spirillum.fluid.wire.stokeslets import Accuracy, Wire
@@ -210,8 +209,7 @@ class Solids:
                         here, (start, stop) = family.of_mode[m], first + family.starts[m : m + 2]
                         matrix[start:stop, start:stop] += free[np.ix_(here, here)]
                         first += family.dual.size
-            with ThreadPoolExecutor(2) as pool:
-                return tuple(pool.map(factored, matrices))
+            return tuple(each(factored, matrices))
 
     def _free(self) -> list[Samples]:
         """The single layer in unbounded fluid, one matrix a mode."""

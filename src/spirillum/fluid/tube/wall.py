@@ -19,6 +19,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.kernels.compiled import in_one_thread
 
 __all__ = [
     "SLACK",
@@ -28,8 +29,10 @@ __all__ = [
     "distances_of",
     "each",
     "extensions",
+    "from_the_wall",
     "point_reflection",
     "point_waves",
+    "summed",
     "times_layers",
     "waves_between",
     "weighted_layers",
@@ -51,6 +54,7 @@ nearest: there are many of them, and what each lacks adds up to half a percent o
 _AT_WALL = 1e-9
 """Distance over the radius below which things are at the wall, where every wave reaches them."""
 _THREADS = 2
+_BLOCK = 96  # columns of a symmetric product that are computed at a time
 
 _T = TypeVar("_T")
 _S = TypeVar("_S")
@@ -136,8 +140,20 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
     """Compiled loops and linear algebra let other threads run."""
+    if in_one_thread():
+        return [function(item) for item in items]
     with ThreadPoolExecutor(_THREADS) as pool:
         return list(pool.map(function, items))
+
+
+def summed(function: Callable[[range], _T], count: int) -> list[_T]:
+    """Sums over the nodes in k, a few of them: what each thread adds up needs no more memory than one of its terms.
+
+    Args:
+        function: the sum over some nodes.
+        count: number of nodes.
+    """
+    return each(function, [range(first, count, _THREADS) for first in range(min(_THREADS, count))])
 
 
 def extensions(k: float, radius: float, rho: Samples, orders: int, first: int = 0) -> Samples:
@@ -212,20 +228,38 @@ def distances_of(points: Samples, radius: float) -> Samples:
     return distances
 
 
+def from_the_wall(distances: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of points sorted by their distance from the wall, and the places of their components to undo that.
+
+    What waves reach are then the first of the points: sums over them need no index.
+    """
+    order = np.argsort(distances, kind="stable")
+    return order, components_of(np.argsort(order))
+
+
 def point_reflection(points: Samples, waves: Waves) -> Samples:
     """Velocities at points from forces at the same points, symmetric, (3 n, 3 n); without the minus sign."""
-    distances = distances_of(points, waves.radius)
+    order, back = from_the_wall(distances_of(points, waves.radius))
+    placed = points[order]
+    distances = distances_of(placed, waves.radius)
 
-    def products(number: int) -> list[tuple[np.ndarray, Samples]]:
-        found = []
-        for low, high, there in waves.bands(number, distances, float(distances.min()), waves.orders[number]):
-            here = components_of(there)
-            at_points = point_waves(points[there], waves, number, low, high)
-            onto_wall = times_layers(at_points, waves, number, low)
-            found.append((here, onto_wall.reshape(here.size, -1) @ at_points.reshape(here.size, -1).T))
-        return found
+    def reflected(numbers: range) -> Samples:
+        total = np.zeros((3 * len(points),) * 2)
+        for number in numbers:
+            for low, high, there in waves.bands(number, distances, float(distances[0]), waves.orders[number]):
+                at_points = point_waves(placed[: there.size], waves, number, low, high)
+                onto_wall = times_layers(at_points, waves, number, low)
+                _add_lower(onto_wall.reshape(3 * there.size, -1), at_points.reshape(3 * there.size, -1), total)
+        return total
 
-    total = np.zeros((3 * len(points),) * 2)
-    for here, product in (pair for pairs in each(products, range(waves.k.size)) for pair in pairs):
-        total[np.ix_(here, here)] += product
-    return total
+    lower = np.tril(sum(summed(reflected, waves.k.size)))
+    whole = lower + np.tril(lower, -1).T
+    found: Samples = whole[np.ix_(back, back)]
+    return found
+
+
+def _add_lower(a: np.ndarray, b: np.ndarray, total: Samples) -> None:
+    """Add a b', which is symmetric, to the first rows and columns of `total`, where only the lower half counts."""
+    for first in range(0, len(a), _BLOCK):
+        last = min(first + _BLOCK, len(a))
+        total[first : len(a), first:last] += a[first:] @ b[first:last].T
