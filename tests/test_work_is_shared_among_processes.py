@@ -1,6 +1,14 @@
 """Work shared out among processes: every answer once, beside its task, and no copy of the caller's script."""
 
 import math
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 
 from spirillum.processes import as_they_come
 
@@ -9,3 +17,37 @@ def test_answers_of_several_processes_are_those_of_one() -> None:
     tasks = [1.0, 4.0, 9.0]
     assert list(as_they_come(math.sqrt, tasks, 1)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
     assert sorted(as_they_come(math.sqrt, tasks, 2)) == [(1.0, 1.0), (4.0, 2.0), (9.0, 3.0)]
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="processes are looked up in /proc")
+def test_processes_end_with_the_one_that_asked(tmp_path: Path) -> None:
+    """A process that is killed cannot end those that it has started: they notice."""
+    script = "import time; from spirillum.processes import as_they_come; list(as_they_come(time.sleep, [60.0] * 4, 2))"
+    asking = subprocess.Popen([sys.executable, "-c", script])
+    children = _waited_for(lambda: _workers_of(asking.pid), 2)
+    asking.send_signal(signal.SIGKILL)
+    asking.wait()
+    assert len(children) == 2
+    assert _waited_for(lambda: [1] * (not any(map(_runs, children))), 1) == [1]
+
+
+def _waited_for(found: Callable[[], list[int]], count: int) -> list[int]:
+    """What is found once there is enough of it, or after half a minute."""
+    end = time.monotonic() + 30.0
+    while len(found()) < count and time.monotonic() < end:
+        time.sleep(0.05)
+    return found()
+
+
+def _workers_of(pid: int) -> list[int]:
+    """Processes that another one has started and that compute."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    words = {int(child): Path(f"/proc/{child}/cmdline").read_bytes() for child in children}
+    return [child for child, command in words.items() if b"spawn_main" in command]
+
+
+def _runs(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
+from threading import Thread
 from types import ModuleType
 from typing import TypeVar
 
@@ -49,7 +50,7 @@ def as_they_come(
             yield task, work(task)
         return
     pool = ProcessPoolExecutor(
-        min(workers, len(first)), mp_context=get_context("spawn"), initializer=_single if single else None
+        min(workers, len(first)), mp_context=get_context("spawn"), initializer=_begin, initargs=(single,)
     )
     try:
         waiting: dict[Future[_Answer], _Task] = {}
@@ -88,9 +89,18 @@ def memory_in_use() -> float:
     return float(pages * os.sysconf("SC_PAGE_SIZE"))
 
 
-def _single() -> None:
-    """In a new process: libraries that are loaded from here on keep to one thread."""
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+def _begin(single: bool) -> None:  # noqa: FBT001 - called by the pool
+    """In a new process: it ends with the one that asked, and keeps to one thread where it should."""
+    Thread(target=_end_with_parent, daemon=True).start()
+    if single:  # for libraries that are loaded from here on
+        os.environ.update(dict.fromkeys(_THREADS, "1"))
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)  # what it was at is lost, and nobody waits for more
 
 
 @contextmanager
