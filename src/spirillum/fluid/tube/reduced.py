@@ -142,7 +142,7 @@ class Reduced:
         distances = distances_of(points, self.waves.radius)
 
         def reflected(numbers: range) -> list[Samples]:
-            found = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
+            found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]
             for number in numbers:
                 for low, high, there in self.waves.bands(number, distances, self.away, self.waves.orders[number]):
                     here = 3 * there.size

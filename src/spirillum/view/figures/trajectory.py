@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +36,8 @@ COLUMNS = {"single": COLUMN, "double": PAGE}
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
 _MOST_EVENTS = 12
+_CROWDED = 0.05
+"""Distance of events over that of the axis below which they share a label."""
 _MOST_BESIDE = 4
 """Entries of a legend from which on they stand in two rows."""
 _DECADES = 5
@@ -98,7 +99,7 @@ _PANELS = (
 _IN_TUBE = (
     _Panel("gap", (("wall_gap", "under the body"), ("tail_gap", "under the tail")), film=True),
     _Panel("azimuth", (("azimuth", ""),)),
-    _Panel("pitch, yaw to the wall", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
+    _Panel("angle to wall", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
     _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True),
     _Panel("velocity $U_x$", (("forward_velocity", ""),)),
     _Panel("body rate", (("body_rotation_rate", ""),)),
@@ -323,7 +324,15 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
     if any(words for words, _ in lines) and not (film and len(lines) == 1):
         columns = len(lines) if len(lines) < _MOST_BESIDE else 2
         axes.legend(
-            loc="upper right", ncols=columns, handlelength=1.8, columnspacing=1.0, borderaxespad=0.2, labelspacing=0.2
+            loc="upper right",
+            ncols=columns,
+            handlelength=1.8,
+            columnspacing=1.0,
+            borderaxespad=0.2,
+            labelspacing=0.2,
+            frameon=True,
+            framealpha=0.8,
+            edgecolor="none",
         )
         _make_room(axes, -(-len(lines) // columns) * (1.0 if beside > 1 else 2.0))
 
@@ -343,6 +352,7 @@ def _draw_film(axes: Axes, dataset: xr.Dataset, values: Samples, scale: Scale) -
             textcoords="offset points",
             size=7.5,
             color="#555555",
+            bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.8},
         )
     axes.set_yscale("log")
     axes.set_ylim(0.6 * low / scale.factor, max(1.6 * high, 10.0 * low) / scale.factor)
@@ -385,25 +395,27 @@ def _event_words(events: list[tuple[float, str]]) -> list[str]:
 
 
 def _mark_events(axes: Axes, events: list[tuple[float, str]], span: float, *, numbered: bool) -> None:
-    for number, (when, _) in enumerate(events, 1):
+    for when, _ in events:
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
-        if numbered and number <= _MOST_EVENTS:
-            axes.annotate(
-                str(number),
-                (when, 1.0),
-                xycoords=axes.get_xaxis_transform(),
-                xytext=(0, 2 + 7 * _crowded(events, number - 1, span)),
-                textcoords="offset points",
-                ha="center",
-                size=7,
-                color="#555555",
-            )
+    for numbers in _close_together(events[:_MOST_EVENTS], span) if numbered else []:
+        axes.annotate(
+            str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
+            (np.mean([events[number][0] for number in numbers]), 1.0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            size=7,
+            color="#555555",
+        )
 
 
-def _crowded(events: list[tuple[float, str]], place: int, span: float) -> int:
-    """0 or 1: every other one of events close to each other in a run of `span` stands higher."""
-    near = [later[0] - earlier[0] < 0.03 * span for earlier, later in pairwise(events[: place + 1])]
-    level = 0
-    for close in near:
-        level = 1 - level if close else 0
-    return level
+def _close_together(events: list[tuple[float, str]], span: float) -> list[list[int]]:
+    """Numbers of the events from 0, those together that have no room for a label each."""
+    found: list[list[int]] = []
+    for number, (when, _) in enumerate(events):
+        if found and when - events[found[-1][0]][0] < _CROWDED * span:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    return found
