@@ -55,6 +55,7 @@ def test_leave_one_out_is_the_density_of_a_robot_given_the_others(ranking: Any) 
         assert item.pointwise[tame] == pytest.approx(plain[tame], abs=0.15)
 
 
+@pytest.mark.slow
 def test_equal_models_are_not_told_apart(made: Callable[..., Path]) -> None:
     from spirillum.calibration.ranking import ranked_fits
 
