@@ -12,7 +12,7 @@ from spirillum.vision.track.body import BodyFinder
 from spirillum.vision.track.glare import Glare, standing_glare
 
 pytest.importorskip("cv2")
-REAR, MIDDLE, NOSE, ASIDE = (-0.014, 0.0), (0.0, 0.0), (0.022, 0.003), (-0.014, 0.012)
+REAR, MIDDLE, NOSE, ASIDE, RIM = (-0.014, 0.0), (0.0, 0.0), (0.022, 0.003), (-0.014, 0.012), (0.018, 0.005)
 """Places of the glare from the body's mid-length halfway through the film, m."""
 
 
@@ -61,6 +61,7 @@ def test_glare_under_which_an_end_passes_is_told_with_its_place(
         (None, 0.0, {}),
         (REAR, 1.0, {}),  # a highlight on the body
         (NOSE, 1.0, {}),
+        (RIM, 1.0, {"velocity": 1.2e-3}),  # a slow robot, and a highlight that reaches over its rim
         (ASIDE, 0.0, {}),
         (MIDDLE, 0.0, {"velocity": 0.2e-3}),  # no edge comes there
         (None, 0.0, {"body": (250, 250, 250), "seal": (250, 250, 250)}),

@@ -72,7 +72,8 @@ def _standing(white: np.ndarray, bodies: Samples) -> np.ndarray:
     """Spots that stay white where they are, on the way of the body, (h, w).
 
     What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
-    shifted back by as much as the robot has moved.
+    shifted back by as much as the robot has moved. Both are counted on the same part of the picture, the whole way: a
+    highlight that reaches over the body's rim would else lose there, and seem to stand.
 
     Args:
         white: what is white on each frame, (n, h, w).
@@ -88,12 +89,12 @@ def _standing(white: np.ndarray, bodies: Samples) -> np.ndarray:
     (_, still), (_, along) = (
         cv2.connectedComponents((np.mean(ones, axis=0) >= GLARE.share).astype(np.uint8)) for ones in (white, back)
     )
-    way, there = covered.any(axis=0), covered[middle].astype(bool)
+    way, body = covered.any(axis=0), np.count_nonzero(covered[middle])
     spots = np.zeros(way.shape, dtype=bool)
     for label in np.unique(still[way & (still > 0)]):
         spot = still == label
-        moving = np.isin(along, np.setdiff1d(along[spot], [0])) & there
-        inside, body = np.count_nonzero(spot & way), np.count_nonzero(there)
+        moving = np.isin(along, np.setdiff1d(along[spot], [0])) & way
+        inside = np.count_nonzero(spot & way)
         if inside > max(GLARE.least * body, np.count_nonzero(moving)) and np.count_nonzero(spot) < GLARE.most * body:
             spots |= spot
     return spots
