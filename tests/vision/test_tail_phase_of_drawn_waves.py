@@ -108,6 +108,17 @@ def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> No
     assert any("tail_rotation_rate" in flag.spoils for flag in wire.flags)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tail_lost_in_noise_is_not_seen_and_is_not_said_to_have_another_shape(
+    flat_pictures: ModuleType, tmp_path: Path, seed: int
+) -> None:
+    drawn = film(flat_pictures, wire=(150, 190, 170), noise=20.0, seed=seed)
+    wire, _, _ = learnt(drawn, tmp_path)
+    assert [flag.name for flag in wire.flags] == ["tail-unreadable"]
+    assert wire.flags[0].spoils == ("tail_rotation_rate",)
+    assert "compress the film less" in wire.flags[0].sentence
+
+
 def test_a_tail_out_of_view_is_not_read(flat_pictures: ModuleType, tmp_path: Path) -> None:
     wire, pictures, _ = learnt(film(flat_pictures, frames=8), tmp_path)
     assert np.isnan(wire.read(pictures[0][0], BodyPose(-0.1, 0.0, 0.0))).all()

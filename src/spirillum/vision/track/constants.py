@@ -419,6 +419,8 @@ class TailConstants:
     """Least share of the wire that has to be where it should be."""
     largest_rival: float = 0.85
     """Largest score of another phase over the best one."""
+    seen_share: float = 0.5
+    """Share of the frames on which a tail of another shape has to be readable, so that it is said to be seen."""
     offset: float = 0.3
     """Prior standard deviation of the tail's sideways offset, over the wire's apparent diameter."""
     tilt: float = 0.02

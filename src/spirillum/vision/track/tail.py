@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +39,15 @@ class _Strip(NamedTuple):
     """Step from one column to the next, pixels, (rows, 2)."""
     tilt: Samples
     """Derivatives with height of the shift along (e) and across (f) and of the magnification (g), (rows, 3)."""
+
+
+class _SeenShape(NamedTuple):
+    """The shape of the tail in the picture."""
+
+    wavelength: float
+    """Over that of the robot file."""
+    amplitude: float
+    """Over that of the robot file."""
 
 
 class TailWave:
@@ -109,15 +119,19 @@ class TailWave:
         if chosen is None:
             self._flags = [self._unseen()]
             return
-        for _ in range(2):
-            self.usual = 0.0
-            self._refit_contrast(strips)
-        fits = np.array([self._fit(image, strip)[0] for image, strip in strips])
+        fits = np.array([answer for answer, _ in self.settled(strips)])
         readable = fits[:, 2] > TAIL.least_share
         self.readable = float(np.mean(readable))
         self._check_shape(strips, fits[readable], self.readable)
         if self.readable < 0.2 and not self._flags:
             self._flags = [self._unseen()]
+
+    def settled(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> list[tuple[Samples, float]]:
+        """Refit the contrast from a first one; fit and rival (see `_fit`) on each frame."""
+        for _ in range(2):
+            self.usual = 0.0
+            self._refit_contrast(strips)
+        return [self._fit(image, strip) for image, strip in strips]
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
         """Phase of the tail and its standard error, rad; NaN where it is unreadable.
@@ -174,7 +188,11 @@ class TailWave:
         return 1 if misfit > -1.0 else -1
 
     def _unseen(self) -> Flag:
-        return Flag("tail-unreadable", "the wire of the tail is not seen, so that its rotation is not given", _TAIL)
+        sentence = (
+            "the tail is not seen well enough, so that its rotation is not given: compress the film less, film the "
+            "tail larger, or before a floor and in a light from which its wire stands out"
+        )
+        return Flag("tail-unreadable", sentence, _TAIL)
 
     def _strip(self, pose: BodyPose) -> _Strip:
         pixels = seen(self._points, pose, self.optics).reshape(_COARSE, -1, 2)
@@ -285,10 +303,14 @@ class TailWave:
         own, best = float(np.interp(1.0, _FACTORS, scores)), int(np.argmax(scores))
         if abs(_FACTORS[best] - 1.0) > 0.07 and scores[best] > 1.15 * own:
             spoils = _TAIL if readable < 0.8 or own < 0.7 * scores[best] else ()
-            sentence = f"the tail does not look as the robot file says{self._seen_shape(few)}: check the file; " + (
-                "the tail's rotation is not given" if spoils else "its rotation is read all the same"
-            )
-            self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
+            shape = self._seen_shape(few)
+            if shape is not None:
+                sentence = f"the tail does not look as the robot file says{self._told(shape)}: check the file; " + (
+                    "the tail's rotation is not given" if spoils else "its rotation is read all the same"
+                )
+                self._flags.append(Flag("tail-does-not-fit", sentence, spoils))
+            elif spoils:
+                self._flags.append(self._unseen())
             return
         tail = self.robot.tail
         if len(fits):
@@ -300,9 +322,12 @@ class TailWave:
                 )
                 self._flags.append(Flag("tail-does-not-fit", sentence))
 
-    def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> str:
-        """The best-fitting wavelength and amplitude over all candidate contrasts, in words; empty if none fits."""
-        tail, found = self.robot.tail, []
+    def _seen_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> _SeenShape | None:
+        """The best-fitting wavelength and amplitude over all candidate contrasts; None if no such tail is seen.
+
+        Noise has a best-fitting shape too: on half of the frames the tail has to be readable in that shape.
+        """
+        found = []
         for weights in _CONTRASTS:
             contrast = np.array(weights) / np.linalg.norm(weights)
             ridges = [(self._ridge(image, strip, contrast), strip) for image, strip in strips[::3]]
@@ -310,14 +335,27 @@ class TailWave:
             for amplitude in _AMPLITUDES:
                 by_wavelength = self._scores_by_wavelength(ridges, amplitude)
                 if by_wavelength is not None:
-                    found.append((by_wavelength.max(), _FACTORS[int(np.argmax(by_wavelength))], amplitude))
-        score, wavelength, amplitude = max(found, default=(0.0, 1.0, 1.0))
+                    shape = _SeenShape(_FACTORS[int(np.argmax(by_wavelength))], amplitude)
+                    found.append((by_wavelength.max(), shape, weights))
+        score, shape, weights = max(found, default=(0.0, _SeenShape(1.0, 1.0), _CONTRASTS[0]))
         if score <= 0.0:
-            return ""
+            return None
+        other = copy(self)
+        other.wave, other.contrast = self._shaped(shape), np.array(weights) / np.linalg.norm(weights)
+        read = [fit[2] > TAIL.least_share and rival < TAIL.largest_rival for fit, rival in other.settled(strips)]
+        return shape if np.mean(read) > TAIL.seen_share else None
+
+    def _shaped(self, shape: _SeenShape) -> Samples:
+        """The wave of a tail of another shape."""
+        return np.asarray(self.wave * np.array([1.0 / shape.wavelength, 1.0 / shape.wavelength, 1.0, shape.amplitude]))
+
+    def _told(self, shape: _SeenShape) -> str:
+        """In words, how a shape differs from that of the robot file."""
         seen = []
-        for name, factor, least in (("wavelength", wavelength, 0.07), ("amplitude", amplitude, 0.0)):
+        for name, least in (("wavelength", 0.07), ("amplitude", 0.0)):
+            factor = getattr(shape, name)
             if abs(factor - 1.0) > least:
-                given = getattr(tail, name) * 1e3
+                given = getattr(self.robot.tail, name) * 1e3
                 seen.append(f"tail.{name} looks like {factor * given:.1f} mm, and is {given:.3g} mm there")
         return f" ({'; '.join(seen)})" if seen else ""
 
@@ -325,7 +363,7 @@ class TailWave:
         """Scores of waves of `_FACTORS` times the wavelength; None where too little of the tail is in view."""
         found = []
         for ridge, strip in ridges:
-            waves = [self.wave * np.array([1.0 / factor, 1.0 / factor, 1.0, amplitude]) for factor in _FACTORS]
+            waves = [self._shaped(_SeenShape(factor, amplitude)) for factor in _FACTORS]
             scores = np.array([self._scores(ridge, strip, wave).max() for wave in waves])
             if np.isfinite(scores).all():
                 found.append(scores)
