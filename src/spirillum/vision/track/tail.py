@@ -128,9 +128,11 @@ class TailWave:
 
     def settled(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> list[tuple[Samples, float]]:
         """Refit the contrast from a first one; fit and rival (see `_fit`) on each frame."""
+        self.usual = 0.0
         for _ in range(2):
-            self.usual = 0.0
             self._refit_contrast(strips)
+        peaks = [answer[9] for answer, _ in (self._fit(image, strip) for image, strip in strips) if answer[2] > 0.3]
+        self.usual = 0.5 * float(np.median(peaks)) if peaks else 0.0
         return [self._fit(image, strip) for image, strip in strips]
 
     def read(self, image: np.ndarray, pose: BodyPose) -> tuple[float, float]:
@@ -222,9 +224,15 @@ class TailWave:
         return scores
 
     def _clearness(self, image: np.ndarray, strip: _Strip, contrast: Samples) -> float:
-        """Contrast of the best phase against the others, over the root mean square ridge of the strip."""
-        ridge = self._ridge(image, strip, contrast)
-        scores = self._scores(ridge, strip, self.wave)
+        """Contrast of the best phase against the others, over the root mean square ridge of the strip.
+
+        Only the rows are filtered that the scores are summed over.
+        """
+        few = _Strip(*(rows[:: TAIL.row_stride] for rows in strip))
+        ridge = np.empty((len(few.middle), self.columns))
+        ridge_of(image, few.middle, few.across, contrast, self.inner, ridge)
+        scores = np.empty(TAIL.phases)
+        wave_scores(ridge, self.xi[:: TAIL.row_stride], few.tilt, self.wave, self.step, 1, scores)
         if not np.isfinite(scores).all():
             return np.nan
         return float((scores.max() - np.median(scores)) / (np.sqrt(np.nanmean(ridge**2)) + 0.5))
@@ -261,7 +269,7 @@ class TailWave:
 
     def _refit_contrast(self, strips: Sequence[tuple[np.ndarray, _Strip]]) -> None:
         """Refit the contrast: the linear discriminant of the wire's colours against those of both its sides."""
-        steps, spreads, peaks = [], [], []
+        steps, spreads = [], []
         for image, strip in strips:
             answer, rival = self._fit(image, strip)
             if answer[2] < 0.3 or rival > 0.95:
@@ -285,11 +293,6 @@ class TailWave:
             noise = np.median(spreads, axis=0) + 9.0 * np.eye(3)
             contrast = np.linalg.solve(noise, step)
             self.contrast = np.asarray(contrast / np.linalg.norm(contrast))
-        for image, strip in strips:
-            answer, _ = self._fit(image, strip)
-            if answer[2] > 0.3:
-                peaks.append(answer[9])
-        self.usual = 0.5 * float(np.median(peaks)) if peaks else 0.0
 
     def _check_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]], fits: Samples, readable: float) -> None:
         """Flag a wavelength or amplitude that fits better than that of the robot file."""
