@@ -144,6 +144,9 @@ def test_a_new_setup_file_is_valid_and_is_not_overwritten(tmp_path: Path) -> Non
     assert answer["schema"] == "spirillum.setup-check/1"
     assert answer["robot"] == "biorob2012-wide"
     assert 0.001 < answer["scale_uncertainty"] < 0.05
+    assert "example of setup new, with its uncertainty: camera.height, tank.surface," in answer["warnings"][0]
+    path.write_text(path.read_text().replace('"210 mm"', '"190 mm"').replace('"1 mm"', '"0.8 mm"'))
+    assert "uncertainty: tank.index, markers.spacing, markers.height; fill" in setup_answer(path)["warnings"][0]
     with pytest.raises(InputError, match="exists; allowed: a new file, or --force"):
         new_setup_file(path)
 

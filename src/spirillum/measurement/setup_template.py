@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
@@ -151,6 +152,10 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
     warnings = [] if shares else ["no uncertainty is given: intervals of lengths hold what the picture shows alone"]
     if robot.seal is None or not (setup.robot.stripes or robot.seal.stripes):
         warnings.append("the robot has no stripes: its body's rotation cannot be seen")
+    if same := _as_in_example(setup):
+        warnings.append(
+            f"still as in the example of setup new, with its uncertainty: {', '.join(same)}; fill in your own"
+        )
     content = {
         "file": str(path),
         "valid": True,
@@ -163,6 +168,18 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
         content["film"], flags = _seen_in(film, setup, robot, Path(path).parent)
         warnings += [flag.sentence for flag in flags]
     return envelope("setup-check", content, warnings)
+
+
+def _as_in_example(setup: Setup) -> list[str]:
+    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names."""
+    example, fields = Setup.model_validate(tomllib.loads(setup_text())), [name.split(".") for name in KNOWN]
+    pairs = [(part, key) for part, key in fields if hasattr(getattr(example, part), f"{key}_uncertainty")]
+
+    def held(one: Setup, part: str, key: str) -> tuple[float | None, float]:
+        table = getattr(one, part)
+        return getattr(table, key), getattr(table, f"{key}_uncertainty")
+
+    return [f"{part}.{key}" for part, key in pairs if held(setup, part, key) == held(example, part, key)]
 
 
 def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:
