@@ -100,7 +100,8 @@ def first_look(name: str, body: BodyFinder, frames: Sequence[Frame], still: Samp
             side, other = body.optics.direction, opposite(body.optics.direction)
             raise InputError(
                 f"{name}: robot.direction = '{side}', but a robot like '{body.robot.name}' is seen with its nose on "
-                f"the other side; allowed: '{other}', if it points there"
+                f"the other side; allowed: '{other}', if it points there; else heights and scale that fit: at a "
+                "wrong one either end may look like the nose"
             )
         raise InputError(f"{name}: no robot like '{body.robot.name}' was found in its pictures; {_ALLOWED}")
     chosen = most_likely(found, body.robot.body.length)

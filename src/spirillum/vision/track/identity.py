@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
-from spirillum.vision.camera.optics import BodyPose
+from spirillum.vision.camera.optics import BodyPose, opposite
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.body import BodyFinder
@@ -53,8 +53,9 @@ class Identified(NamedTuple):
         flags = []
         if not self.robot:
             sentence = (
-                "stripes and tail do not look like the robot's: what was followed may be something else, glare or poor "
-                "light may hide them, or robot file, scale or [region] are wrong; nothing is given"
+                "stripes and tail do not look like the robot's: what was followed may be something else, glare, poor "
+                "light or compression may hide them, or heights, scale, robot file, robot.direction or [region] are "
+                "wrong; nothing is given"
             )
             flags.append(Flag("not-the-robot", sentence, (*EVERYTHING, *LENGTHS[1:])))
         rivals = self.start.rivals
@@ -103,7 +104,23 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
                     return other
     if isinstance(found, InputError):
         raise found
-    return found
+    if found.robot or not found.start.flags or _turned_round(name, setup, stated, frames, still):
+        return found
+    return found._replace(start=replace(found.start, flags=()))
+
+
+def _turned_round(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], still: Samples) -> bool:
+    """Whether the robot is there with its whole tail, at its stated size, if its nose is at the other end.
+
+    A body alone tells little of its ends where it is blurred, or looked for at a wrong scale.
+    """
+    side = opposite(stated.optics.direction)
+    turned = setup.model_copy(update={"robot": setup.robot.model_copy(update={"direction": side})})
+    body = BodyFinder(stated.robot, replace(stated.optics, direction=side), stated.bounds)
+    with suppress(InputError):
+        other = identified_at(name, turned, body, frames, still, 1.0)
+        return other.robot and other.whole
+    return False
 
 
 def identified_at(
