@@ -66,5 +66,5 @@ def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[
     shown = capsys.readouterr()
     assert shown.out == ""
     assert " ".join(shown.err.split()).startswith(
-        "no table of this tube yet: it is made now, once, from 60 places, in about 6 min with 2 processes"
+        "no table of this tube yet: it is made now, once, from 60 places, in about 5 min with 2 processes"
     )

@@ -25,6 +25,15 @@ from spirillum.robot.batch import RobotBatch
 from spirillum.robot.seat import Seat
 from spirillum.studies.loading import load_study
 
+LARGEST = {
+    "forward_velocity": 0.011,
+    "body_rotation_rate": 0.006,
+    "sideways_force": 0.025,
+    "pitching_torque": 0.06,
+    "yawing_torque": 0.041,
+    "normal_resistance": 0.027,
+}
+"""Above the largest stated errors, those of torques being of tails of 10 and 15 mm, yawed."""
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 
@@ -76,9 +85,8 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
         table = TubeTable.read(path)
         assert path.stem == table.key
         assert table.key in keys
-        # the largest: 4.8 % in the pitching torque of a tail of 10 mm, yawed, nose down, 0.3 mm from the glass
-        assert all(0 < error < 0.05 for error in table.error.values())
-        assert all(0 < error < 0.05 for error in table.error_without_yaw.values())
+        for stated in (table.error, table.error_without_yaw):
+            assert all(0 < stated[name] < most for name, most in LARGEST.items())
         assert path.stat().st_size < 120_000
 
 

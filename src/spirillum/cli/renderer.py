@@ -62,10 +62,16 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     return {**content, **files, "warnings": answer["warnings"]}
 
 
-def patience(model: str, *, quiet: bool) -> AbstractContextManager[object]:
-    """A sign of life while a model solves; its first run on a machine compiles for some seconds."""
-    from spirillum.fluid.registry import MODELS
+def patience(model: str, *, quiet: bool, yawed: bool = False) -> AbstractContextManager[object]:
+    """A sign of life while a model solves; its first run on a machine compiles for some seconds.
 
+    That a yawed place is solved for, which takes minutes, is a line on standard error in any case.
+    """
+    from spirillum.fluid.registry import MODELS
+    from spirillum.fluid.tube.announced import YAWED
+
+    if yawed and model in MODELS and MODELS[model].placed:
+        Console(stderr=True, soft_wrap=True).print(YAWED, highlight=False)
     quick = model not in MODELS or MODELS[model].closed_form
     return at_work("solving for the flow (the first time, compiling takes some seconds)", quiet=quiet or quick)
 

@@ -6,11 +6,11 @@ __all__ = ["ANNOUNCED", "TABLE_TAKES", "YAWED", "announcement"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "15 to 20 minutes of one core"
+TABLE_TAKES = "10 to 15 minutes of one core"
 """What it takes to make the table of one robot; estimated from what four tails at once took."""
-YAWED = "a yawed place without a table: the flow is solved for in a minute or two of one core"
+YAWED = "a yawed place without a table: the flow is solved for in minutes of one core"
 """A progress message that is to be read, too."""
-_SECONDS = 13.0
+_SECONDS = 10.0
 """Time that a place takes one process, s: for the paper's robots; near the glass it is three times as long."""
 
 
@@ -24,5 +24,5 @@ def announcement(places: int, workers: int) -> str:
     minutes = max(round(places * _SECONDS / max(workers, 1) / 60.0), 1)
     return (
         f"{ANNOUNCED}: it is made now, once, from {places} places, in about {minutes} min with "
-        f"{'1 process' if workers == 1 else f'{workers} processes'}; an interruption loses none that are done"
+        f"{'1 process' if workers == 1 else f'{workers} processes'}, less where some are kept"
     )

@@ -138,7 +138,7 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             "at least",
             thinnest,
             "mm",
-            "the coupling would touch the glass (placement.pitch, coupling.diameter)",
+            "the coupling would touch the glass (placement.pitch, placement.yaw, coupling.diameter)",
             "tail-in-wall",
         ),
         Limit.of(
@@ -148,7 +148,7 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             WIRE_FILM * 0.5 * batch.wire_diameter,
             "mm",
             f"the film under the wire is resolved down to {WIRE_FILM:g} of its radius, and below 0 the tail would "
-            "pass through the wall (placement.pitch, placement.tail_drop, tail.amplitude)",
+            "pass through the wall (placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude)",
             "tail-in-wall",
         ),
     ]
