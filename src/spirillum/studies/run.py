@@ -113,7 +113,7 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
             "B_m (readings 'rotor' and 'paper'), so that those rates and speeds are upper bounds"
         )
     asked = [find_swimmer_model(name) for name in loaded.study.models]
-    warnings += _without_band(loaded, asked)
+    warnings += _of_places(loaded, asked)
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
     warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
@@ -125,19 +125,25 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
     return warnings + uneven_models(loaded.robots, models, factors)
 
 
-def _without_band(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:
-    """What answers at one place of several lack; nothing with a band, or where all places are known."""
-    if loaded.study.band:
-        return []
+def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:
+    """What answers of robots that are held at places in their tube leave out."""
+    walled = [model.name for model in models if model.placed]
+    if not walled:
+        return ["band = true, but no model of the study computes walls: there is no band"] if loaded.study.band else []
+    held = (
+        f"model '{walled[0]}' holds the robots at their places: let go, weight and contact move them, they are slower "
+        "and perhaps in another order; `spirillum settle` follows a robot to its steady motion"
+    )
     placements = loaded.placements or (loaded.study.placement,)
     found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
-    if not found:
-        return []
-    walled = next(iter(found.values()))
-    return [
-        f"{' and '.join(found)} are not given: model '{walled}' answers at one place, and others change speeds and "
-        "perhaps their order; --band computes those, too, in seconds with tables, else in many minutes"
-    ]
+    if loaded.study.band or not found:
+        return [held]
+    one_place = (
+        f"{' and '.join(found)} are not given: model '{next(iter(found.values()))}' answers at one place, and others "
+        "change speeds and perhaps their order; --band computes those, too, in seconds with tables, else in many "
+        "minutes"
+    )
+    return [one_place, held]
 
 
 def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:

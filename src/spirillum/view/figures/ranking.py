@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,6 +20,8 @@ __all__ = ["ranking_picture"]
 MOST = 12
 """Robots in the figure."""
 _ROW, _ENDS = 0.24, 1.2  # inches
+_LINE, _WIDE = 0.19, 68
+"""Height of a line of the title, inches, and the characters that it holds."""
 
 
 _NO_WALLS = "The channel's walls are not computed"
@@ -44,17 +48,18 @@ def ranking_picture(ranking: StudyRanking) -> Picture:
 def _drawn(ranking: StudyRanking) -> Figure:
     robots = ranking.robots[:MOST]
     names = [name for name in ranking.quantities if any(np.isfinite(robot.values[name]) for robot in robots)]
-    figure = new_figure(PAGE, _ENDS + _ROW * len(robots))
+    title = fill(plain(ranking.message[:1].upper() + ranking.message[1:], 120), _WIDE)
+    more = _LINE * title.count("\n")
+    figure = new_figure(PAGE, _ENDS + more + _ROW * len(robots))
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
     for panel, name in zip(panels[0], names, strict=True):
         _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike})
     first = panels[0][0]
     first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
-    title = ranking.message[:1].upper() + ranking.message[1:]
-    figure.suptitle(plain(title, 90), x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
+    figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
     by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}." if ranking.walls else "")
-    figure.text(0.02, 1.0 - 0.32 / figure.get_figheight(), by, ha="left", va="top", size="small")
+    figure.text(0.02, 1.0 - (0.32 + more) / figure.get_figheight(), by, ha="left", va="top", size="small")
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.14 / figure.get_figheight()))
     return figure
 

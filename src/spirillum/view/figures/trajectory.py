@@ -213,7 +213,7 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
     if not in_tube or path is None:
         return f"{name}: a run in time"
     speed = float(dataset["mean_forward_velocity"]) if "mean_forward_velocity" in dataset else np.nan
-    swims = f"swims at {1e3 * speed:.3g} mm/s" if np.isfinite(speed) else "moves"
+    swims = f"swims at {1e3 * speed:.3g} mm/s on average" if np.isfinite(speed) else "moves"
     azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
     around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
     if swing < _STILL:
