@@ -27,7 +27,7 @@ _COARSE = 160
 """Width of the reduced picture whose coarse structure is compared, pixels."""
 _REACH = 10
 """Largest shift that is looked for there, pixels."""
-_BLUR = 8.0
+_BLUR = 12.0
 """Standard deviation of the widest blur, pixels; wider ones are made on a reduced picture, as they take long."""
 _SWAYS = 0.15
 """Scatter of the pictures' height, or of their sides by roll, from which on the camera sways, pixels."""
