@@ -152,9 +152,9 @@ def free_motion(
     sign = float(np.sign(held.tail_rotation_rate))
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
-    checked = _checked(run, links)
-    warnings = (*held.warnings, *checked.said, *_said(run, links, weight=weight))
-    known = run.lying.state in ("steady", "orbits") and checked.known
+    checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
+    warnings = (*held.warnings, *(checked.said if lies else ()), *_said(run, links, weight=weight))
+    known = lies and checked.known
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
     return FreeMotion(found, run, links, gap, laid)

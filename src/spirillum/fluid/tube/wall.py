@@ -19,7 +19,6 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.kernels.compiled import in_one_thread
 
 __all__ = [
     "SLACK",
@@ -140,6 +139,8 @@ def waves_between(radius: float, reach: float, distance: float, tolerance: float
 
 def each(function: Callable[[_S], _T], items: Iterable[_S]) -> list[_T]:
     """Compiled loops and linear algebra let other threads run."""
+    from spirillum.kernels.compiled import in_one_thread  # loads the compiler
+
     if in_one_thread():
         return [function(item) for item in items]
     with ThreadPoolExecutor(_THREADS) as pool:
