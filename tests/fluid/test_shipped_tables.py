@@ -26,14 +26,14 @@ from spirillum.robot.seat import Seat
 from spirillum.studies.loading import load_study
 
 LARGEST = {
-    "forward_velocity": 0.011,
+    "forward_velocity": 0.015,
     "body_rotation_rate": 0.006,
     "sideways_force": 0.025,
     "pitching_torque": 0.06,
     "yawing_torque": 0.041,
     "normal_resistance": 0.027,
 }
-"""Above the largest stated errors, those of torques being of tails of 10 and 15 mm, yawed."""
+"""Above the largest stated errors: of speeds those of an amplitude of 1.5 mm, of torques those of 10 and 15 mm."""
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 
@@ -80,7 +80,7 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
     batches = [RobotBatch.of(study.robot_at(index)) for index in range(study.count)]
     keys = {key_of(RobotGeometry.of(batch), tube_radius(batch)) for batch in batches}
     files = list((Path(library.__file__).parent / "tables").glob("*.table"))
-    assert len(files) >= 16
+    assert len(files) == 32
     for path in files:
         table = TubeTable.read(path)
         assert path.stem == table.key
