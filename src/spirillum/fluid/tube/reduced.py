@@ -20,7 +20,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.fluid.tube.rings import System
 from spirillum.fluid.tube.solids import Solids
-from spirillum.fluid.tube.wall import Waves, distances_of, from_the_wall, point_waves, summed
+from spirillum.fluid.tube.wall import Waves, from_the_wall, point_waves, summed
 from spirillum.fluid.wire.interaction import share
 from spirillum.fluid.wire.sources import Sources
 
@@ -137,9 +137,7 @@ class Reduced:
 
     def _reflected(self, placed: Samples) -> list[Samples]:
         """Fields that the wall reflects of unit forces at points about its axis, for each system, (fields, 3 n)."""
-        order, back = from_the_wall(distances_of(placed, self.waves.radius))
-        points = placed[order]
-        distances = distances_of(points, self.waves.radius)
+        points, distances, back = from_the_wall(placed, self.waves.radius)
 
         def reflected(numbers: range) -> list[Samples]:
             found: list[Samples] = [np.zeros((answers.wall[0].shape[0], placed.size)) for answers in self.answers]

@@ -229,20 +229,19 @@ def distances_of(points: Samples, radius: float) -> Samples:
     return distances
 
 
-def from_the_wall(distances: Samples) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of points sorted by their distance from the wall, and the places of their components to undo that.
+def from_the_wall(points: Samples, radius: float) -> tuple[Samples, Samples, np.ndarray]:
+    """Points with the nearest to the wall first, their distances from it, and the places of components to undo that.
 
     What waves reach are then the first of the points: sums over them need no index.
     """
+    distances = distances_of(points, radius)
     order = np.argsort(distances, kind="stable")
-    return order, components_of(np.argsort(order))
+    return points[order], distances[order], components_of(np.argsort(order))
 
 
 def point_reflection(points: Samples, waves: Waves) -> Samples:
     """Velocities at points from forces at the same points, symmetric, (3 n, 3 n); without the minus sign."""
-    order, back = from_the_wall(distances_of(points, waves.radius))
-    placed = points[order]
-    distances = distances_of(placed, waves.radius)
+    placed, distances, back = from_the_wall(points, waves.radius)
 
     def reflected(numbers: range) -> Samples:
         total = np.zeros((3 * len(points),) * 2)
