@@ -1,9 +1,12 @@
-"""A piece that is missing from a film shows in place, body and tail at once; noise, gaps and pushes do not."""
+"""A piece that is missing from a film shows in place, body and tail at once; noise, gaps and pushes do not.
+
+A body whose picture compression repeats does not move at all, which no noise allows.
+"""
 
 import numpy as np
 import pytest
 
-from spirillum.vision.track.cuts import cuts_in, jumps_of_time
+from spirillum.vision.track.cuts import cuts_in, frozen_place, jumps_of_time
 from spirillum.vision.track.motion import Motion
 
 PIXEL = 2.5e-4
@@ -73,3 +76,27 @@ def test_short_and_unseen_series_say_nothing():
     assert jumps_of_time(Motion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == ()
     true, x, body, tail = series()
     assert cuts_in(Motion(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan)), PIXEL) == ()
+
+
+def test_a_body_that_compression_freezes_is_told():
+    true, x, body, tail = series()
+    frozen = x[0] + 1e-3 * PIXEL * np.random.default_rng(3).normal(size=x.size)
+    (flag,) = frozen_place(Motion(true, frozen, body, tail), PIXEL)
+    assert flag.name == "frozen-by-compression"
+    assert set(flag.spoils) >= {"forward_velocity", "tail_rotation_rate"}
+    assert "body_rotation_rate" not in flag.spoils
+
+
+def test_slow_noisy_and_resting_robots_are_not_frozen():
+    true, x, body, tail = series()
+    rest = np.full(x.size, x[0])
+    slow = 0.005 * PIXEL * np.arange(x.size)  # a fast camera without noise: half a step of the bound, 1.5 pixels in all
+    noisy = rest + 0.02 * PIXEL * np.random.default_rng(4).normal(size=x.size)
+    for motion in (
+        Motion(true, slow, body, tail),
+        Motion(true, noisy, body, tail),
+        Motion(true, x, body, tail),
+        Motion(true, rest, np.zeros(x.size), np.full(x.size, np.nan)),
+        Motion(true, np.full(x.size, np.nan), body, tail),
+    ):
+        assert frozen_place(motion, PIXEL) == ()

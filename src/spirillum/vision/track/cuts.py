@@ -1,7 +1,8 @@
-"""Detection of films whose time stamps contradict the motion.
+"""Detection of films whose time stamps or pictures contradict the motion.
 
 Where a part of the film is missing but time stamps continue evenly, position, body and tail jump on the same frame.
-Where time stamps jump but nothing is missing, the motion continues as if no time had passed.
+Where time stamps jump but nothing is missing, the motion continues as if no time had passed. Where strong compression
+repeats the edges of the body from frame to frame, body or tail turn while the place does not change at all.
 """
 
 from __future__ import annotations
@@ -17,9 +18,10 @@ from spirillum.robust import least_squares_line, mad_scale
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import CUTS
 from spirillum.vision.track.motion import Motion
+from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.warnings import EVERYTHING
 
-__all__ = ["cuts_in", "jumps_of_time"]
+__all__ = ["cuts_in", "frozen_place", "jumps_of_time"]
 
 
 def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
@@ -75,6 +77,36 @@ def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tup
         "time had passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
     )
     return (Flag("times-do-not-fit", sentence, EVERYTHING),)
+
+
+def frozen_place(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
+    """Flag a body that turns, or whose tail does, while its place changes by less than any camera's noise.
+
+    A video codec repeats parts of a picture that have changed by less than its quantisation; slow motion is left out
+    until it exceeds that.
+
+    Args:
+        motion: the robot's motion.
+        length_per_pixel: length per pixel, m.
+    """
+    _, x, body_angle, tail_phase = motion
+    place = x[np.isfinite(x)] / length_per_pixel
+    if place.size < CUTS.long_window or not any(_turned(angle) for angle in (body_angle, tail_phase)):
+        return ()
+    still = float(np.mean(np.abs(np.diff(place)) < CUTS.still))
+    if still < CUTS.frozen or float(np.ptp(place)) > CUTS.place:
+        return ()
+    sentence = (
+        f"the robot turns, but on {100.0 * still:.0f} % of the frames its place is that of the frame before to "
+        f"{CUTS.still:g} pixels, more exactly than a camera's noise allows: strong compression of the video leaves out "
+        "slow motion; neither speed nor the tail's rotation is given: compress the film less"
+    )
+    return (Flag("frozen-by-compression", sentence, (*LENGTHS, "tail_rotation_rate")),)
+
+
+def _turned(angle: Samples) -> bool:
+    known = angle[np.isfinite(angle)]
+    return bool(known.size and np.ptp(known) > CUTS.turned)
 
 
 def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
