@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -138,8 +138,8 @@ def body_rows() -> list[Row]:
     return rows
 
 
-def published_rows(*, without: Collection[str] = ()) -> list[Row]:
-    """Wires of other shapes, but for those named: the torus, exact, and helices measured in oil."""
+def published_rows() -> list[Row]:
+    """Wires of other shapes: the torus, exact, and helices measured in oil."""
     rows = []
     accuracies: tuple[Accuracy, ...] = ("standard", "high")
     for accuracy in accuracies:
@@ -147,14 +147,10 @@ def published_rows(*, without: Collection[str] = ()) -> list[Row]:
             if ratio < 0.01 and accuracy == "high":
                 continue  # thousands of stations: for a ring that thin both forms agree
             what = f"torus, a/R = {ratio:g}"
-            if what in without:
-                continue
             found = _resistance(_ring(ratio), accuracy)[0, 0] / (6.0 * np.pi * (1.0 + ratio))
             rows.append({"wire": what, "accuracy": accuracy, "quantity": "drag", "error": found / exact - 1.0})
         for wavelength, measured in RODENBORN.items():
             what = f"helix, wavelength {wavelength:g} radii"
-            if what in without:
-                continue
             r = _resistance(_rodenborn(wavelength), accuracy)
             found = (-r[0, 3] / 6.3**2, r[3, 3] / 6.3**3, r[0, 0] / 6.3)
             rows += [

@@ -271,6 +271,7 @@ def test_a_wire_along_the_glass(ratio: float, error: float) -> None:
     np.testing.assert_allclose(no_gradient(*slopes(b, offset)), along, rtol=error)
 
 
+@pytest.mark.slow
 def test_a_wire_near_the_glass_against_a_cylinder_resolved() -> None:
     """Across the tube, sideways and towards the wall, 2 radii from it: two long capsules and two long wires."""
     b, offset = 0.08, 0.84

@@ -36,7 +36,15 @@ def film(flat_pictures, folder, roll, stated):
     return folder / "film", folder / "film.setup.toml"
 
 
-@pytest.mark.parametrize(("roll", "stated"), [(25.0, "right"), (160.0, "left"), (90.0, "up"), (-100.0, "down")])
+@pytest.mark.parametrize(
+    ("roll", "stated"),
+    [
+        (25.0, "right"),
+        (-100.0, "down"),
+        pytest.param(160.0, "left", marks=pytest.mark.slow),
+        pytest.param(90.0, "up", marks=pytest.mark.slow),
+    ],
+)
 def test_rates_do_not_know_how_the_camera_is_turned(flat_pictures, tmp_path, roll, stated):
     path, setup = film(flat_pictures, tmp_path, roll, stated)
     found = follow(path, *load_setup(setup))

@@ -108,7 +108,7 @@ def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> No
     assert any("tail_rotation_rate" in flag.spoils for flag in wire.flags)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow)])
 def test_a_tail_lost_in_noise_is_not_seen_and_is_not_said_to_have_another_shape(
     flat_pictures: ModuleType, tmp_path: Path, seed: int
 ) -> None:
