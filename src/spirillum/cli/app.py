@@ -302,6 +302,15 @@ def study(
             show_default=False,
         ),
     ] = None,
+    settled: Annotated[
+        bool | None,
+        typer.Option(
+            "--settled/--no-settled",
+            help="Let the robots go in their tubes and follow each to its steady motion too (seconds a robot), or not; "
+            "else as the study says.",
+            show_default=False,
+        ),
+    ] = None,
     workers: Annotated[int, typer.Option(min=1, max=64, help="Number of processes for all but short work.")] = 2,
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="A Dask scheduler whose workers compute: tcp://HOST:8786.")
@@ -336,6 +345,7 @@ def study(
             models=model,
             band=band,
             predicted=predicted,
+            settled=settled,
             workers=workers if cluster is None else cluster,
             store=store,
             calibration=calibration,

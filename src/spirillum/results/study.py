@@ -42,6 +42,7 @@ def study(
     models: Sequence[str] | None = None,
     band: bool | None = None,
     predicted: bool | None = None,
+    settled: bool | None = None,
     workers: int | str = 1,
     store: str | Path | None = None,
     calibration: str | Path | None = None,
@@ -62,6 +63,8 @@ def study(
             (seconds with tables, else many minutes), or not; None: what the study says.
         predicted: lay the robots down in their tubes and let them go too, over a design of gap, pitch, waiting time,
             roughness and friction, with nothing fitted (minutes), or not; None: what the study says.
+        settled: let the robots go in their tubes and follow each to its steady motion too (some seconds a robot), or
+            not; None: what the study says.
         workers: number of processes, or the address of a Dask scheduler, as `tcp://192.168.1.5:8786`. The results do
             not depend on it.
         store: instead of `output`, a Zarr store (`study.zarr`), written a region after the other: for more robots than
@@ -90,6 +93,7 @@ def study(
         models=models,
         band=band,
         predicted=predicted,
+        settled=settled,
         calibration=calibration,
         posterior=posterior,
         largest=LARGEST_STUDY if store is None else LARGEST_STORED,

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from spirillum.citations import REFERENCES
 from spirillum.fluid.registry import SWIMMER_MODELS
-from spirillum.quantities import unit_of
 from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 from spirillum.shown import counted
-from spirillum.studies.ranking import ENDS, RANKED, Best, RankedRobot, StudyRanking, best_in_words
+from spirillum.studies.ranking import ENDS, RANKED, Best, RankedRobot, StudyRanking, best_in_words, unit_of_ranked
 from spirillum.units import among, display_unit, in_unit
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, A
         most: rows.
     """
     sizes = {name: [robot.values[name] for robot in ranking.robots] for name in ranking.quantities}
-    units = {name: among(max(values, key=abs), unit_of(name), values) for name, values in sizes.items() if values}
+    units = {name: _unit_among(name, values) for name, values in sizes.items() if values}
     first = ranking.robots[:most]
     return {
         "message": ranking.message,
@@ -55,16 +54,22 @@ def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, A
     }
 
 
+def _unit_among(name: str, values: Sequence[float]) -> str:
+    """The unit for people of a quantity of several robots; NaN for those without an answer."""
+    known = [value for value in values if not math.isnan(value)] or [0.0]
+    return among(max(known, key=abs), unit_of_ranked(name), known)
+
+
 def _size(best: Best) -> str:
     """The value of the best robot, with its unit."""
-    value, unit = best.robot.values[best.quantity], unit_of(best.quantity)
+    value, unit = best.robot.values[best.quantity], unit_of_ranked(best.quantity)
     shown = display_unit(value, unit)
     return f"{in_unit(value, unit, shown)} {shown}".removesuffix(" 1")
 
 
 def _ranked_cell(robot: RankedRobot, name: str, unit: str) -> str:
     """Value and ends of a quantity of a robot, in a unit."""
-    value, low, high = (in_unit(of[name], unit_of(name), unit) for of in (robot.values, robot.low, robot.high))
+    value, low, high = (in_unit(of[name], unit_of_ranked(name), unit) for of in (robot.values, robot.low, robot.high))
     if math.isnan(robot.values[name]):
         return "-"
     return value if math.isnan(robot.low[name]) else f"{value} ({low} to {high})"

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 from spirillum.files import write_text
 from spirillum.papers.registry import claims_of, figures_of, predictions_of
-from spirillum.quantities import unit_of
 from spirillum.results.page import draw_pictures, page
 from spirillum.results.study_content import content, shown_ranking
 from spirillum.results.study_robot import robot_picture
-from spirillum.studies.ranking import StudyRanking, ranking_of
+from spirillum.studies.ranking import StudyRanking, ranking_of, unit_of_ranked
 from spirillum.view.figures.laid_down import laid_down_picture
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.ranking import ranking_picture
@@ -76,7 +75,7 @@ def _pictures(dataset: xr.Dataset) -> dict[str, Picture]:
 def _ranking_rows(ranking: StudyRanking) -> str:
     """The ranking as CSV, all of its robots; SI."""
     names = ranking.quantities
-    header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of(name)]}" for name in names for end in _ENDS)]
+    header = ["rank", "robot", *(f"{name}{end}_{_COLUMN[unit_of_ranked(name)]}" for name in names for end in _ENDS)]
     table = io.StringIO()
     writer = csv.writer(table, lineterminator="\n")
     writer.writerow([title.rstrip("_") for title in header])

@@ -59,8 +59,8 @@ def stored_study(
             cluster that is not there, or is lost; a missing library.
     """
     required("zarr", "a store", "cluster")
-    if loaded.study.band or loaded.study.predicted:
-        option = "band" if loaded.study.band else "predicted"
+    option = next((name for name in ("band", "predicted", "settled") if getattr(loaded.study, name)), None)
+    if option is not None:
         raise InputError(f"{option} with a store; allowed: a folder for the results (-o DIR), on any number of workers")
     mark = {"schema": "spirillum.study-store/1", "title": loaded.study.title, "fingerprint": f"{fingerprint}-store"}
     claim = {"mark": _MARK, "content": mark, "what": "study"}

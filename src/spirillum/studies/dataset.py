@@ -20,6 +20,7 @@ from spirillum.studies.laid_down import LaidDownTask
 from spirillum.studies.laid_down_dataset import laid_down_coordinates, laid_down_variables
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
+from spirillum.studies.settled import SettledTask, settled_variables
 from spirillum.studies.work import REASONS, Part, Task
 from spirillum.version import versions
 
@@ -42,17 +43,21 @@ _BAND = {
 }
 
 
+LetGo = tuple[Sequence[tuple[LaidDownTask, Part]], Sequence[tuple[SettledTask, Part]]]
+"""Answers of robots that made the runs of a design, and of those that were followed to their steady motions."""
+
+
 def assembled(
     loaded: LoadedStudy,
     answers: Iterable[tuple[Task, Part]],
     band: Sequence[tuple[BandTask, Part]],
-    laid_down: Sequence[tuple[LaidDownTask, Part]],
+    let_go: LetGo,
     observed: ObservedArrays | None,
     fingerprint: str,
     warnings: Sequence[str],
 ) -> xr.Dataset:
-    """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots laid down."""
-    dataset = laid_out(loaded, answers, band, laid_down, observed)
+    """Lay all answers into one Dataset: at the reference place, at the places of a band, of robots that were let go."""
+    dataset = laid_out(loaded, answers, band, let_go, observed)
     dataset.attrs = described(loaded, observed, fingerprint, warnings)
     dataset.attrs["checksum"] = _checksum(dataset)
     return dataset
@@ -82,7 +87,7 @@ def laid_out(
     loaded: LoadedStudy,
     answers: Iterable[tuple[Task, Part]],
     band: Sequence[tuple[BandTask, Part]] = (),
-    laid_down: Sequence[tuple[LaidDownTask, Part]] = (),
+    let_go: LetGo = ((), ()),
     observed: ObservedArrays | None = None,
 ) -> xr.Dataset:
     """Answers as labelled arrays, without attributes of the whole."""
@@ -107,6 +112,9 @@ def laid_out(
     if observed is not None:
         data |= _observed_variables(observed, robots, shape)
     coordinates = coordinates_of(loaded)
+    laid_down, settled = let_go
+    if settled:
+        data |= settled_variables(settled, robots, shape)
     if laid_down:
         data |= laid_down_variables(laid_down, robots, shape)
         coordinates |= laid_down_coordinates(study.laid_down)

@@ -15,23 +15,25 @@ from spirillum.studies.band import BandTask
 from spirillum.studies.laid_down import LaidDownTask
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
+from spirillum.studies.settled import SettledTask
 from spirillum.studies.work import Indices, Part, Task, answer
 
-__all__ = ["Job", "answered", "job_of", "one_thread_each"]
+__all__ = ["AnyTask", "Job", "answered", "job_of", "one_thread_each"]
+
+
+AnyTask = Task | BandTask | LaidDownTask | SettledTask
 
 
 class Job(NamedTuple):
     """A task with all that it is computed from; its robots are numbered from 0."""
 
-    task: Task | BandTask | LaidDownTask
+    task: AnyTask
     loaded: LoadedStudy
     """The study without robots, or with those of the task where their draws of a posterior are asked for."""
     observed: ObservedArrays | None
 
 
-def job_of(
-    task: Task | BandTask | LaidDownTask, loaded: LoadedStudy, observed: ObservedArrays | None
-) -> tuple[int, Job]:
+def job_of(task: AnyTask, loaded: LoadedStudy, observed: ObservedArrays | None) -> tuple[int, Job]:
     """A task as a job, with its number."""
     study = loaded.study.model_copy(update={"grid": None, "robots": None})
     small = replace(loaded, study=study, robots=(), placements=(), question={}, cautions=())
@@ -47,7 +49,7 @@ def job_of(
 def answered(numbered: tuple[int, Job]) -> Part:
     """The answer of a job."""
     task, loaded, observed = numbered[1]
-    if isinstance(task, LaidDownTask):
+    if isinstance(task, LaidDownTask | SettledTask):
         return task.answer()
     with one_thread_each(task.model):
         return task.answer(loaded.study.friction) if isinstance(task, BandTask) else answer(task, loaded, observed)

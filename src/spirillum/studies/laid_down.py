@@ -28,7 +28,7 @@ from spirillum.robot.robot import Robot
 from spirillum.studies.factorial import Levels, half_fraction
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.spec import LaidDown
-from spirillum.studies.work import Indices, Part
+from spirillum.studies.work import OneRobot, Part
 from spirillum.swimming.band import steepest_pitch
 from spirillum.swimming.steady import swim
 
@@ -50,7 +50,6 @@ __all__ = [
     "levels",
     "levels_of_readings",
     "without_answer",
-    "without_table",
 ]
 
 FACTORS = ("gap", "pitch", "wait", "roughness", "friction_coefficient")
@@ -117,35 +116,15 @@ def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[Laid]:
 
 
 @dataclass(frozen=True)
-class LaidDownTask:
+class LaidDownTask(OneRobot):
     """All runs of one robot."""
 
-    number: int
-    index: int
-    """Of the robot in the flat order of the study."""
-    robot: Robot
     ranges: LaidDown
-
-    @property
-    def size(self) -> int:
-        """Number of robots."""
-        return 1
-
-    @property
-    def indices(self) -> Indices:
-        """Index of the robot in the flat order of the study."""
-        return np.array([self.index], dtype=np.intp)
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
-        return f"part-{self.number:05d}.npz"
 
     @property
     def words(self) -> str:
         """What is computed, in a few words."""
-        tail = self.robot.tail
-        return f"laid down: {self.robot.name}, tail {1e3 * tail.wavelength:g} x {1e3 * tail.amplitude:g} mm"
+        return f"laid down: {self.tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -263,20 +242,6 @@ def laid_down_tasks(loaded: LoadedStudy, first: int) -> Iterator[LaidDownTask]:
         if has_table(robot):
             yield LaidDownTask(number, index, robot, loaded.study.laid_down)
             number += 1
-
-
-def without_table(loaded: LoadedStudy, tasks: Iterable[LaidDownTask]) -> list[str]:
-    """A sentence on the robots that were not laid down for want of a table; none where all were."""
-    known = {task.index for task in tasks}
-    missing = [index for index in range(loaded.count) if index not in known]
-    if not loaded.study.predicted or not missing:
-        return []
-    first = loaded.robot_at(missing[0])
-    return [
-        f"{len(missing)} of {loaded.count} robots have no table of their tube and were not laid down, the first: "
-        f"{first.name} with a tail of {1e3 * first.tail.wavelength:g} x {1e3 * first.tail.amplitude:g} mm; "
-        "`spirillum prepare` makes one"
-    ]
 
 
 def without_answer(parts: Iterable[Part]) -> list[str]:

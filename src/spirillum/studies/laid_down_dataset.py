@@ -22,7 +22,7 @@ from spirillum.studies.laid_down import (
     levels_of_readings,
 )
 from spirillum.studies.spec import LaidDown
-from spirillum.studies.work import Part
+from spirillum.studies.work import Part, gathered
 
 __all__ = ["laid_down_coordinates", "laid_down_variables"]
 
@@ -68,7 +68,7 @@ def laid_down_variables(
     """
     found: dict[str, Any] = {}
     for name in (*AT_RUNS, *INFERRED):
-        values = _gathered(answers, name, shape)
+        values = gathered(answers, name, shape)
         more = ("inferred_by",) if name in INFERRED else ()
         base = name.removeprefix("modelled_")
         meaning = _MEANINGS.get(name, QUANTITIES[base].meaning)
@@ -86,16 +86,8 @@ def laid_down_variables(
         words = "what the high level of a factor adds to the mean at its low one"
         found[f"{name}_effect"] = ((*robots, *more, "factor"), effects, about(words))
     pitch = attributes("pitch", meaning="pitch at which it is laid down, nose up", source="design of the runs")
-    found["pitch_of_run"] = ((*robots, "run"), _gathered(answers, "laid_pitch", shape), pitch)
+    found["pitch_of_run"] = ((*robots, "run"), gathered(answers, "laid_pitch", shape), pitch)
     return found
-
-
-def _gathered(answers: Sequence[tuple[LaidDownTask, Part]], name: str, shape: Sequence[int]) -> Values:
-    first = answers[0][1][name]
-    values = np.full((int(np.prod(shape)), *first.shape[1:]), np.nan)
-    for task, part in answers:
-        values[task.index] = part[name][0]
-    return values.reshape(*shape, *first.shape[1:])
 
 
 def _effects(values: Values, robots: int) -> Values:

@@ -104,6 +104,7 @@ def load_study(
     models: Sequence[str] | None = None,
     band: bool | None = None,
     predicted: bool | None = None,
+    settled: bool | None = None,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
     largest: int = LARGEST_STUDY,
@@ -116,6 +117,8 @@ def load_study(
         models: hydrodynamic models instead of the study's; None: the study's.
         band: whether to compute bands, instead of what the study says; None: what it says.
         predicted: whether to lay the robots down and let them go, instead of what the study says; None: what it says.
+        settled: whether to follow the robots to their steady motions, instead of what the study says; None: what it
+            says.
         calibration: calibration file, applied to every robot.
         posterior: file of a calibration's posterior: its middle is applied to every robot.
         largest: most results that it may ask for.
@@ -123,7 +126,12 @@ def load_study(
     Raises:
         InputError: if the study or one of its robots is wrong.
     """
-    instead = {"models": None if models is None else list(models), "band": band, "predicted": predicted}
+    instead = {
+        "models": None if models is None else list(models),
+        "band": band,
+        "predicted": predicted,
+        "settled": settled,
+    }
     study, name, folder = _read(source, {field: value for field, value in instead.items() if value is not None})
     if study.size > largest:
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
@@ -132,11 +140,12 @@ def load_study(
     robots = tuple(_robot(entry, folder, {**(overrides or {}), **varied}) for entry, varied in entries)
     robots = _named_apart(robots, [varied for _, varied in entries])
     _check_drives(study, [entry for entry, _ in entries], robots, name)
-    if study.predicted and not (calibration is None and posterior is None):
-        raise InputError(
-            f"{name}: predicted together with a calibration or posterior; allowed: one of them, for what is predicted "
-            "is predicted with nothing fitted"
-        )
+    for option in ("predicted", "settled"):
+        if getattr(study, option) and not (calibration is None and posterior is None):
+            raise InputError(
+                f"{name}: {option} together with a calibration or posterior; allowed: one of them, for these motions "
+                "are followed with nothing fitted"
+            )
     fitted, drawn = _fitted(study, calibration, posterior)
     robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
     _check_varied(study, overrides or {}, name)

@@ -2,8 +2,9 @@
 
 One model and one reading of the friction rank all robots: the model that computes the channel's walls where the study
 has one, else the first that solves for the flow, else its first; the reading that the robots have themselves where the
-study has it. Bands and intervals are those of the study. A band goes over places that robots may share, such as a gap:
-at how many of them the fastest robot is the fastest says more than how far the bands overlap.
+study has it. Robots that were let go too (`settled`) are ordered by their speed in steady motion. Bands and intervals
+are those of the study. A band goes over places that robots may share, such as a gap: at how many of them the fastest
+robot is the fastest says more than how far the bands overlap.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ENDS",
+    "LET_GO",
     "RANKED",
     "Best",
     "Ranked",
@@ -35,6 +37,7 @@ __all__ = [
     "can_be_ranked",
     "ranking_of",
     "robot_dims",
+    "unit_of_ranked",
 ]
 
 _ALIKE = 0.01
@@ -57,8 +60,11 @@ class Ranked(NamedTuple):
         return f"{self.title}, {unit}".removesuffix(", 1")
 
 
+LET_GO = "forward_velocity_settled"
+"""The speed in steady motion, of robots that were let go."""
 RANKED = {
     "forward_velocity": Ranked("speed", "fastest", 1.0),
+    LET_GO: Ranked("speed let go", "fastest when let go", 1.0),
     "hydrodynamic_efficiency": Ranked("efficiency", "most efficient", 1.0),
     "motor_current": Ranked("current", "least current", -1.0),
     "shaft_power": Ranked("power", "least power", -1.0),
@@ -66,6 +72,11 @@ RANKED = {
 """Quantities that rank robots, in the order in which they are shown."""
 ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
+
+
+def unit_of_ranked(name: str) -> str:
+    """SI unit of a quantity that ranks robots."""
+    return unit_of("forward_velocity" if name == LET_GO else name)
 
 
 class RankedRobot(NamedTuple):
@@ -88,7 +99,7 @@ class RankedRobot(NamedTuple):
         }
         return {
             "robot": self.name,
-            **{name: quantity(value, unit_of(name), **ends[name]) for name, value in self.values.items()},
+            **{name: quantity(value, unit_of_ranked(name), **ends[name]) for name, value in self.values.items()},
         }
 
 
@@ -141,10 +152,11 @@ class StudyRanking:
         if not self.robots:
             return "no robot has an answer"
         first = self.robots[0]
-        speed, low, high = (of["forward_velocity"] for of in (first.values, first.low, first.high))
+        by = LET_GO if np.isfinite(first.values.get(LET_GO, np.nan)) else "forward_velocity"
+        speed, low, high = (of[by] for of in (first.values, first.low, first.high))
         shown = display_unit(speed, "m/s")
         band = f" ({in_unit(low, 'm/s', shown)} to {in_unit(high, 'm/s', shown)})" if np.isfinite(low) else ""
-        return f"fastest: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
+        return f"{RANKED[by].superlative}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -185,7 +197,7 @@ def can_be_ranked(dataset: xr.Dataset) -> bool:
     chosen, indexes = ("model", "friction"), dataset.indexes
     named = all(name in indexes and indexes[name].is_unique and dataset.sizes.get(name, 0) > 0 for name in chosen)
     over = {*chosen, *robot_dims(dataset)}
-    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED)
+    return named and all(name in dataset and set(dataset[name].dims) == over for name in RANKED if name != LET_GO)
 
 
 def robot_dims(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -208,10 +220,13 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     chosen = dataset.sel(model=model, friction=reading)
     names = list(_names(dataset))
     known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
+    if LET_GO in chosen:
+        known.insert(0, LET_GO)
     values = {name: _flat(chosen, name, names) for name in known}
     low, high, kind = _ends(chosen, known, names)
     order = np.argsort(-values["forward_velocity"], kind="stable")
     order = order[np.isfinite(values["forward_velocity"][order])]
+    order = order[np.argsort(-values[known[0]][order], kind="stable")]  # NaN last, in their order
     ranked = {
         int(index): RankedRobot(
             names[index], int(index), *({name: float(of[name][index]) for name in known} for of in (values, low, high))

@@ -13,11 +13,12 @@ from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
-from spirillum.studies.jobs import answered, job_of
-from spirillum.studies.laid_down import LaidDownTask, laid_down_tasks, without_answer, without_table
+from spirillum.studies.jobs import AnyTask, answered, job_of
+from spirillum.studies.laid_down import has_table, laid_down_tasks, without_answer
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.work import Task, cautions, keep, kept, summed, tasks
+from spirillum.studies.settled import not_settled, settled_tasks
+from spirillum.studies.work import OneRobot, Task, cautions, keep, kept, summed, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
@@ -59,7 +60,8 @@ def computed_study(
     todo: list[Task | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
     runs = list(laid_down_tasks(loaded, len(todo)))
-    asked: list[Task | BandTask | LaidDownTask] = [*todo, *runs]
+    let_go = list(settled_tasks(loaded, len(todo) + len(runs)))
+    asked: list[AnyTask] = [*todo, *runs, *let_go]
     found = {task.number: kept(task, parts, _leading(task, loaded)) for task in asked}
     missing = [task for task in asked if found[task.number] is None]
     done = len(asked) - len(missing)
@@ -77,13 +79,16 @@ def computed_study(
     answers = [(task, parts_of[task.number]) for task in todo if isinstance(task, Task)]
     band = [(task, parts_of[task.number]) for task in todo if isinstance(task, BandTask)]
     laid_down = [(task, parts_of[task.number]) for task in runs]
+    settled = [(task, parts_of[task.number]) for task in let_go]
     warnings = warnings_of(loaded)
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
-    warnings += without_table(loaded, runs)
+    if loaded.study.predicted or loaded.study.settled:
+        warnings += without_table(loaded)
     warnings += without_answer(part for _, part in laid_down)
+    warnings += not_settled(settled)
     warnings += warnings_of_calibrations(loaded)
-    return assembled(loaded, answers, band, laid_down, observed, fingerprint, list(dict.fromkeys(warnings)))
+    return assembled(loaded, answers, band, (laid_down, settled), observed, fingerprint, list(dict.fromkeys(warnings)))
 
 
 _KEPT = "; what was answered is kept"
@@ -91,12 +96,12 @@ _SHORT = 600_000
 """Robots in closed form below which other processes would start longer than they work."""
 
 
-def _leading(task: Task | BandTask | LaidDownTask, loaded: LoadedStudy) -> tuple[int, ...]:
+def _leading(task: AnyTask, loaded: LoadedStudy) -> tuple[int, ...]:
     """Sizes of the first axes of a task's arrays."""
-    return (1,) if isinstance(task, LaidDownTask) else (task.size, len(loaded.study.friction))
+    return (1,) if isinstance(task, OneRobot) else (task.size, len(loaded.study.friction))
 
 
-def _worth(missing: Sequence[Task | BandTask | LaidDownTask], crew: Crew) -> Crew:
+def _worth(missing: Sequence[AnyTask], crew: Crew) -> Crew:
     """Who computes: this process where the others would start longer than they work."""
     quick = all(isinstance(task, Task) and find_swimmer_model(task.model).closed_form for task in missing)
     short = quick and sum(task.size for task in missing) < _SHORT
@@ -132,18 +137,18 @@ def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]
         return ["band = true, but no model of the study computes walls: there is no band"] if loaded.study.band else []
     held = (
         f"model '{walled[0]}' holds the robots at their places: let go, weight and contact move them, they are slower "
-        "and perhaps in another order; `spirillum settle` follows a robot to its steady motion"
+        "and perhaps in another order; --settled follows each of them to its steady motion, in seconds"
     )
     placements = loaded.placements or (loaded.study.placement,)
     found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
     if loaded.study.band or not found:
-        return [held]
+        return [] if loaded.study.settled else [held]
     one_place = (
         f"{' and '.join(found)} are not given: model '{next(iter(found.values()))}' answers at one place, and others "
         "change speeds and perhaps their order; --band computes those, too, in seconds with tables, else in many "
         "minutes"
     )
-    return [one_place, held]
+    return [one_place] if loaded.study.settled else [one_place, held]
 
 
 def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
@@ -154,6 +159,19 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
         for name in loaded.study.models
         for sentence in calibration_warnings(robot, name)
     )
+
+
+def without_table(loaded: LoadedStudy) -> list[str]:
+    """A sentence on the robots that are not followed in their tubes for want of a table; none where all are."""
+    missing = [robot for robot in map(loaded.robot_at, range(loaded.count)) if not has_table(robot)]
+    if not missing:
+        return []
+    first, tail = missing[0], missing[0].tail
+    return [
+        f"{len(missing)} of {loaded.count} robots have no table of their tube and were not let go in it, the first: "
+        f"{first.name} with a tail of {1e3 * tail.wavelength:g} x {1e3 * tail.amplitude:g} mm; `spirillum prepare` "
+        "makes one"
+    ]
 
 
 _NAMED = 3

@@ -114,6 +114,8 @@ class Study(Section):
     """Lay the robots down in their tubes and let them go too, with nothing fitted: minutes."""
     laid_down: LaidDown = LaidDown()
     """Between what they are laid down."""
+    settled: Annotated[bool, Field(strict=True)] = False
+    """Let the robots go in their tubes, and follow each of them to its steady motion too: some seconds a robot."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -19,6 +19,7 @@ from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
+from spirillum.robot.robot import Robot
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.swimming.answer import STEADY, Swimming
@@ -33,10 +34,12 @@ __all__ = [
     "REASONS",
     "WITH_INTERVALS",
     "Caution",
+    "OneRobot",
     "Part",
     "Task",
     "answer",
     "cautions",
+    "gathered",
     "groups",
     "keep",
     "kept",
@@ -141,6 +144,52 @@ class Task:
         """Names of the arrays that an answer may have."""
         endings = ("", "_at_observed_rate", "_at_assumed_rate", "_interval_low", "_interval_high")
         return {"outside", "error_estimate", *(item.name + at for item in STEADY for at in endings)}
+
+
+@dataclass(frozen=True)
+class OneRobot:
+    """One robot that is followed in its tube, as a task of its own."""
+
+    number: int
+    index: int
+    """Of the robot in the flat order of the study."""
+    robot: Robot
+
+    @property
+    def size(self) -> int:
+        """Number of robots."""
+        return 1
+
+    @property
+    def indices(self) -> Indices:
+        """Index of the robot in the flat order of the study."""
+        return np.array([self.index], dtype=np.intp)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the file that keeps its answer."""
+        return f"part-{self.number:05d}.npz"
+
+    @property
+    def tail(self) -> str:
+        """The robot and its tail, in a few words."""
+        tail = self.robot.tail
+        return f"{self.robot.name}, tail {1e3 * tail.wavelength:g} x {1e3 * tail.amplitude:g} mm"
+
+
+def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
+    """A quantity of robots that were followed one by one, over all robots of the study; NaN for those that were not.
+
+    Args:
+        answers: one at least.
+        name: of the quantity.
+        shape: sizes of the dimensions of the robots.
+    """
+    first = answers[0][1][name]
+    values = np.full((int(np.prod(shape)), *first.shape[1:]), np.nan)
+    for task, part in answers:
+        values[task.index] = part[name][0]
+    return values.reshape(*shape, *first.shape[1:])
 
 
 def tasks(loaded: LoadedStudy) -> Iterator[Task]:

@@ -9,7 +9,7 @@ from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, grid
 from spirillum.shown import counted
-from spirillum.studies.ranking import ENDS, RANKED, best_in_words
+from spirillum.studies.ranking import ENDS, LET_GO, RANKED, best_in_words
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -53,13 +53,14 @@ def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
         console.print(f"and {len(robots) - rows} more: --rows, ranking.csv", highlight=False)
     for best in ranking["best"]:
         console.print(escape(best_in_words(best)), highlight=False, soft_wrap=True)
-    if ranking["low_and_high"] in ENDS:
+    if ranking["low_and_high"] in ENDS and LET_GO not in robots[0]:
         console.print(f"low, high: {ENDS[ranking['low_and_high']]}", highlight=False)
 
 
 def _basis(ranking: Answer) -> str:
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    return f"fastest first: model {ranking['model']}, friction {ranking['friction']}{walls}"
+    first = "fastest when let go first" if LET_GO in ranking["robots"][0] else "fastest first"
+    return f"{first}: model {ranking['model']}, friction {ranking['friction']}{walls}"
 
 
 def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]:
@@ -69,7 +70,8 @@ def _columns(robots: Sequence[Answer], name: str) -> list[tuple[str, list[str]]]
     if not sizes:
         return []
     shown = display_unit(max(sizes), own)
-    ends = [end for end in ("low", "high") if name == "forward_velocity" and any(end in item[name] for item in robots)]
+    with_ends = name == "forward_velocity" and LET_GO not in robots[0]  # else the table is wider than a terminal
+    ends = [end for end in ("low", "high") if with_ends and any(end in item[name] for item in robots)]
     return [
         (
             RANKED[name].heading(shown) if end == "value" else end,

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
-from spirillum.quantities import unit_of
-from spirillum.studies.ranking import ENDS, RANKED, RankedRobot, StudyRanking
+from spirillum.studies.ranking import ENDS, RANKED, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain, told_apart
 
@@ -67,7 +66,7 @@ def _drawn(ranking: StudyRanking) -> Figure:
 def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, str]) -> None:
     """One quantity of all robots: points, and lines over their bands."""
     values, low, high = (_of(robots, which, name) for which in ("values", "low", "high"))
-    scale = _scale(np.concatenate([values, high]), unit_of(name))
+    scale = _scale(np.concatenate([values, high]), unit_of_ranked(name))
     rows = np.arange(len(robots))
     colour = COLOURS["blue"]
     panel.hlines(rows, scale(low), scale(high), color=colour, linewidth=2.2, alpha=0.35)

@@ -1,0 +1,141 @@
+"""Robots of a study let go in their tubes, and followed to their steady motions.
+
+Each is laid down where the study's placement says, with its drive on, and followed as `spirillum.settle` does: weight,
+film, contact and its own motion decide where it lies, and so how fast it swims.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spirillum.dynamics.free_motion import free_motion
+from spirillum.errors import InputError
+from spirillum.quantities import QUANTITIES, attributes
+from spirillum.robot.placement import Placement
+from spirillum.studies.laid_down import has_table
+from spirillum.studies.loading import LoadedStudy
+from spirillum.studies.work import OneRobot, Part, gathered
+
+__all__ = ["PLACE", "SETTLED", "STATES", "SettledTask", "not_settled", "settled_tasks", "settled_variables"]
+
+SETTLED = (
+    "forward_velocity",
+    "tail_rotation_rate",
+    "body_rotation_rate",
+    "motor_rotation_rate",
+    "motor_current",
+    "shaft_power",
+    "hydrodynamic_efficiency",
+)
+"""Quantities of a steady motion."""
+PLACE = ("gap", "pitch", "yaw", "azimuth")
+"""Where a robot lies in it."""
+STATES = ("not followed", "steady", "orbits", "goes around", "changing")
+"""What became of a robot; the index in this list is the value in the dataset."""
+_LYING = ("steady", "orbits", "goes around")
+"""States whose means do not depend on when they are taken."""
+
+
+@dataclass(frozen=True)
+class SettledTask(OneRobot):
+    """One robot that is let go."""
+
+    placement: Placement
+    """Where it is laid down."""
+
+    @property
+    def words(self) -> str:
+        """What is computed, in a few words."""
+        return f"let go: {self.tail}"
+
+    @property
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+        return {*SETTLED, *PLACE, "error_estimate", "state"}
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+        return self.needed
+
+    def answer(self) -> Part:
+        """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
+        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate")}
+        try:
+            found = free_motion(self.robot, placement=self.placement).prediction
+        except InputError:
+            return {**nothing, "state": np.zeros(1)}
+        lying = found.lying
+        assert lying is not None  # noqa: S101 - a free motion has one
+        state = np.array([float(STATES.index(lying.state))])
+        if lying.state not in _LYING:
+            return {**nothing, "state": state}
+        values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
+        values |= {name: float(getattr(lying, name)) for name in PLACE}
+        values["error_estimate"] = found.error_estimate
+        return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
+
+
+def settled_tasks(loaded: LoadedStudy, first: int) -> Iterator[SettledTask]:
+    """One task for each robot with a table, numbered from `first`; none where none is asked for."""
+    if not loaded.study.settled:
+        return
+    number, tails = first, loaded.count // len(loaded.robots)
+    for index in range(loaded.count):
+        robot = loaded.robot_at(index)
+        if has_table(robot):
+            yield SettledTask(number, index, robot, loaded.placement_of(index // tails))
+            number += 1
+
+
+def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:
+    """Sentences on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
+    lost = [task for task, part in answers if STATES[int(part["state"][0])] not in _LYING]
+    far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
+    found = []
+    if far:
+        found.append(
+            f"{len(far)} of {len(answers)} robots yaw further in steady motion than their tables were checked for: "
+            f"their speeds when let go have no error estimate; the first: {far[0].tail}"
+        )
+    if lost:
+        found.append(
+            f"{len(lost)} of {len(answers)} robots that were let go have no steady motion, or cannot be followed to "
+            f"it, the first: {lost[0].tail}; `spirillum settle` says why"
+        )
+    return found
+
+
+def settled_variables(
+    answers: Sequence[tuple[SettledTask, Part]], robots: Sequence[str], shape: Sequence[int]
+) -> dict[str, Any]:
+    """The steady motions as variables of a dataset.
+
+    Args:
+        answers: of the robots that were let go, one at least.
+        robots: dimensions of the robots.
+        shape: sizes of these.
+
+    Returns:
+        `<quantity>_settled` over the robots, NaN for those without a steady motion, and `settled`, what became of them.
+    """
+    found: dict[str, Any] = {}
+    for name in (*SETTLED, *PLACE):
+        about = attributes(
+            name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
+        )
+        found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
+    state = np.nan_to_num(gathered(answers, "state", shape)).astype("int8")
+    about = {
+        "units": "1",
+        "long_name": "what became of a robot that was let go",
+        "source": "free motion in the tube",
+        "flag_values": np.arange(len(STATES), dtype="int8"),
+        "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
+    }
+    error = (tuple(robots), gathered(answers, "error_estimate", shape), attributes("error_estimate"))
+    return {**found, "error_estimate_settled": error, "settled": (tuple(robots), state, about)}

@@ -1,0 +1,89 @@
+"""Robots of a study that are let go answer as each does alone, and order the ranking."""
+
+import numpy as np
+import pytest
+
+import spirillum as sp
+from spirillum.errors import InputError
+from spirillum.robot.placement import Placement
+from spirillum.studies.ranking import LET_GO, StudyRanking, ranking_of
+from spirillum.studies.settled import STATES, SettledTask, not_settled
+from spirillum.view.figures.ranking import ranking_picture
+
+LET = {
+    "models": ["tube"],
+    "friction": ["rotor"],
+    "settled": True,
+    "grid": {
+        "channels": {"wide": "biorob2012-wide"},
+        "wavelengths": ["20 mm"],
+        "amplitudes": ["2.5 mm"],
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def let_go():
+    return sp.study(LET)
+
+
+def test_each_robot_answers_as_alone(let_go) -> None:
+    here = let_go.sel(channel="wide", wavelength=0.02, amplitude=2.5e-3)
+    alone = sp.predict(sp.load("biorob2012-wide", **{"tail.wavelength": "20 mm"}), model="tube", motion="free")
+    for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate", "motor_current"):
+        assert float(here[f"{name}_settled"]) == pytest.approx(getattr(alone, name), rel=1e-9)
+    assert float(here["gap_settled"]) == pytest.approx(alone.lying.gap, rel=1e-9)
+    assert STATES[int(here["settled"])] == alone.lying.state == "steady"
+    assert here["forward_velocity_settled"].attrs["units"] == "m/s"
+
+
+def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
+    grid = {**LET["grid"], "amplitudes": ["2.6 mm"]}
+    without = sp.study({**LET, "models": ["rft"], "grid": grid})
+    assert "forward_velocity_settled" not in without
+    assert "1 of 1 robots have no table of their tube and were not let go in it" in without.attrs["warnings"]
+    assert "have no table" not in let_go.attrs["warnings"]
+    assert "holds the robots at their places" not in let_go.attrs["warnings"]
+
+
+def ranked(*speeds: float) -> StudyRanking:
+    """Three held tails, with these speeds of steady motions as if they had been let go."""
+    grid = {**LET["grid"], "wavelengths": ["15 mm", "20 mm", "25 mm"]}
+    held = sp.study({**LET, "grid": grid, "settled": False})
+    values = np.reshape(speeds, (1, 3, 1))
+    return ranking_of(held.assign(forward_velocity_settled=(("channel", "wavelength", "amplitude"), values)))
+
+
+def test_ranking_orders_by_the_speed_when_let_go() -> None:
+    ranking = ranked(2e-4, 1e-4, 3e-4)
+    assert [robot.name for robot in ranking.robots] == ["25 x 2.5 mm", "15 x 2.5 mm", "20 x 2.5 mm"]
+    assert ranking.message == "fastest when let go: 25 x 2.5 mm, 0.3 mm/s"
+    first = ranking.to_dict()["best"][0]
+    assert (first["what"], first["robot"]) == ("fastest when let go", "25 x 2.5 mm")
+    assert "Fastest when let go" in ranking_picture(ranking).title
+
+
+def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> None:
+    ranking = ranked(np.nan, 1e-4, np.nan)
+    assert ranking.robots[0].name == "20 x 2.5 mm"
+    held = [robot.values["forward_velocity"] for robot in ranking.robots[1:]]
+    assert held[0] > held[1]
+    assert all(np.isnan(robot.values[LET_GO]) for robot in ranking.robots[1:])
+
+
+def test_what_cannot_be_followed_is_no_number() -> None:
+    robot = sp.load("biorob2012-wide")
+    task = SettledTask(0, 0, robot, Placement.of({"gap": "30 mm"}))
+    part = task.answer()
+    assert set(part) == task.needed
+    assert np.isnan(part["forward_velocity"]).all()
+    (said,) = not_settled([(task, part)])
+    assert "1 of 1 robots that were let go have no steady motion" in said
+
+
+@pytest.mark.parametrize("given", ["calibration", "posterior"])
+def test_nothing_fitted_goes_with_it(given: str, tmp_path) -> None:
+    with pytest.raises(InputError, match="settled together with a calibration or posterior"):
+        sp.study(LET, **{given: tmp_path / "a.toml"})
+    with pytest.raises(InputError, match="settled with a store"):
+        sp.study(LET, store=tmp_path / "a.zarr")
