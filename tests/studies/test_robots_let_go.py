@@ -57,10 +57,10 @@ def ranked(*speeds: float) -> StudyRanking:
 def test_ranking_orders_by_the_speed_when_let_go() -> None:
     ranking = ranked(2e-4, 1e-4, 3e-4)
     assert [robot.name for robot in ranking.robots] == ["25 x 2.5 mm", "15 x 2.5 mm", "20 x 2.5 mm"]
-    assert ranking.message == "fastest when let go: 25 x 2.5 mm, 0.3 mm/s"
+    assert ranking.message == "fastest once settled: 25 x 2.5 mm, 0.3 mm/s"
     first = ranking.to_dict()["best"][0]
-    assert (first["what"], first["robot"]) == ("fastest when let go", "25 x 2.5 mm")
-    assert "Fastest when let go" in ranking_picture(ranking).title
+    assert (first["what"], first["robot"]) == ("fastest once settled", "25 x 2.5 mm")
+    assert "Fastest once settled" in ranking_picture(ranking).title
 
 
 def test_robots_that_were_not_let_go_come_last_the_faster_held_one_first() -> None:

@@ -64,7 +64,7 @@ LET_GO = "forward_velocity_settled"
 """The speed in steady motion, of robots that were let go."""
 RANKED = {
     "forward_velocity": Ranked("speed", "fastest", 1.0),
-    LET_GO: Ranked("speed let go", "fastest when let go", 1.0),
+    LET_GO: Ranked("settled", "fastest once settled", 1.0),
     "hydrodynamic_efficiency": Ranked("efficiency", "most efficient", 1.0),
     "motor_current": Ranked("current", "least current", -1.0),
     "shaft_power": Ranked("power", "least power", -1.0),

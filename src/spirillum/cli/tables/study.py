@@ -59,7 +59,7 @@ def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
 
 def _basis(ranking: Answer) -> str:
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    first = "fastest when let go first" if LET_GO in ranking["robots"][0] else "fastest first"
+    first = "fastest once settled first" if LET_GO in ranking["robots"][0] else "fastest first"
     return f"{first}: model {ranking['model']}, friction {ranking['friction']}{walls}"
 
 
