@@ -80,6 +80,11 @@ class Robot(RobotTables):
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": problem})
         return self
 
+    @property
+    def with_tail(self) -> str:
+        """Its name and its tail, which tell it apart from the others of a study."""
+        return f"{self.name}, tail {1e3 * self.tail.wavelength:g} x {1e3 * self.tail.amplitude:g} mm"
+
     def derived(self) -> dict[str, Derived]:
         """What follows from the fields: lengths, volumes, weight, centre of mass.
 

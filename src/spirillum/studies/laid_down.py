@@ -124,7 +124,7 @@ class LaidDownTask(OneRobot):
     @property
     def words(self) -> str:
         """What is computed, in a few words."""
-        return f"laid down: {self.tail}"
+        return f"laid down: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:

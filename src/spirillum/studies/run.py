@@ -166,11 +166,9 @@ def without_table(loaded: LoadedStudy) -> list[str]:
     missing = [robot for robot in map(loaded.robot_at, range(loaded.count)) if not has_table(robot)]
     if not missing:
         return []
-    first, tail = missing[0], missing[0].tail
     return [
         f"{len(missing)} of {loaded.count} robots have no table of their tube and were not let go in it, the first: "
-        f"{first.name} with a tail of {1e3 * tail.wavelength:g} x {1e3 * tail.amplitude:g} mm; `spirillum prepare` "
-        "makes one"
+        f"{missing[0].with_tail}; `spirillum prepare` makes one"
     ]
 
 

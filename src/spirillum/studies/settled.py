@@ -50,7 +50,7 @@ class SettledTask(OneRobot):
     @property
     def words(self) -> str:
         """What is computed, in a few words."""
-        return f"let go: {self.tail}"
+        return f"let go: {self.robot.with_tail}"
 
     @property
     def needed(self) -> set[str]:
@@ -100,12 +100,12 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:
     if far:
         found.append(
             f"{len(far)} of {len(answers)} robots yaw further in steady motion than their tables were checked for: "
-            f"their speeds when let go have no error estimate; the first: {far[0].tail}"
+            f"their speeds when let go have no error estimate; the first: {far[0].robot.with_tail}"
         )
     if lost:
         found.append(
             f"{len(lost)} of {len(answers)} robots that were let go have no steady motion, or cannot be followed to "
-            f"it, the first: {lost[0].tail}; `spirillum settle` says why"
+            f"it, the first: {lost[0].robot.with_tail}; `spirillum settle` says why"
         )
     return found
 

@@ -170,12 +170,6 @@ class OneRobot:
         """Name of the file that keeps its answer."""
         return f"part-{self.number:05d}.npz"
 
-    @property
-    def tail(self) -> str:
-        """The robot and its tail, in a few words."""
-        tail = self.robot.tail
-        return f"{self.robot.name}, tail {1e3 * tail.wavelength:g} x {1e3 * tail.amplitude:g} mm"
-
 
 def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
     """A quantity of robots that were followed one by one, over all robots of the study; NaN for those that were not.

@@ -126,8 +126,9 @@ def _why_without_walls(
     if outside:  # a place that was asked for is refused by the model that knows places
         return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
     if (tables_only or motion == "free") and not has_table(batch):
-        lacks = "not every robot has a table" if among else "the robot has no table"
-        return f"{lacks} for its tube yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
+        lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
+        lacks = lacks if among else "the robot has no table for its tube"
+        return f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
     return ""
 
 
