@@ -496,13 +496,12 @@ class CutConstants:
     """Share of the least jump below which two lines meet."""
     unseen: int = 20
     """Frames without the robot over which lines go on: it may be lost where it jumps."""
-    still: float = 0.01
-    """Step of the place from frame to frame below which the picture of the body is repeated, pixels."""
-    frozen: float = 0.95
-    """Share of such steps from which on compression is said to leave out motion, if the place changes by less than
-    `place` in all."""
-    turned: float = 0.1
-    """Least angle by which body or tail turn meanwhile, rad."""
+    advance: float = 0.5
+    """Least advance of a robot that turns, pixels."""
+    tail_turns: float = 1.0
+    """Turns of the tail in which it has to advance by that."""
+    body_turns: float = 0.25
+    """Turns of the body in which it has to."""
 
 
 @dataclass(frozen=True)

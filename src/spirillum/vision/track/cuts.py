@@ -2,7 +2,7 @@
 
 Where a part of the film is missing but time stamps continue evenly, position, body and tail jump on the same frame.
 Where time stamps jump but nothing is missing, the motion continues as if no time had passed. Where strong compression
-repeats the edges of the body from frame to frame, body or tail turn while the place does not change at all.
+repeats the edges of the body, or something that stands still is taken for them, its tail turns and the robot stays.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.warnings import EVERYTHING
 
-__all__ = ["cuts_in", "frozen_place", "jumps_of_time"]
+__all__ = ["cuts_in", "jumps_of_time", "stands_still"]
 
 
 def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
@@ -79,34 +79,37 @@ def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tup
     return (Flag("times-do-not-fit", sentence, EVERYTHING),)
 
 
-def frozen_place(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
-    """Flag a body that turns, or whose tail does, while its place changes by less than any camera's noise.
+def stands_still(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
+    """Flag a robot that turns, but does not advance by half a pixel.
 
-    A video codec repeats parts of a picture that have changed by less than its quantisation; slow motion is left out
-    until it exceeds that.
+    A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong compression
+    leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the body.
 
     Args:
         motion: the robot's motion.
         length_per_pixel: length per pixel, m.
     """
-    _, x, body_angle, tail_phase = motion
-    place = x[np.isfinite(x)] / length_per_pixel
-    if place.size < CUTS.long_window or not any(_turned(angle) for angle in (body_angle, tail_phase)):
+    time, x, body_angle, tail_phase = motion
+    known = np.isfinite(x)
+    turns, turned = (_turned(angle) for angle in (tail_phase, body_angle))
+    if known.sum() < CUTS.long_window or max(turns / CUTS.tail_turns, turned / CUTS.body_turns) < 1.0:
         return ()
-    still = float(np.mean(np.abs(np.diff(place)) < CUTS.still))
-    if still < CUTS.frozen or float(np.ptp(place)) > CUTS.place:
+    line = least_squares_line(time[known], x[known])
+    if abs(line.slope) * float(np.ptp(time[known])) > CUTS.advance * length_per_pixel:
         return ()
+    part = f"its tail turns {turns:.1f} times" if turns >= CUTS.tail_turns else "it turns"
     sentence = (
-        f"the robot turns, but on {100.0 * still:.0f} % of the frames its place is that of the frame before to "
-        f"{CUTS.still:g} pixels, more exactly than a camera's noise allows: strong compression of the video leaves out "
-        "slow motion; neither speed nor the tail's rotation is given: compress the film less"
+        f"{part}, but the robot does not advance by {CUTS.advance:g} pixels: it is stuck, or strong compression of the "
+        "video leaves out slow motion, or something that stands still, such as a cable, is taken for an edge of the "
+        "body; neither speed nor the tail's rotation is given: look at the annotated film"
     )
-    return (Flag("frozen-by-compression", sentence, (*LENGTHS, "tail_rotation_rate")),)
+    return (Flag("does-not-advance", sentence, (*LENGTHS, "tail_rotation_rate")),)
 
 
-def _turned(angle: Samples) -> bool:
+def _turned(angle: Samples) -> float:
+    """Turns from least to largest angle; 0 where unknown."""
     known = angle[np.isfinite(angle)]
-    return bool(known.size and np.ptp(known) > CUTS.turned)
+    return float(np.ptp(known)) / (2.0 * math.pi) if known.size else 0.0
 
 
 def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
