@@ -52,6 +52,7 @@ def test_robots_without_a_table_are_told_and_left_out(let_go) -> None:
     assert "1 of 1 robots have no table of their tube and were not let go in it" in without.attrs["warnings"]
     assert "have no table" not in let_go.attrs["warnings"]
     assert "holds the robots at their places" not in let_go.attrs["warnings"]
+    assert "a settled speed is that of a robot left to itself" in let_go.attrs["warnings"]
 
 
 def ranked(*speeds: float) -> StudyRanking:

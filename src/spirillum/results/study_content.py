@@ -11,7 +11,16 @@ from spirillum.citations import REFERENCES
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.options import ModelOptions, RftOptions, SlenderOptions, TubeOptions
 from spirillum.shown import counted
-from spirillum.studies.ranking import ENDS, RANKED, Best, RankedRobot, StudyRanking, best_in_words, unit_of_ranked
+from spirillum.studies.ranking import (
+    ENDS,
+    RANKED,
+    SETTLED_BASIS,
+    Best,
+    RankedRobot,
+    StudyRanking,
+    best_in_words,
+    unit_of_ranked,
+)
 from spirillum.units import among, display_unit, in_unit
 
 if TYPE_CHECKING:
@@ -45,7 +54,9 @@ def shown_ranking(ranking: StudyRanking, most: int = MOST_RANKED) -> dict[str, A
     return {
         "message": ranking.message,
         "basis": f"model {ranking.model}, friction reading {ranking.friction}"
-        + (", the channel's walls not computed" if ranking.walls else ""),
+        + (", the channel's walls not computed" if ranking.walls else "")
+        + (f"; {SETTLED_BASIS}" if ranking.settled else ""),
+        "first": "Fastest once settled first" if ranking.settled else "Fastest first",
         "ends": ENDS.get(ranking.kind, ""),
         "best": [best_in_words(best.to_dict(), _size(best)) for best in ranking.best],
         "header": ["robot", *(RANKED[name].heading(unit) for name, unit in units.items())],

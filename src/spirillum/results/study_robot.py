@@ -42,8 +42,8 @@ def robot_picture(dataset: xr.Dataset, ranking: StudyRanking) -> Picture | None:
         table = dumps[place]
     robot = _rebuilt(table)
     words = robot_words(robot)
-    drawn = f"Drawn is the fastest: {ranking.robots[0].name}" if ranking.robots else "Drawn is the study's first robot"
-    return Picture("The robot", f"{words} {drawn}.", words, lambda: robot_figure(robot))
+    first = f"the first of the ranking: {ranking.robots[0].name}" if ranking.robots else "the study's first robot"
+    return Picture("The robot", f"{words} Drawn is {first}.", words, lambda: robot_figure(robot))
 
 
 def _rebuilt(table: Mapping[str, Any]) -> Robot:

@@ -29,6 +29,7 @@ __all__ = [
     "ENDS",
     "LET_GO",
     "RANKED",
+    "SETTLED_BASIS",
     "Best",
     "Ranked",
     "RankedRobot",
@@ -70,6 +71,8 @@ RANKED = {
     "shaft_power": Ranked("power", "least power", -1.0),
 }
 """Quantities that rank robots, in the order in which they are shown."""
+SETTLED_BASIS = "settled: by model tube, let go, in steady motion; all else: by the model above, not let go"
+"""What the speed of robots that were let go rests on, and the other quantities do not."""
 ENDS = {"band": "over the gaps and pitches that nobody gave", "interval": "95 % interval"}
 """What low and high are, by the kind of a ranking."""
 
@@ -115,11 +118,11 @@ class Best(NamedTuple):
     of_places: int
     """Number of places at which the robots have answers."""
     spread: float
-    """Largest less least value of all robots, over that of the best."""
+    """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
 
     @property
     def alike(self) -> bool:
-        """Whether the quantity hardly tells the robots apart."""
+        """Whether there are several robots, and the quantity hardly tells them apart."""
         return self.spread < _ALIKE
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,6 +162,11 @@ class StudyRanking:
         return f"{RANKED[by].superlative}: {first.name}, {in_unit(speed, 'm/s', shown)} {shown}{band}"
 
     @property
+    def settled(self) -> bool:
+        """Whether robots were let go, and are ordered by the speed in steady motion."""
+        return LET_GO in self.quantities
+
+    @property
     def quantities(self) -> tuple[str, ...]:
         """Names of the quantities."""
         return tuple(self.robots[0].values) if self.robots else ()
@@ -170,6 +178,7 @@ class StudyRanking:
             "friction": self.friction,
             "walls_left_out": self.walls,
             "low_and_high": self.kind or "none",
+            **({"settled": SETTLED_BASIS} if self.settled else {}),
             "best": [best.to_dict() for best in self.best],
             "robots": [robot.to_dict() for robot in self.robots[:_MOST]],
         }
@@ -220,9 +229,10 @@ def ranking_of(dataset: xr.Dataset) -> StudyRanking:
     chosen = dataset.sel(model=model, friction=reading)
     names = list(_names(dataset))
     known = ["forward_velocity", "hydrodynamic_efficiency", _cost(chosen)]
-    if LET_GO in chosen:
+    if LET_GO in chosen and bool(np.isfinite(chosen[LET_GO].values).any()):
         known.insert(0, LET_GO)
     values = {name: _flat(chosen, name, names) for name in known}
+    values[known[-1]] = np.abs(values[known[-1]])  # a motor that turns the other way draws no less
     low, high, kind = _ends(chosen, known, names)
     order = np.argsort(-values["forward_velocity"], kind="stable")
     order = order[np.isfinite(values["forward_velocity"][order])]
@@ -293,7 +303,8 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     _title, word, sign = RANKED[name]
     among = np.array(list(ranked))
     winner = int(among[np.nanargmax(sign * values[among])])
-    spread = float(np.ptp(values[among][np.isfinite(values[among])]) / max(abs(values[winner]), 1e-300))
+    finite = values[among][np.isfinite(values[among])]
+    spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
     places = chosen.get(f"{name}_at_place")
     if places is None:
         return Best(word, name, ranked[winner], 0, 0, spread)

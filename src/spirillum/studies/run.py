@@ -119,6 +119,7 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
         )
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
+    warnings += [_SETTLED] if loaded.study.settled else []
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
     warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
@@ -128,6 +129,14 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     return warnings + uneven_models(loaded.robots, models, factors)
+
+
+_SETTLED = (
+    "a settled speed is that of a robot left to itself until its motion is steady, which may take minutes, on "
+    "asperities of 1e-4 of its radius and with a friction coefficient of 0.1, both assumed; a trial of some turns lies "
+    "between it and the speed held at a place: `spirillum simulate` follows it, `spirillum settle` says how long it "
+    "takes"
+)
 
 
 def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:
@@ -143,8 +152,9 @@ def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]
     found = {name: model.name for model in models for place in placements for name in left_open(place, model)}
     if loaded.study.band or not found:
         return [] if loaded.study.settled else [held]
+    are = "are" if len(found) > 1 else "is"
     one_place = (
-        f"{' and '.join(found)} are not given: model '{next(iter(found.values()))}' answers at one place, and others "
+        f"{' and '.join(found)} {are} not given: model '{next(iter(found.values()))}' answers at one place, and others "
         "change speeds and perhaps their order; --band computes those, too, in seconds with tables, else in many "
         "minutes"
     )

@@ -94,13 +94,13 @@ def settled_tasks(loaded: LoadedStudy, first: int) -> Iterator[SettledTask]:
 
 def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:
     """Sentences on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
-    lost = [task for task, part in answers if STATES[int(part["state"][0])] not in _LYING]
+    lost = [task for task, part in answers if not np.isfinite(part["forward_velocity"][0])]
     far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
     found = []
     if far:
         found.append(
             f"{len(far)} of {len(answers)} robots yaw further in steady motion than their tables were checked for: "
-            f"their speeds when let go have no error estimate; the first: {far[0].robot.with_tail}"
+            f"their settled speeds have no error estimate; the first: {far[0].robot.with_tail}"
         )
     if lost:
         found.append(
@@ -129,7 +129,7 @@ def settled_variables(
             name, meaning=f"{QUANTITIES[name].meaning}, in steady motion", source="free motion in the tube"
         )
         found[f"{name}_settled"] = (tuple(robots), gathered(answers, name, shape), about)
-    state = np.nan_to_num(gathered(answers, "state", shape)).astype("int8")
+    state = np.clip(np.nan_to_num(gathered(answers, "state", shape)), 0, len(STATES) - 1).astype("int8")
     about = {
         "units": "1",
         "long_name": "what became of a robot that was let go",
@@ -137,5 +137,10 @@ def settled_variables(
         "flag_values": np.arange(len(STATES), dtype="int8"),
         "flag_meanings": " ".join(word.replace(" ", "-") for word in STATES),
     }
-    error = (tuple(robots), gathered(answers, "error_estimate", shape), attributes("error_estimate"))
+    about_error = attributes(
+        "error_estimate",
+        meaning="relative error of the speed in steady motion; NaN beyond the yaws that the table was checked for",
+        source="table of the tube",
+    )
+    error = (tuple(robots), gathered(answers, "error_estimate", shape), about_error)
     return {**found, "error_estimate_settled": error, "settled": (tuple(robots), state, about)}

@@ -53,13 +53,15 @@ def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
         console.print(f"and {len(robots) - rows} more: --rows, ranking.csv", highlight=False)
     for best in ranking["best"]:
         console.print(escape(best_in_words(best)), highlight=False, soft_wrap=True)
-    if ranking["low_and_high"] in ENDS and LET_GO not in robots[0]:
+    if "settled" in ranking:
+        console.print(ranking["settled"], highlight=False)
+    elif ranking["low_and_high"] in ENDS:
         console.print(f"low, high: {ENDS[ranking['low_and_high']]}", highlight=False)
 
 
 def _basis(ranking: Answer) -> str:
     walls = "; the channel's walls are not computed" if ranking["walls_left_out"] else ""
-    first = "fastest once settled first" if LET_GO in ranking["robots"][0] else "fastest first"
+    first = "fastest once settled first" if "settled" in ranking else "fastest first"
     return f"{first}: model {ranking['model']}, friction {ranking['friction']}{walls}"
 
 

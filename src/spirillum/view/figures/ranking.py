@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Values
-from spirillum.studies.ranking import ENDS, RANKED, RankedRobot, StudyRanking, unit_of_ranked
+from spirillum.studies.ranking import ENDS, RANKED, SETTLED_BASIS, RankedRobot, StudyRanking, unit_of_ranked
 from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import COLOURS, PAGE, Scale, new_figure, plain, told_apart
 
@@ -51,19 +51,21 @@ def _drawn(ranking: StudyRanking) -> Figure:
     more = _LINE * title.count("\n")
     figure = new_figure(PAGE, _ENDS + more + _ROW * len(robots))
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
+    ticks = 4 if len(names) < 4 else 2
     for panel, name in zip(panels[0], names, strict=True):
-        _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike})
+        _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike}, ticks)
     first = panels[0][0]
     first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
     figure.suptitle(title, x=0.02, y=1.0 - 0.1 / figure.get_figheight(), ha="left", va="top", weight="bold")
-    by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}." if ranking.walls else "")
+    by = f"Model {ranking.model}, friction {ranking.friction}. " + (f"{_NO_WALLS}. " if ranking.walls else "")
+    by += f"{SETTLED_BASIS[:1].upper()}{SETTLED_BASIS[1:]}." if ranking.settled else ""
     figure.text(0.02, 1.0 - (0.32 + more) / figure.get_figheight(), by, ha="left", va="top", size="small")
     figure.tight_layout(rect=(0.0, 0.0, 1.0, 1.0 - 0.14 / figure.get_figheight()))
     return figure
 
 
-def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, str]) -> None:
+def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, str], ticks: int) -> None:
     """One quantity of all robots: points, and lines over their bands."""
     values, low, high = (_of(robots, which, name) for which in ("values", "low", "high"))
     scale = _scale(np.concatenate([values, high]), unit_of_ranked(name))
@@ -74,7 +76,7 @@ def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[
     for chosen, face in ((winner, colour), (~winner, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
     panel.set_xlabel(RANKED[name].heading(scale.unit))
-    panel.xaxis.set_major_locator(MaxNLocator(4))
+    panel.xaxis.set_major_locator(MaxNLocator(ticks))
     panel.set_xlim(0.0, 1.08 * float(np.nanmax(scale(np.concatenate([values, high])))))
     panel.tick_params(axis="y", length=0)
     for side in ("top", "right", "left"):

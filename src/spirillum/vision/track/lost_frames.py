@@ -250,7 +250,7 @@ def _corrected(lost: np.ndarray, *, doubtful: bool) -> Flag:
 def _uneven(count: int) -> Flag:
     sentence = (
         f"on {count} frames the motion goes on by more than a step while the times go on evenly, but not clearly by "
-        "whole frames: frames were lost, or the motor stutters; nothing is given: record with the camera's own time "
-        "stamps"
+        "whole frames: frames were lost, strong compression of the video holds motion back, or the motor stutters; "
+        "nothing is given: record with the camera's own time stamps, and compress less"
     )
     return Flag("uneven-steps", sentence, EVERYTHING)
