@@ -292,7 +292,8 @@ class TailWave:
             step = np.median(steps, axis=0)
             noise = np.median(spreads, axis=0) + 9.0 * np.eye(3)
             contrast = np.linalg.solve(noise, step)
-            self.contrast = np.asarray(contrast / np.linalg.norm(contrast))
+            if (size := np.linalg.norm(contrast)) > 0.0:  # a flat drawing has places where nothing differs
+                self.contrast = np.asarray(contrast / size)
 
     def _check_shape(self, strips: Sequence[tuple[np.ndarray, _Strip]], fits: Samples, readable: float) -> None:
         """Flag a wavelength or amplitude that fits better than that of the robot file."""
