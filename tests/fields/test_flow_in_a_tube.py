@@ -54,6 +54,17 @@ def test_held_force_is_across_the_tube(swimming: sp.Flow) -> None:
     assert abs(along) < 0.3 * swimming.held_force
 
 
+@pytest.mark.parametrize(("plane", "middle"), [("xz", 0.0), ("xy", 6.0)])
+def test_planes_beside_the_tube_are_refused(robot: sp.Robot, plane: str, middle: float) -> None:
+    """The body, of radius 9 mm, 5 mm above the floor of a tube of 20 mm: its axis is 6 mm below that of the tube."""
+    seat = seat_in_tube(robot, "tube", {"gap": "5 mm"}, None)
+    for side in (-1.0, 1.0):
+        plane_around(robot, plane, f"{middle + side * 19.99} mm", resolution=8, seat=seat)
+        beyond = f"{middle + side * 20.01:g} mm"
+        with pytest.raises(sp.InputError, match=f"offset = {beyond} with plane = '{plane}': the plane lies outside"):
+            plane_around(robot, plane, beyond, resolution=8, seat=seat)
+
+
 def test_grids_end_at_the_glass(swimming: sp.Flow, section: Any) -> None:
     seat, data = swimming.seat, section
     assert seat is not None

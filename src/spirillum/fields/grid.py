@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import Seat
+from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,10 +71,18 @@ def plane_grid(
         seat: the robot's place in a tube, beyond whose glass there is no grid.
 
     Raises:
-        InputError: if the grid would be too small or too large.
+        InputError: if the grid would be too small or too large, or the plane lies outside the tube.
     """
-    box = {axis: side for axis, side in _box(robot, margin, seat).items() if axis in plane}
-    return _grid(box, {PLANES[plane]: np.array([offset])}, resolution, "resolution")
+    box, across = _box(robot, margin, seat), PLANES[plane]
+    if seat is not None and across != "x":
+        low, high = _glass(box["x"], seat, seat.radius)[across]
+        if not low < offset < high:
+            raise InputError(
+                f"offset = {show(offset, 'mm')} with plane = '{plane}': the plane lies outside the tube; allowed: "
+                f"between {show(low, 'mm')} and {show(high, 'mm')}"
+            )
+    sides = {axis: side for axis, side in box.items() if axis in plane}
+    return _grid(sides, {across: np.array([offset])}, resolution, "resolution")
 
 
 def volume_grid(robot: Robot, margin: float | None, resolution: int, seat: Seat | None = None) -> Grid:
@@ -116,15 +125,21 @@ def _in_glass(box: dict[str, tuple[float, float]], seat: Seat, *, whole: bool) -
         whole: show all of a tube that is not much wider than the box.
     """
     reach = (1.0 + _GLASS) * seat.radius
-    start, forward = seat.offset * seat.across[0], seat.forward  # the tube's axis in body axes
-    glass = {}
-    for axis, index in (("y", 1), ("z", 2)):
-        middles = [start[index] + (x - start[0]) * forward[index] / forward[0] for x in box["x"]]
-        half = reach / np.sqrt(1.0 - forward[index] ** 2)
-        glass[axis] = (min(middles) - half, max(middles) + half)
+    glass = _glass(box["x"], seat, reach)
     if whole and reach < _WIDEST * box["y"][1]:
         return {**box, **glass}
     return {**box, **{axis: (max(box[axis][0], low), min(box[axis][1], high)) for axis, (low, high) in glass.items()}}
+
+
+def _glass(ends: tuple[float, float], seat: Seat, reach: float) -> dict[str, tuple[float, float]]:
+    """Least and largest y and z in body axes of points at most `reach` from a tube's axis, between two ends along x."""
+    start, forward = seat.offset * seat.across[0], seat.forward  # the tube's axis in body axes
+    glass = {}
+    for axis, index in (("y", 1), ("z", 2)):
+        middles = [start[index] + (x - start[0]) * forward[index] / forward[0] for x in ends]
+        half = reach / np.sqrt(1.0 - forward[index] ** 2)
+        glass[axis] = (min(middles) - half, max(middles) + half)
+    return glass
 
 
 def _grid(box: dict[str, tuple[float, float]], fixed: dict[str, Samples], resolution: int, name: str) -> Grid:
