@@ -12,16 +12,14 @@ import numpy as np
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.kernels.compiled import rows_in_one_thread
 from spirillum.studies.band import BandTask
-from spirillum.studies.laid_down import LaidDownTask
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays, observed_at
-from spirillum.studies.settled import SettledTask
-from spirillum.studies.work import Indices, Part, Task, answer
+from spirillum.studies.work import Indices, OneRobot, Part, Task, answer
 
 __all__ = ["AnyTask", "Job", "answered", "job_of", "one_thread_each"]
 
 
-AnyTask = Task | BandTask | LaidDownTask | SettledTask
+AnyTask = Task | BandTask | OneRobot
 
 
 class Job(NamedTuple):
@@ -49,7 +47,7 @@ def job_of(task: AnyTask, loaded: LoadedStudy, observed: ObservedArrays | None) 
 def answered(numbered: tuple[int, Job]) -> Part:
     """The answer of a job."""
     task, loaded, observed = numbered[1]
-    if isinstance(task, LaidDownTask | SettledTask):
+    if isinstance(task, OneRobot):
         return task.answer()
     with one_thread_each(task.model):
         return task.answer(loaded.study.friction) if isinstance(task, BandTask) else answer(task, loaded, observed)

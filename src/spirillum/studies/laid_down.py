@@ -9,7 +9,7 @@ reads it, and put through the paper's inference: B_eff by (18), the factor on th
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,9 +20,6 @@ from spirillum.dynamics.simulation import simulate
 from spirillum.dynamics.tube_integration import INTERRUPTED
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.fluid.tube.domain import tube_radius
-from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.studies.factorial import Levels, half_fraction
@@ -44,7 +41,6 @@ __all__ = [
     "WINDOWS",
     "Laid",
     "LaidDownTask",
-    "has_table",
     "laid_down_runs",
     "laid_down_tasks",
     "levels",
@@ -97,14 +93,6 @@ def levels_of_readings() -> Levels:
     return np.concatenate([np.repeat(runs, len(WINDOWS), axis=0), windows], axis=1)
 
 
-def has_table(robot: Robot) -> bool:
-    """Whether the robot's tube has a table: without one a run would begin with minutes of preparation."""
-    if robot.channel is None:
-        return False
-    batch = RobotBatch.of(robot)
-    return find_table(RobotGeometry.of(batch), tube_radius(batch)) is not None
-
-
 def laid_down_runs(robot: Robot, ranges: LaidDown) -> list[Laid]:
     """How a robot is laid down in each run; its steepest pitch is what gap and tail allow."""
     batch, found = RobotBatch.of(robot), []
@@ -130,11 +118,6 @@ class LaidDownTask(OneRobot):
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
         return {*AT_RUNS, *INFERRED, "laid_pitch"}
-
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-        return self.needed
 
     def answer(self) -> Part:
         """Every quantity of every run: (1, runs, windows), what is inferred with one more axis for `INFERRED_BY`.
@@ -232,16 +215,17 @@ def inferred(robot: Robot, seen: Part) -> Part:
     return {name: np.stack(values, axis=-1).reshape(*shape, len(INFERRED_BY)) for name, values in columns.items()}
 
 
-def laid_down_tasks(loaded: LoadedStudy, first: int) -> Iterator[LaidDownTask]:
-    """One task for each robot with a table, numbered from `first`; none where none is asked for."""
-    if not loaded.study.predicted:
-        return
-    number = first
-    for index in range(loaded.count):
-        robot = loaded.robot_at(index)
-        if has_table(robot):
+def laid_down_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[LaidDownTask]:
+    """One task for each robot, numbered from `first`; none where none is asked for.
+
+    Args:
+        loaded: the study.
+        robots: those with a table, by their index in the flat order of the study.
+        first: number of the first task.
+    """
+    if loaded.study.predicted:
+        for number, (index, robot) in enumerate(robots.items(), start=first):
             yield LaidDownTask(number, index, robot, loaded.study.laid_down)
-            number += 1
 
 
 def without_answer(parts: Iterable[Part]) -> list[str]:

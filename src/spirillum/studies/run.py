@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from spirillum.crews import Crew, shared_out
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.batch import RobotBatch
+from spirillum.robot.robot import Robot
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.dataset import assembled
 from spirillum.studies.jobs import AnyTask, answered, job_of
-from spirillum.studies.laid_down import has_table, laid_down_tasks, without_answer
+from spirillum.studies.laid_down import laid_down_tasks, without_answer
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.settled import not_settled, settled_tasks
@@ -22,6 +24,7 @@ from spirillum.studies.work import OneRobot, Task, cautions, keep, kept, summed,
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
+from spirillum.swimming.model_choice import has_table
 from spirillum.version import own_version
 
 if TYPE_CHECKING:
@@ -59,8 +62,10 @@ def computed_study(
     """
     todo: list[Task | BandTask] = list(tasks(loaded))
     todo += band_tasks(loaded, len(todo))
-    runs = list(laid_down_tasks(loaded, len(todo)))
-    let_go = list(settled_tasks(loaded, len(todo) + len(runs)))
+    followed = loaded.study.predicted or loaded.study.settled
+    with_table = _with_table(loaded) if followed else {}
+    runs = list(laid_down_tasks(loaded, with_table, len(todo)))
+    let_go = list(settled_tasks(loaded, with_table, len(todo) + len(runs)))
     asked: list[AnyTask] = [*todo, *runs, *let_go]
     found = {task.number: kept(task, parts, _leading(task, loaded)) for task in asked}
     missing = [task for task in asked if found[task.number] is None]
@@ -83,8 +88,8 @@ def computed_study(
     warnings = warnings_of(loaded)
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
-    if loaded.study.predicted or loaded.study.settled:
-        warnings += without_table(loaded)
+    if followed:
+        warnings += _without_table(loaded, with_table)
     warnings += without_answer(part for _, part in laid_down)
     warnings += not_settled(settled)
     warnings += warnings_of_calibrations(loaded)
@@ -171,9 +176,15 @@ def warnings_of_calibrations(loaded: LoadedStudy) -> list[str]:
     )
 
 
-def without_table(loaded: LoadedStudy) -> list[str]:
+def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
+    """Robots that have a table of their tube, by their index in the flat order of the study."""
+    every = ((index, loaded.robot_at(index)) for index in range(loaded.count))
+    return {index: robot for index, robot in every if robot.channel and has_table(RobotBatch.of(robot))}
+
+
+def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[str]:
     """A sentence on the robots that are not followed in their tubes for want of a table; none where all are."""
-    missing = [robot for robot in map(loaded.robot_at, range(loaded.count)) if not has_table(robot)]
+    missing = [loaded.robot_at(index) for index in range(loaded.count) if index not in with_table]
     if not missing:
         return []
     return [

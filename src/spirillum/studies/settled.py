@@ -6,7 +6,7 @@ film, contact and its own motion decide where it lies, and so how fast it swims.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from spirillum.dynamics.free_motion import free_motion
 from spirillum.errors import InputError
 from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.placement import Placement
-from spirillum.studies.laid_down import has_table
+from spirillum.robot.robot import Robot
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.work import OneRobot, Part, gathered
 
@@ -36,8 +36,6 @@ PLACE = ("gap", "pitch", "yaw", "azimuth")
 """Where a robot lies in it."""
 STATES = ("not followed", "steady", "orbits", "goes around", "changing")
 """What became of a robot; the index in this list is the value in the dataset."""
-_LYING = ("steady", "orbits", "goes around")
-"""States whose means do not depend on when they are taken."""
 
 
 @dataclass(frozen=True)
@@ -57,11 +55,6 @@ class SettledTask(OneRobot):
         """Names of the arrays of its answer."""
         return {*SETTLED, *PLACE, "error_estimate", "state"}
 
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-        return self.needed
-
     def answer(self) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
         nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate")}
@@ -72,7 +65,7 @@ class SettledTask(OneRobot):
         lying = found.lying
         assert lying is not None  # noqa: S101 - a free motion has one
         state = np.array([float(STATES.index(lying.state))])
-        if lying.state not in _LYING:
+        if lying.state == "changing":  # its means depend on when they are taken
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
         values |= {name: float(getattr(lying, name)) for name in PLACE}
@@ -80,16 +73,18 @@ class SettledTask(OneRobot):
         return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
 
 
-def settled_tasks(loaded: LoadedStudy, first: int) -> Iterator[SettledTask]:
-    """One task for each robot with a table, numbered from `first`; none where none is asked for."""
-    if not loaded.study.settled:
-        return
-    number, tails = first, loaded.count // len(loaded.robots)
-    for index in range(loaded.count):
-        robot = loaded.robot_at(index)
-        if has_table(robot):
+def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) -> Iterator[SettledTask]:
+    """One task for each robot, numbered from `first`; none where none is asked for.
+
+    Args:
+        loaded: the study.
+        robots: those with a table, by their index in the flat order of the study.
+        first: number of the first task.
+    """
+    if loaded.study.settled:
+        tails = loaded.count // len(loaded.robots)
+        for number, (index, robot) in enumerate(robots.items(), start=first):
             yield SettledTask(number, index, robot, loaded.placement_of(index // tails))
-            number += 1
 
 
 def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zipfile
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -147,7 +148,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class OneRobot:
+class OneRobot(ABC):
     """One robot that is followed in its tube, as a task of its own."""
 
     number: int
@@ -169,6 +170,25 @@ class OneRobot:
     def file_name(self) -> str:
         """Name of the file that keeps its answer."""
         return f"part-{self.number:05d}.npz"
+
+    @property
+    @abstractmethod
+    def words(self) -> str:
+        """What is computed, in a few words."""
+
+    @property
+    @abstractmethod
+    def needed(self) -> set[str]:
+        """Names of the arrays of its answer."""
+
+    @property
+    def allowed(self) -> set[str]:
+        """Names of the arrays that an answer may have."""
+        return self.needed
+
+    @abstractmethod
+    def answer(self) -> Part:
+        """Its answer, with one robot along the first axis of every array."""
 
 
 def gathered(answers: Sequence[tuple[OneRobot, Part]], name: str, shape: Sequence[int]) -> Values:
