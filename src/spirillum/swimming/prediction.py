@@ -260,6 +260,7 @@ def predict(
     if not chosen.closed_form:
         slow = chosen.form == "direct" and batch.placement.yaw != 0.0
         tell(YAWED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+    check = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = case.swim(batch)
     if not result.valid[0]:
         raise InputError(case.why_not())
@@ -268,7 +269,7 @@ def predict(
         *([choice.caution] if choice.caution else []),
         *case.warnings(result, names_friction=names_friction),
     ]
-    error = case.error_estimate(result)
+    error = case.error_estimate(result, check)
     with_band = band is True or (band is None and (chosen.closed_form or chosen.form == "table"))
     over = band_of(batch, chosen, result, case.swim, tell) if with_band else None
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
@@ -321,12 +322,16 @@ class _Case:
             motion=self.motion,
         )
 
-    def error_estimate(self, result: Swimming) -> float:
+    def checked(self) -> Swimming | None:
+        """Steady swimming at another resolution, which tells the error; None where the model is checked by none."""
+        other = self.model.checked_by(self.robot.model)
+        return None if other is None else self.swim(self.batch, other)
+
+    def error_estimate(self, result: Swimming, check: Swimming | None) -> float:
         """Relative difference of the forward velocity from another resolution; NaN for a model in closed form."""
-        check = self.model.checked_by(self.robot.model)
         if check is None:
             return self.model.stated_speed_error(self.batch)
-        return float(speed_difference(self.swim(self.batch, check), result)[0])
+        return float(speed_difference(check, result)[0])
 
     def warnings(self, result: Swimming, *, names_friction: bool) -> list[str]:
         """What to be careful about in the answer: calibration, accuracy, drive, what a free motion leaves out.

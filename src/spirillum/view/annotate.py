@@ -179,7 +179,7 @@ def _degrees(angle: float) -> str:
 def annotated_film(
     path: Path, robot: Robot, words: dict[str, str], thumbnail: Callable[[bytes], None] | None = None
 ) -> Iterator[Callable[[int, np.ndarray, Seen], None]]:
-    """A film of annotated frames at their true times, encoded by a thread of its own.
+    """A film of annotated frames at their true times, drawn and encoded by a thread of its own.
 
     Args:
         path: the file, `.mp4`.
@@ -191,14 +191,18 @@ def annotated_film(
         InputError: if a package is missing, or no encoder is there.
     """
     annotator = Annotator(robot)
-    writer = _Writer(path, words)
     kept: list[np.ndarray] = []
 
-    def on_frame(index: int, image: np.ndarray, seen: Seen) -> None:
+    def drawn(index: int, image: np.ndarray, seen: Seen) -> np.ndarray:
         picture = annotator.draw(image, seen)
         if seen.pose is not None and (not kept or index & (index - 1) == 0):
             kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
-        writer.add(picture, seen.time)
+        return picture
+
+    writer = _Writer(path, words, drawn)
+
+    def on_frame(index: int, image: np.ndarray, seen: Seen) -> None:
+        writer.add((index, image, seen))
 
     try:
         yield on_frame
@@ -215,21 +219,25 @@ def _jpeg(picture: np.ndarray) -> bytes:
     return bytes(data) if good else b""
 
 
-class _Writer:
-    """Frames with times into H.264; the film starts with the first frame's time."""
+_Frame = tuple[int, np.ndarray, Seen]
+"""A frame's number, its picture and its observation."""
 
-    def __init__(self, path: Path, words: dict[str, str]) -> None:
+
+class _Writer:
+    """Draws frames and writes them to H.264; the film starts with the first frame's time."""
+
+    def __init__(self, path: Path, words: dict[str, str], drawn: Callable[[int, np.ndarray, Seen], np.ndarray]) -> None:
         required("av", "an annotated video", "video")  # said here, before any frame is tracked
-        self._path, self._words = path, words
-        self._queue: Queue[tuple[np.ndarray, float] | None] = Queue(_WAITING)
+        self._path, self._words, self._drawn = path, words, drawn
+        self._queue: Queue[_Frame | None] = Queue(_WAITING)
         self._error: BaseException | None = None
         self._ended = False
         self._thread = Thread(target=self._run, name="encoding", daemon=True)
         self._thread.start()
 
-    def add(self, image: np.ndarray, time: float) -> None:
+    def add(self, frame: _Frame) -> None:
         """Append a frame."""
-        self._queue.put((image, time))
+        self._queue.put(frame)
 
     def close(self) -> None:
         """Write what is left."""
@@ -253,7 +261,7 @@ class _Writer:
         while not self._ended:  # after an error, so that nobody waits for a place in the queue
             self._next()
 
-    def _next(self) -> tuple[np.ndarray, float] | None:
+    def _next(self) -> _Frame | None:
         item = self._queue.get()
         self._ended = item is None
         return item
@@ -262,8 +270,8 @@ class _Writer:
         item = self._next()
         if item is None:
             raise InputError(f"{self._path.name} has no frames; allowed: a video with at least one")
-        height, width = (even - even % 2 for even in item[0].shape[:2])
-        size, first, last = (width, height), item[1], -1
+        height, width = (even - even % 2 for even in item[1].shape[:2])
+        size, first, last = (width, height), item[2].time, -1
         with h264_writer(
             self._path,
             size,
@@ -276,6 +284,6 @@ class _Writer:
             extra="video",
         ) as film:
             while item is not None:
-                last = max(last + 1, round((item[1] - first) * _TICKS))
-                film.add(item[0][:height, :width], last)
+                last = max(last + 1, round((item[2].time - first) * _TICKS))
+                film.add(self._drawn(*item)[:height, :width], last)
                 item = self._next()
