@@ -16,6 +16,7 @@ BODIES = {
     "ball": Outline((Arc((0.0, 0.0), (0.4, 0.4), (0.0, np.pi)),), ()),
     "capsule": body_outline("capsule", 0.8, 1.2, 0.0, "hemisphere", "flat"),
 }
+ROUND_AND_EDGED = [pytest.param("ball", marks=pytest.mark.slow), "capsule"]
 MIRROR = np.array([1, -1, 1, -1, 1, -1] * 2 + [1.0])  # y to -y
 
 
@@ -57,7 +58,7 @@ def in_other_axes(matrix: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     return turned
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", ROUND_AND_EDGED)
 def test_mirror_image(body: str) -> None:
     """Yaw, phase and hand mirrored: so is everything."""
     for pitch, yaw in ((0.1, 0.15), (0.0, -0.1))[: 1 if body == "capsule" else 2]:
@@ -84,7 +85,7 @@ def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
     assert difference(below, in_other_axes(above, half)) < 1e-8
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", ROUND_AND_EDGED)
 def test_reciprocal_positive_and_continuous(body: str) -> None:
     """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
     found = held_in_tube(solids(body, Seat(1.0, 0.2, 0.1, yaw=0.15), 1e-3), [(coil(0.7), 1)])
