@@ -51,6 +51,22 @@ def test_wrong_moments_are_refused(run: xr.Dataset, time: str, options: dict[str
         sp.flow_of_run(run, time, **options)
 
 
+def test_a_thin_film_is_drawn_as_thick_as_a_fiftieth_of_the_body(run: xr.Dataset, monkeypatch: Any) -> None:
+    """Of a yawed robot a thinner one takes many minutes; nothing is solved here."""
+    lying = run.isel(time=[0]).assign(wall_gap=("time", [1e-6]), wall_yaw=("time", [0.06]), offset=("time", [0.011]))
+    asked: list[Any] = []
+
+    def field(batch: Any, *_: Any) -> None:
+        asked.append(batch.placement)
+        raise sp.InputError("enough")
+
+    monkeypatch.setattr("spirillum.dynamics.flow_of_run.tube_flow_field", field)
+    with pytest.raises(sp.InputError, match="enough"):
+        sp.flow_of_run(lying, 0.0)
+    assert asked[0].gap == pytest.approx(0.02 * sp.load("biorob2012-wide").body.diameter)
+    assert asked[0].yaw == 0.06
+
+
 def test_another_run_is_refused(run: xr.Dataset) -> None:
     with pytest.raises(sp.InputError, match="the run has no wall_yaw; allowed: a free run in a tube"):
         sp.flow_of_run(run.drop_vars("wall_yaw"), 0.0)

@@ -73,7 +73,11 @@ class Flow(Shown):
     frame: Frame
     """`lab` (that of the channel; unbounded fluid rests far away) or `body` (moving with the forward velocity)."""
     held_force: float = 0.0
-    """Sideways force that holds the lateral motion at this phase, N; far away in unbounded fluid the flow is its."""
+    """Sideways force on the robot from outside, N.
+
+    Of a robot whose lateral motion is held: what holds it at this phase; far away in unbounded fluid the flow is its.
+    At a moment of a free run: weight, contact and a field.
+    """
 
     @property
     def robot(self) -> Robot:

@@ -37,6 +37,7 @@ _SPEED_DECADES = 3.0
 _PRESSURE_DECADES = 2.0
 """Range of the pressure's logarithmic colours on each side; below it they are linear."""
 _LINES_PER_INCH = 0.36
+_HELD = "Held from moving sideways by"
 _LINES = "direction of the velocity's part in the plane"
 
 
@@ -311,7 +312,9 @@ def _place(flow: Flow, lengths: Scale) -> Iterator[str]:
         yield f"tail lowered by {placement['tail_drop']['value'] / lengths.factor:.4g} {lengths.unit}"
     mean = Scale.of(np.array([motion.plug_velocity]), "m/s")
     through = f"{motion.plug_velocity / mean.factor:.4g} {mean.unit}"
-    if motion.batch.placement.flow is not None:
+    if motion.motion == "free":  # a moment of a run, which tells how its ends and an imposed flow drive the fluid
+        yield f"mean flow {through}"
+    elif motion.batch.placement.flow is not None:
         yield f"imposed mean flow {through}"
     elif placement["ends"] == "closed":
         yield "ends closed"
@@ -330,6 +333,7 @@ def _notes(flow: Flow, view: _View) -> Iterator[str]:
     held = ""
     if flow.held_force > 0:
         force = Scale.of(np.array([flow.held_force]), "N")
-        held = f" Held from moving sideways by {flow.held_force / force.factor:.2g} {force.unit}."
+        words = "Weight and contact push it sideways with" if flow.prediction.motion == "free" else _HELD
+        held = f" {words} {flow.held_force / force.factor:.2g} {force.unit}."
     walls = "Unbounded fluid: no walls." if flow.seat is None else "Pressure: above the mean of the tube's ends."
     yield f"{walls}{held} Computed, nothing is measured."
