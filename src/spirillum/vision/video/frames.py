@@ -323,7 +323,9 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
     if not names:
         raise InputError(f"{path} holds no images; allowed: {_WHAT}")
     if frames_per_second is None:
-        raise InputError(f"camera.frames_per_second is missing; {path} is a folder of images and needs it")
+        raise InputError(
+            f"camera.frames_per_second is missing, but {path} is a folder of images; allowed: their rate, 0.01 to 1e5"
+        )
     names.sort(key=lambda entry: [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", entry.name)])
     ends = [re.findall(r"\d+", entry.stem)[-1:] for entry in names]
     numbers = np.array([int(end[0]) for end in ends]) if all(ends) else np.arange(len(names))
