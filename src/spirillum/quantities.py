@@ -191,6 +191,13 @@ _ROTATING_FIELD = (
 _IN_THE_TUBE = (
     Quantity("gap", "", "m", "smallest distance of body and glass", "geometry"),
     Quantity("azimuth", "", "rad", "azimuth of the body's centre about +x from the lowest place", "force balance"),
+    Quantity(
+        "approach_time",
+        "",
+        "s",
+        "time in which a small distance from the steady motion falls by e",
+        "motion in the tube",
+    ),
     Quantity("sideways_force", "", "N", "force of the fluid along the wall, towards +y", "model tube"),
     Quantity("normal_force", "", "N", "force of the fluid away from the wall", "model tube"),
     Quantity("pitching_torque", "", "N m", "torque of the fluid about mid-length, nose up", "model tube"),

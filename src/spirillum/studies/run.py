@@ -19,7 +19,7 @@ from spirillum.studies.jobs import AnyTask, answered, job_of
 from spirillum.studies.laid_down import laid_down_tasks, without_answer
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
-from spirillum.studies.settled import not_settled, settled_tasks
+from spirillum.studies.settled import not_settled, settled_basis, settled_tasks
 from spirillum.studies.work import OneRobot, Task, cautions, keep, kept, summed, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
@@ -124,7 +124,7 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
         )
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
-    warnings += [_SETTLED] if loaded.study.settled else []
+    warnings += [settled_basis(loaded.study.contact)] if loaded.study.settled else []
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
     warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
@@ -134,14 +134,6 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
     models = loaded.study.models
     factors = [name for name in models if any(name in robot.calibration for robot in loaded.robots)]
     return warnings + uneven_models(loaded.robots, models, factors)
-
-
-_SETTLED = (
-    "a settled speed is that of a robot left to itself until its motion is steady, which may take minutes, on "
-    "asperities of 1e-4 of its radius and with a friction coefficient of 0.1, both assumed; a trial of some turns lies "
-    "between it and the speed held at a place: `spirillum simulate` follows it, `spirillum settle` says how long it "
-    "takes"
-)
 
 
 def _of_places(loaded: LoadedStudy, models: Sequence[SwimmerModel]) -> list[str]:

@@ -18,9 +18,20 @@ from spirillum.quantities import QUANTITIES, attributes
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.loading import LoadedStudy
+from spirillum.studies.spec import Contact
 from spirillum.studies.work import OneRobot, Part, gathered
+from spirillum.units import show
 
-__all__ = ["PLACE", "SETTLED", "STATES", "SettledTask", "not_settled", "settled_tasks", "settled_variables"]
+__all__ = [
+    "PLACE",
+    "SETTLED",
+    "STATES",
+    "SettledTask",
+    "not_settled",
+    "settled_basis",
+    "settled_tasks",
+    "settled_variables",
+]
 
 SETTLED = (
     "forward_velocity",
@@ -32,8 +43,8 @@ SETTLED = (
     "hydrodynamic_efficiency",
 )
 """Quantities of a steady motion."""
-PLACE = ("gap", "pitch", "yaw", "azimuth")
-"""Where a robot lies in it."""
+PLACE = ("gap", "pitch", "yaw", "azimuth", "approach_time")
+"""Where a robot lies in it, and how fast it comes there."""
 STATES = ("not followed", "steady", "orbits", "goes around", "changing")
 """What became of a robot; the index in this list is the value in the dataset."""
 
@@ -44,6 +55,8 @@ class SettledTask(OneRobot):
 
     placement: Placement
     """Where it is laid down."""
+    contact: Contact
+    """What it rests on."""
 
     @property
     def words(self) -> str:
@@ -59,7 +72,12 @@ class SettledTask(OneRobot):
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
         nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate")}
         try:
-            found = free_motion(self.robot, placement=self.placement).prediction
+            found = free_motion(
+                self.robot,
+                placement=self.placement,
+                roughness=self.contact.roughness,
+                in_tube={"friction_coefficient": self.contact.friction_coefficient},
+            ).prediction
         except InputError:
             return {**nothing, "state": np.zeros(1)}
         lying = found.lying
@@ -84,7 +102,22 @@ def settled_tasks(loaded: LoadedStudy, robots: Mapping[int, Robot], first: int) 
     if loaded.study.settled:
         tails = loaded.count // len(loaded.robots)
         for number, (index, robot) in enumerate(robots.items(), start=first):
-            yield SettledTask(number, index, robot, loaded.placement_of(index // tails))
+            yield SettledTask(number, index, robot, loaded.placement_of(index // tails), loaded.study.contact)
+
+
+def settled_basis(contact: Contact) -> str:
+    """What settled speeds are, and rest on, a sentence.
+
+    Args:
+        contact: of the robots with the glass.
+    """
+    height = "1e-4 of its radius" if contact.roughness is None else show(contact.roughness, "um")
+    return (
+        "a settled speed is that of a robot left to itself until its motion is steady, which may take minutes, on "
+        f"asperities of {height} and with a friction coefficient of {contact.friction_coefficient:g}, both assumed; a "
+        "trial of some turns lies between it and the speed held at a place: `spirillum simulate` follows it, "
+        "`spirillum settle` says how long it takes"
+    )
 
 
 def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT
 from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.arguments import in_range
@@ -17,7 +18,7 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz, show
 
-__all__ = ["LARGEST_STORED", "Grid", "LaidDown", "Study"]
+__all__ = ["LARGEST_STORED", "Contact", "Grid", "LaidDown", "Study"]
 
 _MOST_ROBOTS = 100_000
 """Most robots that are loaded one by one."""
@@ -80,6 +81,15 @@ class LaidDown(Section):
         return self
 
 
+class Contact(Section):
+    """What robots rest on that are followed to their steady motions; assumed."""
+
+    roughness: Length | None = None
+    """Height of the asperities; unset: 1e-4 of the body's radius."""
+    friction_coefficient: _Coefficient = FRICTION_COEFFICIENT
+    """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
+
+
 _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 
 
@@ -116,6 +126,8 @@ class Study(Section):
     """Between what they are laid down."""
     settled: Annotated[bool, Field(strict=True)] = False
     """Let the robots go in their tubes, and follow each of them to its steady motion too: some seconds a robot."""
+    contact: Contact = Contact()
+    """What these robots rest on."""
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
