@@ -29,6 +29,12 @@ GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\
         (GRID.replace("biorob2012-wide", "missing.toml"), "missing.toml does not exist"),
         ('robots = ["biorob2012-wide", "none.toml"]\n', "none.toml does not exist"),
         ("robots = []\n", "robots"),
+        ('robots = ["biorob2012-wide", "biorob2012-wide"]\n', "biorob2012-wide are the same; allowed: each once"),
+        (
+            'robots = ["biorob2012-wide"]\nvary = {"tail.length" = ["40 mm", "4 cm"]}\n',
+            "tail.length = 40 mm and biorob2012-wide, tail.length = 4 cm are the same",
+        ),
+        ("settled = 1\n" + GRID, "settled = 1 is not allowed; allowed: true or false"),
         ("a = [[[[", "is not TOML"),
         ("a = " + "[" * 5000 + "]" * 5000, "nested too deeply"),
     ],

@@ -101,6 +101,8 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
         "int_from_float": "a whole number",
         "float_parsing": "a number",
         "float_type": "a number",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
     }
     if kind in words:
         return words[kind]

@@ -138,6 +138,8 @@ def load_study(
         raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
     entries = list(_entries_of(study))
     robots = tuple(_robot(entry, folder, {**(overrides or {}), **varied}) for entry, varied in entries)
+    if study.grid is None:
+        _check_different(robots, entries, name)
     robots = _named_apart(robots, [varied for _, varied in entries])
     _check_drives(study, [entry for entry, _ in entries], robots, name)
     for option in ("predicted", "settled"):
@@ -197,6 +199,23 @@ def _entries_of(study: Study) -> Iterator[tuple[str, dict[str, Any]]]:
     for source in sources:
         for values in product(*study.vary.values()):
             yield source, dict(zip(study.vary, values, strict=True))
+
+
+def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[str, Any]]], name: str) -> None:
+    """Refuse a robot that stands twice in a list, or one value of a varied field in two spellings.
+
+    Raises:
+        InputError: for such a study.
+    """
+    seen: dict[str, int] = {}
+    for number, robot in enumerate(robots):
+        first = seen.setdefault(robot.model_dump_json(), number)
+        if first != number:
+            one, other = (
+                ", ".join([source, *(f"{path} = {value}" for path, value in varied.items())])
+                for source, varied in (entries[first], entries[number])
+            )
+            raise InputError(f"{name}: robots {one} and {other} are the same; allowed: each once")
 
 
 def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]]) -> tuple[Robot, ...]:
