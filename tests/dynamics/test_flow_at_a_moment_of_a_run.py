@@ -67,6 +67,19 @@ def test_a_thin_film_is_drawn_as_thick_as_a_fiftieth_of_the_body(run: xr.Dataset
     assert asked[0].yaw == 0.06
 
 
+def test_damaged_runs_are_refused(run: xr.Dataset) -> None:
+    time = run["time"].to_numpy().copy()
+    time[3] = np.nan
+    for times in (run.isel(time=slice(0, 0)), run.isel(time=slice(None, None, -1)), run.assign_coords(time=time)):
+        with pytest.raises(sp.InputError, match="time of the run has no values, or does not increase"):
+            sp.flow_of_run(times, 0.05)
+    for name in ("velocity", "tail_phase", "angular_velocity"):
+        with pytest.raises(sp.InputError, match=f"{name} of the run at time = .* is no finite number"):
+            sp.flow_of_run(run.assign({name: run[name] * np.nan}), 0.05)
+        with pytest.raises(sp.InputError, match=f"the run has no {name}"):
+            sp.flow_of_run(run.drop_vars(name), 0.05)
+
+
 def test_another_run_is_refused(run: xr.Dataset) -> None:
     with pytest.raises(sp.InputError, match="the run has no wall_yaw; allowed: a free run in a tube"):
         sp.flow_of_run(run.drop_vars("wall_yaw"), 0.0)

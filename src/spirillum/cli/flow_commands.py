@@ -112,6 +112,7 @@ def flow(
     from spirillum.fields.answer import flow_answer
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
+    from spirillum.fluid.tube.announced import OF_A_RUN
     from spirillum.results.flow import check_targets, write_flow
 
     check_targets(output, volume)
@@ -148,7 +149,7 @@ def flow(
             return flow_of_run(run, str(time), frame=frame, resolution=fineness)
 
     with renderer.progress_bar(quiet=json) as progress:
-        progress("flow: forces on the robot", 0, 1)
+        progress("flow: forces on the robot" if run is None else OF_A_RUN, 0, 1)
         found = around()
         written = {}
         if output is not None:

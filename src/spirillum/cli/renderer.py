@@ -90,9 +90,9 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     of their own on standard error in any case.
     """
     from spirillum.crews import ESTIMATE
-    from spirillum.fluid.tube.announced import ANNOUNCED, YAWED
+    from spirillum.fluid.tube.announced import ANNOUNCED, OF_A_RUN, YAWED
 
-    lines = (ANNOUNCED, ESTIMATE, YAWED)
+    lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, YAWED)
     console = Console(stderr=True, soft_wrap=True)
     if quiet:
 

@@ -33,8 +33,11 @@ if TYPE_CHECKING:
 
 __all__ = ["flow_of_run"]
 
-_NEEDED = ("offset", "azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow", "attitude", "velocity")
-"""What a run in a tube has beside that of any free run."""
+_NEEDED = (
+    *("time", "azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow", "attitude", "velocity", "angular_velocity"),
+    *("tail_phase", "motor_rotation_rate", "body_rotation_rate", "tail_rotation_rate"),
+)
+"""What a run in a tube has, and what its flow follows from."""
 
 _TOLERANCE, _ORDER = 0.03, 4
 """Of a picture: against the tolerance 0.001 and 8 nodes of a panel, forces differ by 0.2 percent."""
@@ -75,11 +78,19 @@ def flow_of_run(
             f"the run has no {missing[0]}; allowed: a free run in a tube, by `spirillum simulate --model tube`"
         )
     times = np.asarray(dataset["time"].values, dtype=float)
+    if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+        raise InputError("time of the run has no values, or does not increase; allowed: samples one after the other")
     if not times[0] <= moment <= times[-1]:
         raise InputError(
             f"time = {show(moment, 's')} is outside the run; allowed: {show(times[0], 's')} to {show(times[-1], 's')}"
         )
     now = dataset.isel(time=int(np.argmin(np.abs(times - moment))))
+    unknown = [name for name in _NEEDED if not np.all(np.isfinite(np.asarray(now[name].values, dtype=float)))]
+    if unknown:
+        raise InputError(
+            f"{unknown[0]} of the run at time = {show(float(now['time']), 's')} is no finite number; allowed: a moment "
+            "at which all is known"
+        )
     prediction, phase, body, rotor = _motion(now, resolution)
     order = Fineness.order if Resolution.of(resolution).tolerance is not None else _ORDER
     field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]), order)
