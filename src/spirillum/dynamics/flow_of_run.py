@@ -12,7 +12,6 @@ from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
-from spirillum.fluid.tube.solids import Fineness
 from spirillum.fluid.tube.tube import Tube
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
@@ -39,8 +38,7 @@ _NEEDED = (
 )
 """What a run in a tube has, and what its flow follows from."""
 
-_TOLERANCE, _ORDER = 0.03, 4
-"""Of a picture: against the tolerance 0.001 and 8 nodes of a panel, forces differ by 0.2 percent."""
+_TOLERANCE = 0.03
 _THINNEST = 0.02
 """Thinnest film that is drawn, in diameters of the body: thinner ones of a yawed robot take many minutes."""
 
@@ -57,7 +55,7 @@ def flow_of_run(
     Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
     wall. No force and torque but weight, contact and a field act on the robot. A film thinner than a fiftieth of the
     body's diameter is drawn as thick as that, with the same velocities, and a warning says so: to resolve it would take
-    many minutes. A yawed robot takes half a minute, as it has no mirror image.
+    many minutes. A yawed robot takes about a minute, as it has no mirror image.
 
     Args:
         run: its file, or its dataset.
@@ -92,8 +90,7 @@ def flow_of_run(
             "at which all is known"
         )
     prediction, phase, body, rotor = _motion(now, resolution)
-    order = Fineness.order if Resolution.of(resolution).tolerance is not None else _ORDER
-    field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]), order)
+    field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
     around = Flow(prediction, field, phase, cast("Frame", frame))
     return around.with_held_force()
 

@@ -20,7 +20,7 @@ from spirillum.arrays import Amplitudes, Samples
 from spirillum.fields.fluid_field import FluidField, add_tractions, checked_points, name_parts
 from spirillum.fluid.tube.confined import Held, Strengths, turned_motions
 from spirillum.fluid.tube.domain import seat_of
-from spirillum.fluid.tube.solids import Fineness, Solids
+from spirillum.fluid.tube.solids import Solids
 from spirillum.fluid.tube.tube import held_robot
 from spirillum.fluid.tube.wall import waves_between
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
@@ -329,12 +329,7 @@ def _ring_forces(modes: Amplitudes, theta: Samples) -> Samples:
 
 
 def tube_flow_field(
-    batch: RobotBatch,
-    body_twist: Samples,
-    rotor_twist: Samples,
-    phase: float,
-    mean_flow: float,
-    order: int = Fineness.order,
+    batch: RobotBatch, body_twist: Samples, rotor_twist: Samples, phase: float, mean_flow: float
 ) -> TubeFlowField:
     """Flow around one robot in its tube whose parts move with given twists.
 
@@ -344,9 +339,8 @@ def tube_flow_field(
         rotor_twist: velocity (m/s) and rotation (rad/s) of the rotor about the origin, body axes, (6,).
         phase: phase phi of the tail, rad.
         mean_flow: mean velocity of the fluid through the tube, m/s.
-        order: Gauss nodes of a panel.
     """
     twists = np.concatenate([np.asarray(body_twist, dtype=float), np.asarray(rotor_twist, dtype=float)])
-    held = held_robot(batch, 0, phase, order)
+    held = held_robot(batch, 0, phase)
     solids = tuple(RobotGeometry.of(batch).outlines.items())
     return TubeFlowField(held, seat_of(batch), solids, twists, float(mean_flow), float(batch.viscosity[0]))

@@ -168,16 +168,15 @@ def solved_together(
     return found
 
 
-def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0, order: int = Fineness.order) -> Held:
+def held_robot(batch: RobotBatch, index: int = 0, phase: float = 0.0) -> Held:
     """All that the flow around robot number `index` exerts and is made by, viscosity 1, no net flux.
 
     Args:
         batch: robots inside the domain of the model.
         index: which.
         phase: of the tail, rad.
-        order: Gauss nodes of a panel.
     """
-    fineness = replace(Tube().fineness(batch.options), order=order)
+    fineness = Tube().fineness(batch.options)
     return _held(_Question(RobotGeometry.of(batch, index), "robot", seat_of(batch, index), fineness, phase))
 
 
