@@ -42,7 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:  # while errors were being explained
         code = 130
     if own:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done but for the interpreter to leave
+        for ending in (signal.SIGINT, signal.SIGTERM):  # all is done but for the interpreter to leave
+            signal.signal(ending, signal.SIG_IGN)
         gc.freeze()
     sys.exit(code)
 
@@ -50,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _prepare() -> None:
     """What only a process of its own may set."""
     gc.set_threshold(_OBJECTS)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as cleanly as Ctrl-C, with the work it has started
     sys.unraisablehook = _not_lost
     # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
