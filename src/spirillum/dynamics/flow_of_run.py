@@ -111,19 +111,19 @@ def _motion(
     body = np.concatenate([velocity, spin])
     rotor = body + float(now["motor_rotation_rate"]) * np.eye(6)[3]
     mean_flow = float(now["mean_flow"])
-    asked = {"gap": gap, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
+    drawn = max(gap, _THINNEST * robot.body.diameter)
+    asked = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
     batch = RobotBatch.of(robot, Placement.of(asked))
-    thinnest = _THINNEST * robot.body.diameter
     if broken(requirements(batch, Tube())):
-        thinnest = float(np.fmax(least_gap(batch, Tube()), thinnest))
+        drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
     warnings = [line for line in str(now.attrs.get("warnings", "")).split("\n") if line]
-    if gap < thinnest:
+    if gap < drawn:
         warnings.append(
             f"the film of {show(gap, 'um')} under the body is thinner than is resolved: the robot is drawn "
-            f"{show(thinnest - gap, 'um')} further off the wall, with the same velocities, and the pressure in the "
+            f"{show(drawn - gap, 'um')} further off the wall, with the same velocities, and the pressure in the "
             "film is not that of the run"
         )
-    batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": max(gap, thinnest)}))
+    batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": drawn}))
     nothing = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
         "forward_velocity": float(now["velocity"].values[0]),
