@@ -353,9 +353,13 @@ def study(
             progress=progress,
         )
     if folder is None:
-        renderer.show(store_answer(dataset, Path(store or "")), json=json)
+        found = store_answer(dataset, Path(store or ""))
+        renderer.show(found, json=json)
     else:
-        renderer.show(study_answer(dataset, folder), json=json, rows=rows)
+        found = study_answer(dataset, folder)
+        renderer.show(found, json=json, rows=rows)
+    if found["unanswered"] == found["results"]:
+        raise typer.Exit(2)
 
 
 def schema(

@@ -87,6 +87,8 @@ class FreeMotion(NamedTuple):
     """Smallest distance of body and wall where it was laid down, m."""
     laid: Laid
     """How it was laid down."""
+    checked: Checked
+    """Whether its table was checked where it lies."""
 
 
 def free_motion(
@@ -157,7 +159,7 @@ def free_motion(
     known = lies and checked.known
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
-    return FreeMotion(found, run, links, gap, laid)
+    return FreeMotion(found, run, links, gap, laid, checked)
 
 
 def let_go(robot: Robot, laid: Laid) -> tuple[Prediction, TubeRobot, StartPlace]:

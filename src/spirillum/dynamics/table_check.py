@@ -19,8 +19,10 @@ class Checked(NamedTuple):
 
     known: bool
     """Whether the motion keeps to yaws at which the table was checked."""
+    near: bool
+    """Whether it comes nearer to the glass than where the table was checked."""
     said: list[str]
-    """Where it does not, or comes nearer to the glass, a sentence each."""
+    """What there is to say of both, a sentence each."""
 
 
 def held_against_check(
@@ -52,7 +54,7 @@ def held_against_check(
             f"{_from(time, near[0])}its gap falls to {_length(float(gap[near].min()))}, and its table was checked at "
             f"gaps from {_length(least)} on: the error estimate is that of such places"
         )
-    return Checked(not beyond.size, said)
+    return Checked(not beyond.size, bool(near.size), said)
 
 
 def _from(time: Samples | None, first: int) -> str:

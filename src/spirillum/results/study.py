@@ -143,6 +143,7 @@ def study_answer(dataset: xr.Dataset, output: Path) -> dict[str, Any]:
         "files": sorted(str(path.relative_to(output)) for path in output.rglob("*") if path.is_file()),
         "dimensions": {str(name): int(size) for name, size in dataset.sizes.items()},
         "ranking": ranking_of(dataset).to_dict(),
+        "results": dataset["outside"].size,
         "unanswered": int(np.count_nonzero(dataset["outside"].values)),
         "claims": verdicts,
         **({"predictions": third} if foretold else {}),

@@ -94,6 +94,7 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
         "model_type": f"a [{field}] table",
         "tuple_type": "a list, [...]",
         "list_type": "a list, [...]",
+        "dict_type": "a table, { name = value }",
         "too_long": f"at most {_entries(context.get('max_length'))}",
         "too_short": f"at least {_entries(context.get('min_length'))}",
         "int_parsing": "a whole number",

@@ -119,6 +119,10 @@ class Best(NamedTuple):
     """Number of places at which the robots have answers."""
     spread: float
     """Largest less least value of all robots, over that of the best; infinite where no other robot has a value."""
+    known: int
+    """Number of robots that have a value."""
+    robots: int
+    """Number of robots in the ranking."""
 
     @property
     def alike(self) -> bool:
@@ -129,6 +133,7 @@ class Best(NamedTuple):
         """As it stands in JSON."""
         found: dict[str, Any] = {"what": self.what, "quantity": self.quantity, "robot": self.robot.name}
         found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
+        found |= {"robots": self.known, "of_robots": self.robots}
         return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
 
 
@@ -194,7 +199,9 @@ def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
     if best["alike"]:
         return f"{best['what']}: no difference that counts (all within {100 * best['spread']['value']:.1g} %)"
     sure = f"at {best['places']} of {best['of_places']} places" if "places" in best else ""
-    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, sure)))
+    some = best["robots"] < best["of_robots"]
+    among = f"among {best['robots']} of {best['of_robots']} robots, the others have no such value" if some else ""
+    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, sure, among)))
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
@@ -307,8 +314,8 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
     places = chosen.get(f"{name}_at_place")
     if places is None:
-        return Best(word, name, ranked[winner], 0, 0, spread)
+        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size)
     there = sign * places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(np.argmax(there, axis=0) == winner)) if there.shape[1] else 0
-    return Best(word, name, ranked[winner], wins, there.shape[1], spread)
+    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size)

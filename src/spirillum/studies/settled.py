@@ -66,20 +66,21 @@ class SettledTask(OneRobot):
     @property
     def needed(self) -> set[str]:
         """Names of the arrays of its answer."""
-        return {*SETTLED, *PLACE, "error_estimate", "state"}
+        return {*SETTLED, *PLACE, "error_estimate", "near", "state"}
 
     def answer(self) -> Part:
         """Every quantity, (1,); NaN for a robot that cannot be followed, or reaches no steady motion."""
-        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate")}
+        nothing = {name: np.full(1, np.nan) for name in (*SETTLED, *PLACE, "error_estimate", "near")}
         try:
-            found = free_motion(
+            motion = free_motion(
                 self.robot,
                 placement=self.placement,
                 roughness=self.contact.roughness,
                 in_tube={"friction_coefficient": self.contact.friction_coefficient},
-            ).prediction
+            )
         except InputError:
             return {**nothing, "state": np.zeros(1)}
+        found = motion.prediction
         lying = found.lying
         assert lying is not None  # noqa: S101 - a free motion has one
         state = np.array([float(STATES.index(lying.state))])
@@ -87,7 +88,7 @@ class SettledTask(OneRobot):
             return {**nothing, "state": state}
         values = {name: float(getattr(found.swimming, name)[0]) for name in SETTLED}
         values |= {name: float(getattr(lying, name)) for name in PLACE}
-        values["error_estimate"] = found.error_estimate
+        values |= {"error_estimate": found.error_estimate, "near": float(motion.checked.near)}
         return {**{name: np.array([value]) for name, value in values.items()}, "state": state}
 
 
@@ -124,11 +125,17 @@ def not_settled(answers: Sequence[tuple[SettledTask, Part]]) -> list[str]:
     """Sentences on robots without a steady motion, and on steady motions beyond what the tables were checked for."""
     lost = [task for task, part in answers if not np.isfinite(part["forward_velocity"][0])]
     far = [task for task, part in answers if task not in lost and np.isnan(part["error_estimate"][0])]
+    near = [task for task, part in answers if part["near"][0] == 1.0 and task not in far]
     found = []
     if far:
         found.append(
             f"{len(far)} of {len(answers)} robots yaw further in steady motion than their tables were checked for: "
             f"their settled speeds have no error estimate; the first: {far[0].robot.with_tail}"
+        )
+    if near:
+        found.append(
+            f"{len(near)} of {len(answers)} robots come nearer to the glass in steady motion than where their tables "
+            f"were checked: the error estimates are those of wider gaps; the first: {near[0].robot.with_tail}"
         )
     if lost:
         found.append(

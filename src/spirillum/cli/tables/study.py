@@ -12,7 +12,7 @@ from spirillum.shown import counted
 from spirillum.studies.ranking import ENDS, LET_GO, RANKED, best_in_words
 from spirillum.units import display_unit, in_unit
 
-__all__ = ["table"]
+__all__ = ["empty_results", "table"]
 
 
 def table(answer: Answer, console: Console, *, rows: int = 10) -> None:
@@ -24,7 +24,7 @@ def table(answer: Answer, console: Console, *, rows: int = 10) -> None:
     console.print(f"[bold]{escape(answer['title'])}[/bold]: {extent} of the friction", highlight=False)
     show_ranking(answer["ranking"], console, rows)
     if answer["unanswered"]:
-        console.print(f"{answer['unanswered']} results are empty: variable `outside` says why", highlight=False)
+        console.print(empty_results(answer), highlight=False)
     console.print(f"observations: {escape(answer['observations'])}", highlight=False)
     if answer.get("predictions"):
         counts = ", ".join(f"{count} {verdict.replace('-', ': ')}" for verdict, count in answer["predictions"].items())
@@ -33,6 +33,11 @@ def table(answer: Answer, console: Console, *, rows: int = 10) -> None:
         claims = ", ".join(f"{count} {verdict}" for verdict, count in answer["claims"].items())
         console.print(f"statements of the paper: {claims}", highlight=False)
     console.print(f"open {escape(answer['folder'])}/report.html", highlight=False, soft_wrap=True)
+
+
+def empty_results(answer: Answer) -> str:
+    """How many results are empty, and where the reasons stand."""
+    return f"{answer['unanswered']} of {answer['results']} results are empty: warnings and variable `outside` say why"
 
 
 def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
@@ -55,8 +60,9 @@ def show_ranking(ranking: Answer, console: Console, rows: int) -> None:
         console.print(escape(best_in_words(best)), highlight=False, soft_wrap=True)
     if "settled" in ranking:
         console.print(ranking["settled"], highlight=False)
-    elif ranking["low_and_high"] in ENDS:
-        console.print(f"low, high: {ENDS[ranking['low_and_high']]}", highlight=False)
+    if ranking["low_and_high"] in ENDS:
+        where = ", of robots that are not let go: in ranking.csv" if "settled" in ranking else ""
+        console.print(f"low, high: {ENDS[ranking['low_and_high']]}{where}", highlight=False)
 
 
 def _basis(ranking: Answer) -> str:

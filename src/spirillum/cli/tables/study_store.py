@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer
+from spirillum.cli.tables.study import empty_results
 
 __all__ = ["table"]
 
@@ -15,6 +16,6 @@ def table(answer: Answer, console: Console) -> None:
     sizes = " x ".join(f"{size} {name}" for name, size in answer["dimensions"].items())
     console.print(f"[bold]{escape(answer['title'])}[/bold]: {sizes}", highlight=False)
     if answer["unanswered"]:
-        console.print(f"{answer['unanswered']} results are empty: variable `outside` says why", highlight=False)
+        console.print(empty_results(answer), highlight=False)
     console.print(f"observations: {escape(answer['observations'])}", highlight=False)
     console.print(f"{answer['results']} results in {escape(answer['folder'])}", highlight=False, soft_wrap=True)
