@@ -75,6 +75,16 @@ def test_a_thin_film_is_drawn_as_thick_as_a_fiftieth_of_the_body(run: xr.Dataset
     assert asked[0].yaw == 0.06
 
 
+def test_the_sample_that_is_taken_is_told(run: xr.Dataset, monkeypatch: Any) -> None:
+    """Nothing is solved: what carries the warning is what is asked here."""
+    monkeypatch.setattr("spirillum.dynamics.flow_of_run.tube_flow_field", lambda *_: None)
+    monkeypatch.setattr("spirillum.dynamics.flow_of_run.Flow.with_held_force", lambda flow: flow)
+    first, second = (float(time) for time in run["time"][:2])
+    between = first + 0.4 * (second - first)
+    assert "the flow is that at the nearest one, 0 s" in sp.flow_of_run(run, between).prediction.warnings[0]
+    assert not any("no sample" in line for line in sp.flow_of_run(run, second).prediction.warnings)
+
+
 def test_damaged_runs_are_refused(run: xr.Dataset) -> None:
     time = run["time"].to_numpy().copy()
     time[3] = np.nan

@@ -77,6 +77,15 @@ def test_a_run_that_is_never_on_has_no_means_while_on() -> None:
     run = held(duration=0.5, on=[(1.0, 2.0)])
     assert np.isnan(run["mean_forward_velocity_on"])
     assert float(run["time_on"]) == 0.0
+    assert "the remote switches nothing on before the run ends at 0.5 s" in run.attrs["warnings"].split("\n")
+
+
+@pytest.mark.parametrize("motion", ["held", "free"])
+def test_times_beyond_the_end_are_told(motion: str) -> None:
+    run = sp.simulate(robot(), motion=motion, timing={"duration": 0.5, "on": [(0.0, 0.2), (0.5, 2.0)]}, model="rft")
+    said = run.attrs["warnings"].split("\n")
+    assert "on = 0.5 s to 2 s lies beyond the end of the run at 0.5 s" in said
+    assert not any("switches nothing on" in line for line in said)
 
 
 def test_a_free_robot_without_floor_swims_steadily_as_its_screw() -> None:

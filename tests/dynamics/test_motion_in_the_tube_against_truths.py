@@ -475,6 +475,10 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     file.write_text("time_s,flow_mm_s\n0,0\n2,-40\n")
     fast = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, True, None)
     assert "Reynolds number (imposed flow, body diameter) = 0.2" in fast.attrs["warnings"]
+    assert "begins at" not in fast.attrs["warnings"]
+    file.write_text("time_s,flow_mm_s\n1,0\n2,1\n")
+    late = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, True, None)
+    assert f"{file} begins at 1 s, and the run ends at 0.01 s" in late.attrs["warnings"]
     open_ended = run_in_tube(steady, table, times, placed, InTube(), None, True, None)
     assert open_ended.attrs["ends"] == "open"  # the channel has a length
     for text, words in (

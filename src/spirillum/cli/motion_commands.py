@@ -176,7 +176,7 @@ def simulate(
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)
-    over_time = flow is not None and flow.lower().endswith(".csv")
+    over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
     if picture is not None:
         from spirillum.view.figures.trajectory import check_column

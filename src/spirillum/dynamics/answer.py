@@ -55,6 +55,7 @@ def run_answer(dataset: xr.Dataset) -> dict[str, Any]:
             **({"against": dataset.attrs["error_against"]} if "error_against" in dataset.attrs else {}),
             statement=dataset.attrs["known_error"],
         ),
+        **({"placement": json.loads(dataset.attrs["placement"])} if "placement" in dataset.attrs else {}),
         **_in_the_tube(dataset),
         "events": json.loads(dataset.attrs["events"]),
         "steady": dataset.attrs["steady"],

@@ -25,6 +25,7 @@ def run_attributes(prediction: Prediction) -> dict[str, Any]:
         "calibrated": int(prediction.calibrated),
         "error_estimate": prediction.error_estimate,
         "known_error": prediction.known_error,
+        **({} if prediction.model.error_against is None else {"error_against": prediction.model.error_against}),
         "settings": json.dumps(prediction.robot.model_dump(), sort_keys=True),
         "references": " ".join(prediction.references),
         "versions": versions(),

@@ -89,6 +89,12 @@ def flow_of_run(
             f"{unknown[0]} of the run at time = {show(float(now['time']), 's')} is no finite number; allowed: a moment "
             "at which all is known"
         )
+    nearest = float(now["time"])
+    if abs(nearest - moment) > 1e-9:
+        said = (
+            f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
+        )
+        now = now.assign_attrs(warnings="\n".join([said, str(now.attrs.get("warnings", ""))]))
     prediction, phase, body, rotor = _motion(now, resolution)
     field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
     around = Flow(prediction, field, phase, cast("Frame", frame))

@@ -210,13 +210,14 @@ def held_run(prediction: Prediction, timing: Timing) -> xr.Dataset:
     if prediction.tail_rotation_rate == 0:
         raise InputError("drive.duty = 0: the tail does not turn; allowed: more than 0, and `on` for switching off")
     turn = 2.0 * np.pi / abs(prediction.tail_rotation_rate)
-    end, time, switches = timing.timetable(turn, float(batch.electrics.duty[0]))
+    end, time, switches, unused = timing.timetable(turn, float(batch.electrics.duty[0]))
     response = axial_response(batch, prediction)
     moments = np.union1d(time, [switch.time for switch in switches])
     transient = motor_transient(batch.electrics, response.slip, moments, switches)
     dataset = _dataset(prediction, batch.electrics, response, transient, switches)
     averages = _averages(dataset, prediction, switches, end)
-    return dataset.isel(time=np.isin(moments, time)).assign(averages)
+    said = [*prediction.warnings, *unused]
+    return dataset.isel(time=np.isin(moments, time)).assign(averages).assign_attrs(warnings="\n".join(said))
 
 
 def _dataset(
@@ -274,11 +275,11 @@ def _dataset(
             "title": f"Axial swimming of {prediction.robot.name} (two degrees of freedom)",
             **run_attributes(prediction),
             "motion": "held",
+            "placement": json.dumps(prediction.placement),
             "steady": STEADY,
             "events": json.dumps([{"time": time, "what": f"duty {duty:g}"} for time, duty in switches]),
             "switches": ", ".join(f"duty {duty:g} from {start:g} s" for start, duty in switches),
             "integrator": f"VODE Adams, order up to {_HIGHEST_ORDER}, relative tolerance {_TOLERANCE:g}",
-            "warnings": "\n".join(prediction.warnings),
         },
     )
 

@@ -188,7 +188,7 @@ def _free_run(
 ) -> xr.Dataset:
     """A run with six degrees of freedom."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
-    end, time, switches = times.timetable(2.0 * np.pi / turning_rate(steady), own)
+    _, time, switches, unused = times.timetable(2.0 * np.pi / turning_rate(steady), own)
     links = links_without_walls(steady, roughness, weight=weight)
     start = resting_state(steady.robot, links, placed)
     reach = reach_of(steady.robot)
@@ -197,9 +197,7 @@ def _free_run(
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
     on = stretches_on(switches, driven)
     title = f"Free swimming of {steady.robot.name} (six degrees of freedom)"
-    said = [*steady.warnings, *_left_out(steady, links, weight=weight)]
-    if all(switch.duty == 0 for switch in switches):
-        said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
+    said = [*steady.warnings, *_left_out(steady, links, weight=weight), *unused]
     more = {}
     if np.isfinite(links.wall[kernel.RADIUS]):
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]

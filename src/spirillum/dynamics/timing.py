@@ -60,6 +60,8 @@ class Timetable(NamedTuple):
     """Evenly spaced samples from 0 to the end, s."""
     switches: list[Switch]
     """Every switching of the remote, the first at 0."""
+    said: list[str]
+    """Where the schedule of the remote and the run do not meet, a sentence each."""
 
 
 class Timing(Options):
@@ -102,4 +104,16 @@ class Timing(Options):
         end = duration_of(self.turns, turn, self.duration)
         switches = schedule(self.on, self.duty, duty, end)
         time = sample_times(end, turn, self.samples_per_turn, [switch.time for switch in switches])
-        return Timetable(end, time, switches)
+        return Timetable(end, time, switches, self._unused(switches, end))
+
+    def _unused(self, switches: Sequence[Switch], end: float) -> list[str]:
+        """What of the schedule lies beyond the end of the run, a sentence each."""
+        said = []
+        if all(switch.duty == 0 for switch in switches):
+            said.append(f"the remote switches nothing on before the run ends at {end:.4g} s")
+        late = [(start, stop) for start, stop in self.on or () if start >= end]
+        if late:
+            first, last = late[0]
+            also = f" and {len(late) - 1} more" if len(late) > 1 else ""
+            said.append(f"on = {first:g} s to {last:g} s{also} lies beyond the end of the run at {end:.4g} s")
+        return said

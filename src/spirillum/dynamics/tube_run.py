@@ -98,8 +98,7 @@ def tube_run(
     said = [*steady.warnings]
     if ended < times.end:
         said.append(f"the run ends at {ended:.6g} s of {times.end:.6g} s: {run.events[-1].what}")
-    if all(switch.duty == 0 for switch in times.switches):
-        said.append(f"the remote switches nothing on before the run ends at {times.end:.4g} s")
+    said += times.said
     title = f"Free swimming of {steady.robot.name} in its tube (six degrees of freedom)"
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     attrs |= _assumptions(robot, wait, (*before, *run.events))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -75,6 +76,7 @@ def run_in_tube(
         said += [
             limit.sentence() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])
         ]
+        said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")
     return dataset.assign_attrs(
@@ -117,6 +119,16 @@ def links_in_tube(
         phase=start_phase(steady.robot),
     )
     return links, start
+
+
+def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[str]:
+    """A sentence on a flow file of several rows that begins after the run; none for any other."""
+    start = float(flow[0, 0])
+    if len(flow) == 1 or start < end:
+        return []
+    return [
+        f"{source} begins at {start:g} s, and the run ends at {end:.4g} s: the flow is that of its first row throughout"
+    ]
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:

@@ -10,7 +10,16 @@ from rich.markup import escape
 from rich.table import Table
 
 from spirillum.answer import quantity
-from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_error, show_reason
+from spirillum.cli.tables.parts import (
+    Answer,
+    add_bands,
+    add_quantities,
+    friendly,
+    grid,
+    show_error,
+    show_placement,
+    show_reason,
+)
 from spirillum.dynamics.events import told
 from spirillum.units import display_unit, in_unit
 
@@ -35,6 +44,8 @@ def table(answer: Answer, console: Console) -> None:
             soft_wrap=True,
         )
     show_reason(answer, console)
+    if "placement" in answer:
+        show_placement(answer["placement"], console)
     if "in_tube" in answer:
         place = answer["in_tube"]
         shown = {

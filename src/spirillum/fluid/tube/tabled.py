@@ -74,7 +74,7 @@ class TabledTube(Tube):
     """The model `tube` for robots that have tables."""
 
     form = "table"
-    error_against = "places that are no nodes of its table"
+    error_against = "solutions at places between the nodes of its table"
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
         """Answer from tables.
