@@ -193,6 +193,28 @@ def test_headline_says_which_way_it_went(tube_run: Any, factor: float, turned: f
 
 
 @pytest.mark.usefixtures("unplaced")
+def test_long_run_shows_means_over_a_turn_of_the_tail(tube_run: Any) -> None:
+    """An oscillation at the tail's rate has none but its drift, whatever its amplitude."""
+    long = tube_run.interp(time=np.linspace(0.0, 2.0, 2001))
+    angle = 2.0 * np.pi * 20.0 * long["time"]  # 40 turns of 50 samples
+    long = long.assign(tail_angle=angle, forward_velocity=1e-3 * (1.0 + np.sin(angle)) - 1e-4 * long["time"])
+    figure = trajectory_figure(long)
+    speed = next(axes for axes in figure.axes if axes.get_ylabel() == "velocity $U_x$ (mm/s)")
+    time, mean = speed.lines[1].get_data()
+    assert mean == pytest.approx(1.0 - 0.1 * np.asarray(time), abs=1e-6)
+    assert any("means over a turn of the tail" in text.get_text() for text in figure.findobj(Text))
+    short = long.assign(tail_angle=0.5 * angle)
+    assert not any("means over a turn" in text.get_text() for text in trajectory_figure(short).findobj(Text))
+
+
+@pytest.mark.usefixtures("unplaced")
+def test_speed_of_a_switched_run_is_that_while_on(tube_run: Any) -> None:
+    switched = tube_run.assign(time_on=1.0, mean_forward_velocity_on=2e-3)
+    texts = " ".join(text.get_text() for text in trajectory_figure(switched).findobj(Text))
+    assert "swims at 2 mm/s while on" in " ".join(texts.split())
+
+
+@pytest.mark.usefixtures("unplaced")
 def test_robot_that_touches_nothing_has_no_panel_of_contact(tube_run: Any) -> None:
     tube_run = tube_run.assign(
         contact_force=0.0 * tube_run["contact_force"], contact_friction=0.0 * tube_run["azimuth"]

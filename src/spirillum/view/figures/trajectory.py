@@ -38,8 +38,14 @@ _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 _MOST_EVENTS = 12
 _CROWDED = 0.05
 """Distance of events over that of the axis below which they share a label."""
-_MOST_BESIDE = 4
-"""Entries of a legend from which on they stand in two rows."""
+_LETTERS_BESIDE = 40
+"""Letters of a legend, with seven for each line's sample, above which its entries stand in two columns."""
+_LETTER = 0.1
+"""Share of a time axis above which the panel's letter stands."""
+_MANY_TURNS = 30.0
+"""Turns of the tail above which their oscillations fill a panel, and means over a turn are drawn too."""
+_SWITCHED = 0.99
+"""Share of the run with the drive on below which its speed is the one while on."""
 _DECADES = 5
 """Range of a logarithmic axis."""
 _DECADES_BARE = 30.0
@@ -65,6 +71,8 @@ class _Panel:
     """Whether the axis is logarithmic over the whole range of the lines, with the roughness as a level."""
     changing: bool = False
     """Whether a panel whose lines are constant is left out."""
+    mean: bool = False
+    """Whether the mean over a turn of the tail is drawn for the first line of a long run."""
 
 
 _PANELS = (
@@ -100,9 +108,9 @@ _IN_TUBE = (
     _Panel("gap", (("wall_gap", "under the body"), ("tail_gap", "under the tail")), film=True),
     _Panel("azimuth", (("azimuth", ""),)),
     _Panel("angle to wall", (("wall_pitch", "pitch"), ("wall_yaw", "yaw"))),
-    _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True),
-    _Panel("velocity $U_x$", (("forward_velocity", ""),)),
-    _Panel("body rate", (("body_rotation_rate", ""),)),
+    _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True, mean=True),
+    _Panel("velocity $U_x$", (("forward_velocity", ""),), mean=True),
+    _Panel("body rate", (("body_rotation_rate", ""),), mean=True),
     _Panel("tail rate", (("tail_rotation_rate", "tail"), ("motor_rotation_rate", "motor"))),
     _Panel("mean flow", (("mean_flow", ""),), changing=True),
 )
@@ -150,6 +158,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
     if path is None and not shown:
         raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
     events = _events_of(dataset, time)
+    turn = _turn_of(dataset, time) if any(panel.mean for panel in shown) else 0
     beside = 2 if column == "double" else 1
     with styled():
         paths, section, panel_height = _HEIGHTS[column]
@@ -163,7 +172,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
             width=COLUMNS[column],
             heights=rows,
             columns=beside,
-            notes=_event_words(events),
+            notes=[*(["black: means over a turn of the tail"] if turn else []), *_event_words(events)],
             sharey=False,
         )
         panels = list(sheet.panels.flat)
@@ -176,8 +185,8 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
                 _draw_path(axes, path, across, name)
         over_time = panels[heads:drawn]
         for number, (axes, panel) in enumerate(zip(over_time, shown, strict=True)):
-            _draw_panel(axes, dataset, panel, time, beside)
-            _mark_events(axes, events, float(time[-1] - time[0]), numbered=number < beside)
+            _draw_panel(axes, dataset, panel, time, beside, turn)
+            _mark_events(axes, events, time, numbered=number < beside)
             axes.set_xlim(float(time[0]), float(time[-1]))
             if number + beside < len(shown):
                 axes.tick_params(labelbottom=False)
@@ -212,8 +221,7 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
     name = plain(str(dataset.attrs.get("robot", "a robot")), 50)
     if not in_tube or path is None:
         return f"{name}: a run in time"
-    speed = float(dataset["mean_forward_velocity"]) if "mean_forward_velocity" in dataset else np.nan
-    swims = f"swims at {1e3 * speed:.3g} mm/s on average" if np.isfinite(speed) else "moves"
+    swims = _speed_in_words(dataset)
     azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
     around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
     if swing < _STILL:
@@ -225,6 +233,16 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
         "" if turned == 0 else " with its body's rotation" if turned * around > 0 else " against its body's rotation"
     )
     return f"{name} {swims} and goes {abs(around):.2g}° around the tube{sense}"
+
+
+def _speed_in_words(dataset: xr.Dataset) -> str:
+    """How fast it swims; while its drive is on, where that is switched off for a part of the run."""
+    time = dataset["time"].values
+    span = float(time[-1] - time[0])
+    switched = "time_on" in dataset and float(dataset["time_on"]) < _SWITCHED * span
+    name, when = ("mean_forward_velocity_on", "while on") if switched else ("mean_forward_velocity", "on average")
+    speed = float(dataset[name]) if name in dataset else np.nan
+    return f"swims at {1e3 * speed:.3g} mm/s {when}" if np.isfinite(speed) else "moves"
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
@@ -255,6 +273,14 @@ def _time_of(dataset: xr.Dataset) -> Samples:
     if time.ndim != 1 or time.size < 2 or not np.all(np.diff(time) > 0):
         raise InputError(f"the run has {time.size} samples of time; allowed: at least 2, increasing")
     return time
+
+
+def _turn_of(dataset: xr.Dataset, time: Samples) -> int:
+    """Samples of a turn of the tail where the run has many turns and samples of each; else 0."""
+    if "tail_angle" not in dataset:
+        return 0
+    turns = abs(float(dataset["tail_angle"][-1] - dataset["tail_angle"][0])) / (2.0 * np.pi)
+    return round(time.size / turns) if _MANY_TURNS < turns < time.size / 4 else 0
 
 
 def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
@@ -295,8 +321,11 @@ def _widen(axes: Axes, x: Samples, y: Samples) -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, beside: int) -> None:
-    """Draw lines over time in a sheet of `beside` columns; a single one has low panels."""
+def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, beside: int, turn: int) -> None:
+    """Draw lines over time in a sheet of `beside` columns; a single one has low panels.
+
+    The mean over `turn` samples is drawn too, where the panel has one; 0: none.
+    """
     lines = list(_lines(dataset, panel, time))
     values = np.concatenate([line for _, line in lines])
     scale = Scale.of(values, unit_of(panel.lines[0][0]))
@@ -312,6 +341,9 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
             linestyle=_LINE_OF.get(words, "-"),
             label=words or None,
         )
+    if panel.mean and turn:
+        middle, mean = (np.convolve(of, np.ones(turn) / turn, mode="valid") for of in (time, lines[0][1]))
+        axes.plot(middle, scale(mean), color=COLOURS["black"], linewidth=1.0)
     if steep:
         top = max(largest) / scale.factor
         axes.set_yscale("log")
@@ -322,7 +354,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
         axes.set_ylim(bottom=min(0.0, float(np.nanmin(values)) / scale.factor))
     axes.set_ylabel(f"{panel.label}{' ' if beside > 1 else chr(10)}({scale.unit})")
     if any(words for words, _ in lines) and not (film and len(lines) == 1):
-        columns = len(lines) if len(lines) < _MOST_BESIDE else 2
+        columns = len(lines) if sum(len(words) + 7 for words, _ in lines) <= _LETTERS_BESIDE else 2
         axes.legend(
             loc="upper right",
             ncols=columns,
@@ -365,7 +397,7 @@ def _make_room(axes: Axes, rows: float) -> None:
     """Room above the lines for a legend of so many rows of the higher panels."""
     low, high = axes.get_ylim()
     if axes.get_yscale() == "log":
-        axes.set_ylim(low, high * (high / low) ** (0.22 * rows))
+        axes.set_ylim(low, high * (high / low) ** (0.32 * rows))
     else:
         axes.set_ylim(low, high + 0.28 * rows * (high - low))
 
@@ -394,17 +426,20 @@ def _event_words(events: list[tuple[float, str]]) -> list[str]:
     return [" · ".join(words)] if words else []
 
 
-def _mark_events(axes: Axes, events: list[tuple[float, str]], span: float, *, numbered: bool) -> None:
+def _mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, numbered: bool) -> None:
+    first, span = float(time[0]), float(time[-1] - time[0])
     for when, _ in events:
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
     for numbers in _close_together(events[:_MOST_EVENTS], span) if numbered else []:
+        middle = float(np.mean([events[number][0] for number in numbers]))
+        beside_letter = first + _LETTER * span
         axes.annotate(
             str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
-            (np.mean([events[number][0] for number in numbers]), 1.0),
+            (max(middle, beside_letter), 1.0),
             xycoords=axes.get_xaxis_transform(),
             xytext=(0, 2),
             textcoords="offset points",
-            ha="center",
+            ha="center" if middle > beside_letter else "left",
             size=7,
             color="#555555",
         )
