@@ -195,7 +195,7 @@ _IN_THE_TUBE = (
         "approach_time",
         "",
         "s",
-        "time in which a small distance from the steady motion falls by e",
+        "time constant with which a small distance from the steady motion decays",
         "motion in the tube",
     ),
     Quantity("sideways_force", "", "N", "force of the fluid along the wall, towards +y", "model tube"),

@@ -215,8 +215,8 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
     slow = run.lying.approach_time
     if run.lying.state == "steady" and slow > 0.2 * run.lying.time:
         found.append(
-            f"a small distance from the steady motion falls by e in {slow:.3g} s: a trial of some turns does not reach "
-            "it; `simulate` follows the way there"
+            f"the steady motion is approached with a time constant of {slow:.3g} s: a trial of some turns does not "
+            "reach it; `simulate` follows the way there"
         )
     return found
 

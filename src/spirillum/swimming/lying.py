@@ -41,7 +41,7 @@ class Lying:
     time: float
     """For how long the motion was followed from where it was laid down, s."""
     approach_time: float
-    """Time in which a small distance from the steady motion falls by e, s; NaN where there is none."""
+    """Time constant with which a small distance from the steady motion decays, s; NaN where there is none."""
     ended: str = ""
     """Why the motion was not followed to a steady one, in half a sentence; empty where it was."""
 

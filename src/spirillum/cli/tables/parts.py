@@ -82,10 +82,15 @@ def show_lying(lying: Answer, console: Console) -> None:
     said = [_STATES[lying["state"]]]
     for name, item in lying.items():
         if isinstance(item, Mapping) and item["value"] not in (None, 0.0):
-            said.append(f"{name.replace('_', ' ')} {' '.join(friendly(item['value'], item['unit']))}".rstrip())
+            words = _TIMES.get(name, name.replace("_", " "))
+            said.append(f"{words} {' '.join(friendly(item['value'], item['unit']))}".rstrip())
     console.print(f"laid down there and followed: {', '.join(said)}", highlight=False, soft_wrap=True)
 
 
+_TIMES = {
+    "followed_time": "found after a simulated time of",
+    "approach_time": "approached with a time constant of",
+}
 _STATES = {
     "steady": "steady",
     "orbits": "orbits the tube's axis",
