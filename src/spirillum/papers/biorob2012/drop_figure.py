@@ -12,12 +12,13 @@ from matplotlib.lines import Line2D
 from spirillum.arrays import Values
 from spirillum.papers.biorob2012.constants import GLOBAL_DROP
 from spirillum.papers.biorob2012.evidence import Evidence
-from spirillum.view.figures.picture import Picture, head_column, tail_axis
+from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.rows import band_handles, draw_band, draw_curve
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study import PANEL
 from spirillum.view.figures.study_view import StudyView, spread
 from spirillum.view.figures.style import Scale, label_of_model, look_of_model
+from spirillum.view.figures.tail_panels import head_column, tail_axis
 
 __all__ = ["drop_picture"]
 

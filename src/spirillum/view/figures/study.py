@@ -13,11 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from spirillum.view.figures.picture import Picture, head_column, tail_axis
+from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
 from spirillum.view.figures.style import Scale, plain, told_apart
+from spirillum.view.figures.tail_panels import head_column, tail_axis
 
 if TYPE_CHECKING:
     import xarray as xr
