@@ -26,7 +26,7 @@ _LARGEST_REYNOLDS = 10.0
 """Reynolds number from which on an answer of Stokes flow is refused unless it is asked for."""
 
 
-def predict(
+def predict(  # noqa: PLR0913 - the options of the command
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = AUTO,

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
-def simulate(
+def simulate(  # noqa: PLR0913 - the options of the command
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = AUTO,

@@ -33,7 +33,7 @@ _RESULTS = ("dataset.nc", "figures", "report.html", "claims.json", "ranking.csv"
 """What a folder without the mark of a study may not hold, for it would be replaced."""
 
 
-def study(
+def study(  # noqa: PLR0913 - the options of the command
     source: str | Path | Mapping[str, Any] | None = None,
     *,
     observations: str | Path | None = None,

@@ -182,7 +182,7 @@ _MORE = {
 }
 
 
-def predict(
+def predict(  # noqa: PLR0913 - the options of the command
     robot: str | Path | Mapping[str, Any] | Robot,
     *,
     model: str = AUTO,
