@@ -41,6 +41,38 @@ def test_a_robot_goes_along_the_axis_of_its_field() -> None:
         assert other.values[name] == pytest.approx(one.values[name], rel=1e-4, abs=1e-6)
 
 
+def test_a_run_in_a_tilted_field_comes_to_swim_along_its_axis() -> None:
+    """From its start along x it turns into the axis; then it is the run in a straight field, turned."""
+    yaw, pitch = np.radians(20.0), np.radians(10.0)
+    axis = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    last = 200  # samples of ten turns
+    speeds = []
+    for field, along in ((None, np.eye(3)[0]), ({"yaw": "20 deg", "pitch": "10 deg"}, axis)):
+        timing = {"turns": 40.0, "samples_per_turn": 20}
+        run = sp.simulate("magnetic-helix", model="rft", weight=False, timing=timing, field=field)
+        way = run["position"].values[-1] - run["position"].values[-1 - last]
+        speeds.append(float(np.linalg.norm(way)) / float(run["time"][-1] - run["time"][-1 - last]))
+        assert way @ along == pytest.approx(np.linalg.norm(way), rel=1e-5)
+        lags = run["phase_lag"].values[-last:], run["wobble_angle"].values[-last:]
+        speeds += [float(np.mean(lag)) for lag in lags]
+    assert speeds[3:] == pytest.approx(speeds[:3], rel=1e-3)
+    assert run.attrs["field_yaw"] == pytest.approx(yaw)
+
+
+@pytest.mark.parametrize(
+    ("robot", "motion", "field", "words"),
+    [
+        ("biorob2012-wide", "free", {"yaw": 0.1}, "field.yaw without a field; allowed: with drive.kind = 'magnetic'"),
+        ("biorob2012-wide", "held", {"yaw": 0.1}, "field with motion 'held'"),
+        ("magnetic-helix", "free", {"strength": 1e-3}, "field.strength of a run; allowed: magnetic.field of the robot"),
+        ("magnetic-helix", "free", {"pitch": "80 deg"}, "field.pitch"),
+    ],
+)
+def test_wrong_fields_of_a_run_are_a_sentence(robot: str, motion: str, field: dict[str, object], words: str) -> None:
+    with pytest.raises(sp.InputError, match=words):
+        sp.simulate(robot, model="rft", motion=motion, field=field)
+
+
 def test_the_angle_of_the_field_does_not_jump() -> None:
     """A rate that changes for no time changes nothing; a tilted axis that is set again is no change."""
     one, other = Plant("magnetic-helix", model="rft"), Plant("magnetic-helix", model="rft")

@@ -19,6 +19,7 @@ from spirillum.dynamics.tube_robot import Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_simulation import run_in_tube
 from spirillum.dynamics.tube_start import StartPlace, laid_down
+from spirillum.dynamics.turning_field import Field
 from spirillum.errors import InputError
 from spirillum.kernels import contacts, dry_friction, rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -463,7 +464,7 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     asked = InTube.of({"azimuth": "20 deg", "wait": "2 s", "friction_coefficient": 0.2, "flow": file})
     placed = Placement.of({"gap": "0.3 mm", "yaw": "1 deg", "pitch": "-0.5 deg"})
     times = Timing(duration="2 s")
-    found = run_in_tube(steady, table, times, placed, asked, 1e-4, True, None)
+    found = run_in_tube(steady, table, times, placed, asked, 1e-4, Field(), True, None)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], [0, 1, 2], [0, 2e-3, -1e-3]), atol=1e-15)
     assert found.attrs["ends"] == "imposed flow"
     assert found.attrs["wait"] == 2.0
@@ -473,13 +474,13 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     assert float(found["electrical_energy"][0]) == 0.0
     assert "Reynolds" not in found.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n0,0\n2,-40\n")
-    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, True, None)
+    fast = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
     assert "Reynolds number (imposed flow, body diameter) = 0.2" in fast.attrs["warnings"]
     assert "begins at" not in fast.attrs["warnings"]
     file.write_text("time_s,flow_mm_s\n1,0\n2,1\n")
-    late = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, True, None)
+    late = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
     assert f"{file} begins at 1 s, and the run ends at 0.01 s" in late.attrs["warnings"]
-    open_ended = run_in_tube(steady, table, times, placed, InTube(), None, True, None)
+    open_ended = run_in_tube(steady, table, times, placed, InTube(), None, Field(), True, None)
     assert open_ended.attrs["ends"] == "open"  # the channel has a length
     for text, words in (
         ("time_s,flow\n0,1\n", "columns"),

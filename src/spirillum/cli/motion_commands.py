@@ -138,6 +138,18 @@ def simulate(
         str | None,
         typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.", rich_help_panel=_START),
     ] = None,
+    field_yaw: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ANGLE",
+            help="Free, magnetic: angle to +y of the axis about which the field turns, up to 45deg; else along +x.",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    field_pitch: Annotated[
+        str | None,
+        typer.Option(metavar="ANGLE", help="Free, magnetic: angle of that axis upwards.", rich_help_panel=_START),
+    ] = None,
     samples_per_turn: Annotated[
         int, typer.Option(help="Samples of the output per steady turn of the tail.", rich_help_panel=_TIMING)
     ] = 100,
@@ -212,6 +224,7 @@ def simulate(
                 "friction_coefficient": friction_coefficient,
                 "flow": flow if over_time else None,
             },
+            field={"yaw": field_yaw, "pitch": field_pitch},
             progress=progress,
         )
         write_dataset(dataset, target)

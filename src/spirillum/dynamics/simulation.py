@@ -18,6 +18,7 @@ from spirillum.dynamics.start import reach_of, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
+from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
@@ -62,6 +63,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     weight: bool = True,
     roughness: str | float | None = None,
     in_tube: InTube | Mapping[str, Any] | None = None,
+    field: Field | Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Simulate swimming from rest.
@@ -93,6 +95,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
         roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: with a free robot and `tube`: `azimuth`, `wait`, `friction_coefficient` and `flow` over time, see
             `InTube`; its placement may have yaw, ends and a constant flow, too.
+        field: `yaw` and `pitch` of the axis about which the field turns a free robot with a magnet, with their units or
+            floats in rad, up to 45 degrees; None: along +x.
         progress: told what is being computed, how much is done, and of how much.
 
     Returns:
@@ -116,7 +120,9 @@ def simulate(  # noqa: PLR0913 - the options of the command
     central = own if known is None else known.central(own)
     choice, motion, said = chosen_run(model, motion, central, placed, calibration, known)
     model = choice.model
-    held, asked = motion_of(motion) == "held", InTube.of(in_tube)
+    held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
+    if held and about != Field():
+        raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
     walled = model == "tube" and not held
     contact = calibrated_contact(calibration) if known is None else known.contact()
     if held:
@@ -145,8 +151,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
             progress=tell,
         )
         if table is not None:
-            return run_in_tube(steady, table, timing, there, touching, rough, weight, tell)
-        return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, weight, tell)
+            return run_in_tube(steady, table, timing, there, touching, rough, about, weight, tell)
+        return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)
 
     dataset = run(central, times, progress)
     if known is not None:
@@ -158,8 +164,9 @@ def simulate(  # noqa: PLR0913 - the options of the command
             dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), draws, tell
         )
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
-    reason = {"model_reason": choice.reason} if choice.reason else {}
-    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **reason)
+    more = {"model_reason": choice.reason} if choice.reason else {}
+    more |= {f"field_{name}": angle for name, angle in about.model_dump(exclude_none=True).items()}
+    return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **more)
 
 
 def _table(
@@ -183,13 +190,14 @@ def _free_run(
     times: Timing,
     placed: Placement,
     roughness: float | None,
+    field: Field,
     weight: bool,  # noqa: FBT001 - one of the run's settings
     progress: Progress | None,
 ) -> xr.Dataset:
     """A run with six degrees of freedom."""
     own = steady.robot.drive.duty if steady.robot.drive is not None else 1.0
     _, time, switches, unused = times.timetable(2.0 * np.pi / turning_rate(steady), own)
-    links = links_without_walls(steady, roughness, weight=weight)
+    links = in_tilted_field(links_without_walls(steady, roughness, weight=weight), field)
     start = resting_state(steady.robot, links, placed)
     reach = reach_of(steady.robot)
     moments = np.union1d(time, [switch.time for switch in switches])

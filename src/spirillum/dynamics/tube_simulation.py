@@ -16,6 +16,7 @@ from spirillum.dynamics.tube_options import InTube, read_flow
 from spirillum.dynamics.tube_robot import FRICTION_COEFFICIENT, Surroundings, TubeRobot, tube_robot
 from spirillum.dynamics.tube_run import tube_run
 from spirillum.dynamics.tube_start import StartPlace, check_roughness
+from spirillum.dynamics.turning_field import Field, in_tilted_field
 from spirillum.errors import InputError
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.fluid.tube.tabled import TabledTube
@@ -45,6 +46,7 @@ def run_in_tube(
     placed: Placement,
     asked: InTube,
     roughness: float | None,
+    field: Field,
     weight: bool,  # noqa: FBT001 - one of the run's settings
     progress: Progress | None,
 ) -> xr.Dataset:
@@ -57,6 +59,7 @@ def run_in_tube(
         placed: where it is laid down, ends, and a constant flow.
         asked: azimuth, waiting time, dry friction, and a flow over time.
         roughness: height of the asperities, m; None: 1e-4 of the body's radius.
+        field: axis about which the field of a robot with a magnet turns.
         weight: let weight and buoyancy act, if the masses are known.
         progress: told what is being computed, how much is done, and of how much.
 
@@ -66,6 +69,7 @@ def run_in_tube(
     robot = steady.robot
     own = robot.drive.duty if robot.drive is not None else 1.0
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
+    links = in_tilted_field(links, field)
     turn = links.turn
     dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]

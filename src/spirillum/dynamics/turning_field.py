@@ -9,11 +9,12 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.acting import Acting
+from spirillum.errors import InputError
 from spirillum.kernels import rigid_links
 from spirillum.robot.arguments import Options
 from spirillum.robot.fields import MagneticField, Pitch, Rate, Yaw
 
-__all__ = ["Field", "TurningField"]
+__all__ = ["Field", "TurningField", "in_tilted_field"]
 
 _A = TypeVar("_A", bound=Acting)
 
@@ -80,3 +81,26 @@ class TurningField:
         drive[rigid_links.AXIS_Y : rigid_links.FIELD_PHASE] = self.axis[1:]
         drive[rigid_links.FIELD_PHASE] = self.phase
         return replace(links, drive=drive)
+
+
+def in_tilted_field(links: _A, asked: Field) -> _A:
+    """A robot in the field of its file, which turns about the axis that is asked for.
+
+    Args:
+        links: what its rates follow from.
+        asked: yaw and pitch of the axis; what is not given is 0.
+
+    Raises:
+        InputError: for another drive, or a rate or strength, which are the robot's own.
+    """
+    given = asked.model_dump(exclude_none=True)
+    if not given:
+        return links
+    own = TurningField.of(links)
+    if own is None:
+        raise InputError(f"field.{next(iter(given))} without a field; allowed: with drive.kind = 'magnetic'")
+    for name in ("rotation_rate", "strength"):
+        if name in given:
+            place = "magnetic.field" if name == "strength" else f"magnetic.{name}"
+            raise InputError(f"field.{name} of a run; allowed: {place} of the robot")
+    return own.changed(asked, 0.0).on(links)
