@@ -51,11 +51,14 @@ def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
         dataset[f"{name}_low"], dataset[f"{name}_high"] = 0.5 * dataset[name], 2.0 * dataset[name]
     found = ranking_of(dataset)
     fastest = found.best[0]
-    assert (found.kind, fastest.places, fastest.of_places) == ("band", 2, 3)
+    assert (found.kind, fastest.places, fastest.of_places) == ("band", 3, 4)  # the reference place is one
     assert found.robots[0].low["forward_velocity"] == pytest.approx(0.5 * found.robots[0].values["forward_velocity"])
     assert "(" in found.message
-    assert best_in_words(fastest.to_dict()) == f"fastest: {fastest.robot.name}, at 2 of 3 places"
-    assert best_in_words(fastest.to_dict(), "1 mm/s") == f"fastest: {fastest.robot.name}, 1 mm/s, at 2 of 3 places"
+    assert best_in_words(fastest.to_dict()) == f"fastest: {fastest.robot.name}, at 3 of 4 places"
+    assert best_in_words(fastest.to_dict(), "1 mm/s") == f"fastest: {fastest.robot.name}, 1 mm/s, at 3 of 4 places"
+    for name in (*names, *(f"{name}_at_place" for name in names)):  # a robot without any answer takes no place away
+        dataset[name][{"wavelength": 0, "amplitude": 0}] = np.nan
+    assert ranking_of(dataset).best[0].of_places == 4
 
 
 def test_report_starts_with_the_ranking(tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ class Best(NamedTuple):
     quantity: str
     robot: RankedRobot
     places: int
-    """Number of places of the band at which it is the best; 0 without a band."""
+    """Number of places, the reference place one of them, at which it is the best; 0 without a band."""
     of_places: int
     """Number of places at which the robots have answers."""
     spread: float
@@ -315,7 +315,8 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     places = chosen.get(f"{name}_at_place")
     if places is None:
         return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size)
-    there = sign * places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
+    others = places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
+    there = sign * np.column_stack([values, others])[among]
     there = there[:, np.isfinite(there).all(axis=0)]
-    wins = int(np.count_nonzero(np.argmax(there, axis=0) == winner)) if there.shape[1] else 0
+    wins = int(np.count_nonzero(among[np.argmax(there, axis=0)] == winner)) if there.shape[1] else 0
     return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size)
