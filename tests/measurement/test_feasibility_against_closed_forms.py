@@ -9,6 +9,7 @@ from spirillum import InputError
 from spirillum.measurement.depth import apparent_distance, depth_shares
 from spirillum.measurement.feasibility import feasibility
 from spirillum.measurement.setup_template import new_setup_file, setup_answer
+from spirillum.swimming.prediction import predict
 from spirillum.vision.setup import load_setup
 
 
@@ -92,12 +93,24 @@ def test_a_robot_that_is_never_in_view_has_no_interval_and_no_verdict(setup_file
     assert any(words in sentence for sentence in found.warnings)
 
 
-def test_unknown_numbers_are_predicted_or_left_out(setup_file: Path) -> None:
-    found = feasibility(setup_file, tail_rate="1.2 Hz")
-    value, source = found.expected["forward_velocity"]
-    assert (value, source) == (pytest.approx(1.10233e-3, rel=1e-4), "predicted by sbt")
+def test_unknown_numbers_are_predicted_as_predict_does_or_left_out(setup_file: Path) -> None:
+    found, said = (
+        feasibility(setup_file, tail_rate="1.2 Hz"),
+        predict("biorob2012-wide", tail_rate="1.2 Hz", band=False),
+    )
+    for name in ("forward_velocity", "body_rotation_rate"):
+        assert found.expected[name] == (pytest.approx(getattr(said, name), rel=1e-9), f"predicted by {said.model.name}")
     assert dict(found.intervals) == {}
     assert "nothing says how large a pixel is" in found.warnings[-1]
+
+
+def test_a_prediction_that_leaves_out_the_walls_says_so(setup_file: Path) -> None:
+    """A tail that is not of the paper has no table for its tube, which would take minutes."""
+    found = feasibility(setup_file, tail_rate="1.2 Hz", overrides={"tail.wavelength": "17 mm"})
+    assert found.expected["forward_velocity"][1] == "predicted by slender"
+    assert "the channel's walls are left out" in found.warnings[-1]
+    given = feasibility(setup_file, **RATES, overrides={"tail.wavelength": "17 mm"})
+    assert not any("walls" in sentence for sentence in given.warnings)
 
 
 def test_intervals_shrink_with_time_and_frames(setup_file: Path) -> None:

@@ -13,6 +13,8 @@ import spirillum as sp
 from spirillum.robot.load import load, preset_names
 from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.motion import steady_rates
+from spirillum.virtual.options import MotionOptions
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial import render
@@ -83,6 +85,18 @@ def test_the_setup_is_one_and_knows_the_heights(trial: Any) -> None:
     assert setup.camera.height == pytest.approx(0.210)
     assert setup.tank.surface == pytest.approx(0.060)
     assert setup.robot.axis_height == pytest.approx(0.022 - 0.020 + 0.009 + 0.0005)
+
+
+def test_a_film_shows_what_predict_says_where_no_model_is_named() -> None:
+    """The paper's robot has a table for its tube. Without one its walls are left out, and the film says so."""
+    asked = MotionOptions.of({"tail_rate": "1.2 Hz"})
+    rates, source, _ = steady_rates(load(ROBOT), asked)
+    said = sp.predict(ROBOT, tail_rate="1.2 Hz", band=False)
+    assert source == said.model.name == "tube"
+    assert rates["forward_velocity"] == pytest.approx(said.forward_velocity, rel=1e-9)
+    _, source, warnings = steady_rates(load(ROBOT, **{"tail.wavelength": "17 mm"}), asked)
+    assert source == "slender"
+    assert "walls are left out" in warnings[-1]
 
 
 def test_a_planted_wrong_depth_stands_in_the_setup_alone(tmp_path: Path) -> None:

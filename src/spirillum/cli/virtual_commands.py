@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Friction, Json, NamedModel, RobotArgument, Settings, TailRate, starting
+from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
 
 if TYPE_CHECKING:
     from spirillum.robot.arguments import Options
@@ -117,7 +117,7 @@ def render(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
     ],
-    model: NamedModel = "sbt",
+    model: Model = "auto",
     tail_rate: TailRate = None,
     friction: Friction = None,
     forward_velocity: Annotated[
@@ -253,7 +253,9 @@ def virtual_experiment(
         "spirillum-virtual-experiment"
     ),
     trials: Annotated[int, typer.Option(help="Trials of each robot.")] = 5,
-    model: Annotated[str | None, typer.Option(help="Hydrodynamic model; else the study's first, or sbt.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Hydrodynamic model; else the study's first, or that of predict.")
+    ] = None,
     friction: Friction = None,
     tail_rate: TailRate = None,
     spread: Annotated[

@@ -45,6 +45,8 @@ _SMALLEST = {"wire": 1.0, "stripe": 3.0, "spacing": 4.0, "amplitude": 2.0}
 """Sizes at which the tracker passes its tests with a margin, pixels."""
 _NEEDED = {"robot": 20.0, "spacing": 3.0}
 """Sizes below which ruler or robot are not detected, pixels."""
+_OTHERWISE = "--expect-speed and --expect-body-rate take what `spirillum predict` says"
+"""How else to come to expected rates with walls than by `spirillum prepare`, a clause."""
 _BASIS = (
     f"errors of a frame: {_POSITION_ERROR:g} pixels of position, {_EDGE_ERROR:g} pixels of a stripe's edge, "
     f"{_WAVE_ERROR:g} pixels of the wire across; {_CORRELATION:g} neighbouring frames err alike, "
@@ -148,7 +150,8 @@ def feasibility(
 
     Args:
         setup: the setup file.
-        tail_rate: expected rate of the tail; unset: predicted by the model `sbt`, as are those that follow.
+        tail_rate: expected rate of the tail; unset: predicted by the model that `predict` answers with, where
+            it is ready at once; so are those that follow.
         body_rate: expected rate of the body.
         speed: expected forward velocity.
         duration: length of a trial; unset: 20 s.
@@ -165,7 +168,7 @@ def feasibility(
     if overrides:
         beside = Path(setup).parent / chosen.robot.file
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
-    expected = _expected(robot, tail_rate, body_rate, speed)
+    expected, caution = _expected(robot, tail_rate, body_rate, speed)
     rate, source_of_rate = chosen.camera.frames_per_second or _FRAMES_PER_SECOND, "assumed"
     if frames_per_second is not None:
         rate, source_of_rate = frames_per_second, "given"
@@ -196,7 +199,7 @@ def feasibility(
         measured = min(span, view.value)
     seen = found and math.isfinite(pixel) and measured * rate >= _FEWEST
     intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
-    warnings = tuple(_warnings(checks, expected, pixel, shares))
+    warnings = (*_warnings(checks, expected, pixel, shares), *caution)
     return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, warnings)
 
 
@@ -222,25 +225,27 @@ def _warnings(
 
 def _expected(
     robot: Robot, tail_rate: str | float | None, body_rate: str | float | None, speed: str | float | None
-) -> dict[str, tuple[float, str]]:
+) -> tuple[dict[str, tuple[float, str]], tuple[str, ...]]:
+    """Expected motion by name, each value with its source, and what to be careful about in a prediction."""
     given: dict[str, float | None] = {
         "forward_velocity": None if speed is None else parse_option("expect-speed", speed, KINDS["velocity"]),
         "body_rotation_rate": None if body_rate is None else parse_option("expect-body-rate", body_rate, KINDS["rate"]),
         "tail_rotation_rate": None if tail_rate is None else parse_option("expect-tail-rate", tail_rate, KINDS["rate"]),
     }
     found = {name: (value, "given") for name, value in given.items() if value is not None}
-    if len(found) < len(given):
-        from spirillum.swimming.prediction import predict
+    if len(found) == len(given):
+        return {name: found[name] for name in given}, ()
+    from spirillum.swimming.model_choice import AUTO, choose_model
+    from spirillum.swimming.prediction import predict
 
-        try:
-            answer = predict(robot, model="sbt", tail_rate=given["tail_rotation_rate"])
-        except InputError as error:
-            raise InputError(
-                f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all"
-            ) from error
-        for name in given:
-            found.setdefault(name, (float(getattr(answer, name)), "predicted by sbt"))
-    return {name: found[name] for name in given}
+    try:
+        choice = choose_model(AUTO, robot, tables_only=True, other_way=_OTHERWISE)
+        answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
+    except InputError as error:
+        raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error
+    for name in given:
+        found.setdefault(name, (float(getattr(answer, name)), f"predicted by {choice.model}"))
+    return {name: found[name] for name in given}, (choice.caution,) if choice.caution else ()
 
 
 def _pixel(

@@ -34,11 +34,12 @@ from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
+from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
 from spirillum.version import own_version
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
-from spirillum.virtual.motion import steady_rates, without_walls
+from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions
 from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render
@@ -139,7 +140,7 @@ def virtual_experiment(
         output: folder; a finished trial that is there and whole is kept, another experiment in it is refused.
         trials: of each robot, 1 to 1000.
         motion: `MotionOptions`: model, tail rate, friction, prescribed rates; the model is by default the study's
-            first, `sbt` without a study.
+            first, without a study the one of `predict`.
         spread: relative standard deviation of the motor's rate from trial to trial, 0 to 0.3.
         duration: of each trial, with its unit or a float in s; None: as long as the robot is in view, at most 20 s.
         camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
@@ -165,7 +166,7 @@ def virtual_experiment(
     steady, warnings = {}, []
     for name, robot in robots.items():
         steady[name], _, said = steady_rates(robot, motion, default_model)
-        warnings += [*without_walls(robot, motion, default_model), *(f"{name}: {sentence}" for sentence in said)]
+        warnings += [f"{name}: {sentence}" for sentence in said]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
         "rates": steady,
@@ -211,7 +212,7 @@ def virtual_experiment(
 def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Robot], str]:
     """Robots by the names of their folders, and the study's first model."""
     if study is None:
-        return {name: load(name) for name in PAPER_ROBOTS}, "sbt"
+        return {name: load(name) for name in PAPER_ROBOTS}, AUTO
     from spirillum.studies.loading import load_study
 
     loaded = load_study(study)

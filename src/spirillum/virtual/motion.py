@@ -13,6 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.robot import Robot
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.tank import tube_height
 from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_trajectory, steady_trajectory
@@ -20,7 +21,10 @@ from spirillum.virtual.trajectory import TrialTrajectory, lab_to_camera, run_tra
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates", "without_walls"]
+__all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
+
+_WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
+"""How else to come to a film with walls than by `spirillum prepare`, a clause."""
 
 
 @dataclass(frozen=True)
@@ -34,14 +38,14 @@ class Motion:
 
 
 def steady_rates(
-    robot: Robot, motion: MotionOptions, default_model: str = "sbt"
+    robot: Robot, motion: MotionOptions, default_model: str = AUTO
 ) -> tuple[dict[str, float], str, tuple[str, ...]]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
     Args:
         robot: a checked robot.
         motion: the model and the prescribed rates.
-        default_model: where `motion` names none.
+        default_model: where `motion` names none; `auto` is what `predict` answers with, where it is ready at once.
 
     Returns:
         The rates by name, what they are from, and warnings.
@@ -59,26 +63,23 @@ def steady_rates(
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 
-    model = motion.model or default_model
-    steady = predict(robot, model=model, tail_rate=motion.tail_rate, friction=motion.friction, band=False)
+    choice = choose_model(motion.model or default_model, robot, tables_only=True, other_way=_WITHOUT_A_TABLE)
+    steady = predict(robot, model=choice.model, tail_rate=motion.tail_rate, friction=motion.friction, band=False)
     found = {name: float(getattr(steady, name)) for name in given} | fixed
     prescribed = [name for name in fixed if name != "tail_rotation_rate"]
-    source = f"{model}, prescribed: {', '.join(prescribed)}" if prescribed else model
-    return found, source, tuple(steady.warnings)
+    source = f"{choice.model}, prescribed: {', '.join(prescribed)}" if prescribed else choice.model
+    walls = () if "forward_velocity" in fixed else _without_walls(robot, choice)
+    return found, source, (*steady.warnings, *walls)
 
 
-def without_walls(robot: Robot, motion: MotionOptions, default_model: str = "sbt") -> tuple[str, ...]:
-    """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none.
-
-    Args:
-        robot: a checked robot.
-        motion: the model and the prescribed rates.
-        default_model: where `motion` names none.
-    """
-    model = motion.model or default_model
-    if robot.channel is None or motion.forward_velocity is not None or find_swimmer_model(model).placed:
+def _without_walls(robot: Robot, choice: ModelChoice) -> tuple[str, ...]:
+    """A sentence where a film shows a robot in a channel whose walls its model leaves out; else none."""
+    if choice.caution:
+        return (choice.caution,)
+    if robot.channel is None or find_swimmer_model(choice.model).placed:
         return ()
-    return (f"model '{model}' leaves out the channel's walls: the film shows a faster robot than with model 'tube'",)
+    named = f"model '{choice.model}' leaves out the channel's walls"
+    return (f"{named}: the film shows a faster robot than with model '{WALLED}'",)
 
 
 def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: CameraOptions) -> Motion:
@@ -108,7 +109,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         body_angle=trial.body_angle,
         tail_phase=trial.tail_phase,
     )
-    return Motion(trajectory, source, (*warnings, *without_walls(robot, motion)))
+    return Motion(trajectory, source, warnings)
 
 
 def motion_of_run(robot: Robot, run: xr.Dataset | str | Path, trial: TrialOptions, camera: CameraOptions) -> Motion:

@@ -47,7 +47,7 @@ class MotionOptions(Options):
     argument: ClassVar[str] = "motion"
 
     model: str | None = None
-    """Hydrodynamic model; None: `sbt`, in a virtual experiment the study's first."""
+    """Hydrodynamic model; None: the study's first, without a study the one that `predict` answers with."""
     friction: str | None = None
     """Reading of the friction; None: the robot's own."""
     tail_rate: Rate | None = None
