@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robot.outline import Line, Outline
+from spirillum.robot.outline import Arc, Line, Outline
 from spirillum.robot.placement import Placement
 
 __all__ = [
@@ -44,11 +44,13 @@ GAP_BAND = (1.0 / 90.0, 1.0 / 9.0)
 """Least and largest gap over the body's radius of the band over unknown gaps: 0.1 to 1 mm for the paper's robot."""
 STEEPEST_PITCH = 0.25 * np.pi
 """Largest pitch of a placement, nose up or down, rad."""
-_SAMPLES = (257, *(33,) * 5)  # rings of a curved piece; each number narrows the bracket of the farthest one
+_SAMPLES = np.linspace(0.0, 1.0, 257)  # rings of a curved piece
+_ROUNDS = 3  # each samples between the neighbours of the farthest ring so far; the distance is then exact
 _STEPS = 181  # pitches that are tried before the first contact is bracketed
 _NARROWEST = 1e-10  # of the bracket around it, rad
 _AROUND = 64  # points of a yawed ring among which Newton's method begins
 _NEWTON_STEPS = 6
+_STILL = 1e-9  # step at which it ends, rad: the distance is then exact
 
 
 @dataclass(frozen=True)
@@ -127,16 +129,17 @@ class Seat:
         Args:
             outline: outline of body or coupling in the robot's frame.
         """
-        reach = 0.0
-        for piece in outline.pieces:
-            low, high = 0.0, 1.0
-            # Along a straight piece the distance is convex: it is largest at one of its ends.
-            for count in (2,) if isinstance(piece, Line) else _SAMPLES:
-                t = np.linspace(low, high, count)
-                distance, _ = self._farthest(*piece.points(t))
-                at = int(np.argmax(distance))
+        ends, arcs = _rings(outline)
+        reach = float(self._farthest(*ends)[0].max(initial=0.0))
+        for arc, whole in arcs:
+            rings, low, width = whole, 0.0, 1.0
+            for _ in range(_ROUNDS):
+                distance, _ = self._farthest(*rings)
+                at = int(distance.argmax())
                 reach = max(reach, float(distance[at]))
-                low, high = float(t[max(at - 1, 0)]), float(t[min(at + 1, count - 1)])
+                first, last = max(at - 1, 0), min(at + 1, _SAMPLES.size - 1)
+                low, width = low + width * float(_SAMPLES[first]), width * float(_SAMPLES[last] - _SAMPLES[first])
+                rings = arc.points(low + width * _SAMPLES)
         return float(self.radius - reach)
 
     def tail_clearance(self, points: Samples, wire_radius: float) -> TailClearance:
@@ -211,6 +214,15 @@ class Seat:
         return np.hypot(sideways, d + rho * np.cos(pitch) * s), np.arcsin(s)
 
 
+@lru_cache(maxsize=256)
+def _rings(outline: Outline) -> tuple[tuple[Samples, Samples], list[tuple[Arc, tuple[Samples, Samples]]]]:
+    """(x, rho) of the rings at the ends of straight pieces, along which the distance is convex, and of each arc's."""
+    ends = [end for piece in outline.pieces if isinstance(piece, Line) for end in (piece.start, piece.end)]
+    x, rho = np.array(ends, dtype=float).reshape(-1, 2).T
+    arcs = [piece for piece in outline.pieces if not isinstance(piece, Line)]
+    return (x, rho), [(arc, arc.points(_SAMPLES)) for arc in arcs]
+
+
 def _farthest_of_ellipses(
     height: tuple[Samples, Samples], side: tuple[Samples, Samples, Samples]
 ) -> tuple[Samples, Samples]:
@@ -220,28 +232,25 @@ def _farthest_of_ellipses(
         height: its mean and its coefficient of sin(theta), (n,) each.
         side: its mean and its coefficients of sin(theta) and cos(theta), (n,) each.
     """
+    (h_0, h_s), (w_0, w_s, w_c) = height, side
     theta = 2.0 * np.pi * np.arange(_AROUND) / _AROUND
     s, c = np.sin(theta), np.cos(theta)
-    squared = (height[0][:, None] + height[1][:, None] * s) ** 2
-    squared += (side[0][:, None] + side[1][:, None] * s + side[2][:, None] * c) ** 2
-    angle = theta[np.argmax(squared, axis=1)]
-
-    def at(angle: Samples) -> tuple[Samples, Samples]:
+    # The squared distance is a quadratic form of sine and cosine; what is constant does not move its maximum.
+    terms = (2.0 * (h_0 * h_s + w_0 * w_s), 2.0 * w_0 * w_c, h_s**2 + w_s**2, w_c**2, 2.0 * w_s * w_c)
+    angle = theta[np.argmax(np.stack(terms, axis=1) @ np.stack([s, c, s**2, c**2, s * c]), axis=1)]
+    best, found = np.zeros_like(angle), angle
+    for _ in range(_NEWTON_STEPS + 1):
         s, c = np.sin(angle), np.cos(angle)
-        return height[0] + height[1] * s, side[0] + side[1] * s + side[2] * c
-
-    best = np.hypot(*at(angle))
-    found = angle
-    for _ in range(_NEWTON_STEPS):
-        s, c = np.sin(angle), np.cos(angle)
-        up, aside = at(angle)
-        up_1, aside_1 = height[1] * c, side[1] * c - side[2] * s
-        slope = up * up_1 + aside * aside_1
-        bend = up_1**2 + aside_1**2 - up * height[1] * s - aside * (side[1] * s + side[2] * c)
-        step = np.where(bend < 0, -slope / np.where(bend < 0, bend, 1.0), 0.0)
-        angle = angle + np.clip(step, -2.0 * np.pi / _AROUND, 2.0 * np.pi / _AROUND)
-        distance = np.hypot(*at(angle))
+        up, aside = h_0 + h_s * s, w_0 + w_s * s + w_c * c
+        distance = np.hypot(up, aside)
         found, best = np.where(distance > best, angle, found), np.maximum(distance, best)
+        up_1, aside_1 = h_s * c, w_s * c - w_c * s
+        slope = up * up_1 + aside * aside_1
+        bend = up_1**2 + aside_1**2 - up * h_s * s - aside * (w_s * s + w_c * c)
+        step = np.where(bend < 0, -slope / np.where(bend < 0, bend, 1.0), 0.0)
+        if np.abs(step).max(initial=0.0) < _STILL:
+            break
+        angle = angle + np.clip(step, -2.0 * np.pi / _AROUND, 2.0 * np.pi / _AROUND)
     return best, found
 
 
