@@ -13,8 +13,8 @@ import spirillum as sp
 from spirillum.robot.load import load, preset_names
 from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation
-from spirillum.virtual.motion import steady_rates
-from spirillum.virtual.options import MotionOptions
+from spirillum.virtual.motion import motion_of_run, steady_rates
+from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
 from spirillum.virtual.trial import render
@@ -152,6 +152,10 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
             np.diff(truth["tail_phase"]), np.diff(np.interp(truth["time"], run["time"], run["tail_angle"]))
         )
     assert found.model.startswith("run")
+    whole = motion_of_run(sp.load(ROBOT), run, TrialOptions(), CameraOptions())
+    assert whole.trajectory.duration == pytest.approx(0.6)
+    with pytest.raises(sp.InputError, match=r"duration = 0\.7 s, but the run ends at 0\.6 s"):
+        motion_of_run(sp.load(ROBOT), run, TrialOptions(duration="0.7 s"), CameraOptions())
 
 
 @pytest.mark.parametrize("view", ["top", "side"])

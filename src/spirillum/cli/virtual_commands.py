@@ -136,7 +136,9 @@ def render(
             metavar="FILE", help="A run of `spirillum simulate` instead of steady swimming.", rich_help_panel=_MOTION
         ),
     ] = None,
-    duration: Annotated[str, typer.Option(metavar="TIME", help="Length of the video.")] = "20s",
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help="Length of the video; else 20 s, or that of the run.")
+    ] = None,
     start: Annotated[
         str | None,
         typer.Option(

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
 
+_USUAL = 20.0
+"""Length of a film of steady swimming, s."""
 _WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
 """How else to come to a film with walls than by `spirillum prepare`, a clause."""
 
@@ -101,7 +103,7 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
         raise InputError(f"wobble = {1e3 * trial.wobble:.4g} mm; allowed: {most}")
     position = lab_to_camera(camera.view, leftwards=camera.leftwards) @ _resting_place(robot, trial.gap, trial.lateral)
     trajectory = steady_trajectory(
-        trial.duration,
+        _USUAL if trial.duration is None else trial.duration,
         **rates,
         position=position + np.array([0.0, 0.0, tube_height(robot, camera.view)]),
         heading=trial.heading,
@@ -134,7 +136,9 @@ def motion_of_run(robot: Robot, run: xr.Dataset | str | Path, trial: TrialOption
     axis = tube_height(robot, camera.view)
     trajectory = run_trajectory(dataset, camera.view, leftwards=camera.leftwards, axis=axis, level=level)
     model = str(dataset.attrs.get("model", ""))[:60]
-    return Motion(trajectory.until(trial.duration), f"run, {model}" if model else "run")
+    if trial.duration is not None:
+        trajectory = trajectory.until(trial.duration)
+    return Motion(trajectory, f"run, {model}" if model else "run")
 
 
 def _clearance(robot: Robot) -> float:

@@ -63,8 +63,8 @@ class TrialOptions(Options):
 
     argument: ClassVar[str] = "trial"
 
-    duration: Time = 20.0
-    """Of the video."""
+    duration: Time | None = None
+    """Of the video; None: 20 s, of a run its length."""
     start: SignedLength | None = None
     """x of the body's mid-length at the first frame, from below the lens; None: the path is centred in the picture."""
     lateral: SignedLength = 0.0
