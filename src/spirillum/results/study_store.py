@@ -16,6 +16,7 @@ from spirillum.crews import Crew, shared_out
 from spirillum.errors import InputError
 from spirillum.extras import required
 from spirillum.files import opened_store, read_json, results_folder, store_files, store_target, write_pieces
+from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
 from spirillum.studies.estimate import estimate_of, is_large
 from spirillum.studies.loading import LoadedStudy
@@ -23,7 +24,6 @@ from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.regions import Region, layout_of
 from spirillum.studies.run import warnings_of, warnings_of_calibrations
 from spirillum.studies.stored import Plan, encoded_region, plan_of, region_jobs
-from spirillum.studies.work import Caution, summed
 
 if TYPE_CHECKING:
     import xarray as xr

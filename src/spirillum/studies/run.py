@@ -14,13 +14,15 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.robot import Robot
 from spirillum.studies.band import BandTask, band_tasks, left_out
+from spirillum.studies.cautions import cautions, summed
 from spirillum.studies.dataset import assembled
 from spirillum.studies.jobs import AnyTask, answered, job_of
+from spirillum.studies.kept_parts import keep, kept
 from spirillum.studies.laid_down import laid_down_tasks, without_answer
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.settled import not_settled, settled_basis, settled_tasks
-from spirillum.studies.work import OneRobot, Task, cautions, keep, kept, summed, tasks
+from spirillum.studies.work import OneRobot, Task, tasks
 from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models

@@ -10,12 +10,13 @@ import numpy as np
 from spirillum.answer import as_json
 from spirillum.files import Stored, chunk_key, region_files
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.studies.cautions import cautions
 from spirillum.studies.dataset import coordinates_of, laid_out
 from spirillum.studies.jobs import one_thread_each
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.studies.regions import Layout, Region, cut
-from spirillum.studies.work import AT_RATES, WITH_INTERVALS, Part, answer, cautions, tasks
+from spirillum.studies.work import AT_RATES, WITH_INTERVALS, Part, answer, tasks
 from spirillum.swimming.answer import STEADY
 
 if TYPE_CHECKING:

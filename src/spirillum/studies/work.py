@@ -1,31 +1,25 @@
-"""The work of a study: blocks of robots, one model at a time, each kept on disk as soon as it is done."""
+"""The work of a study: blocks of robots, one model at a time."""
 
 from __future__ import annotations
 
-import zipfile
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple, Protocol, cast
 
 import numpy as np
 
 from spirillum.arrays import PerRobot, Values
-from spirillum.files import opened, whole_file
 from spirillum.fitted.calibration_file import CalibrationFile, calibrated_robot
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model, quickest
 from spirillum.robot.batch import RobotBatch, batches
-from spirillum.robot.limits import broken
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.loading import LoadedStudy
 from spirillum.studies.observed import ObservedArrays
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.band import joined
-from spirillum.swimming.cautions import accuracy_limits
 from spirillum.swimming.intervals import intervals_of
 from spirillum.swimming.steady import requirements, swim
 
@@ -34,17 +28,12 @@ __all__ = [
     "BLOCK",
     "REASONS",
     "WITH_INTERVALS",
-    "Caution",
     "OneRobot",
     "Part",
     "Task",
     "answer",
-    "cautions",
     "gathered",
     "groups",
-    "keep",
-    "kept",
-    "summed",
     "tasks",
 ]
 
@@ -360,116 +349,3 @@ def _reasons(batch: RobotBatch, model: str) -> PerRobot:
         code = REASONS.index(limit.flag) if limit.flag in REASONS else REASONS.index("other")
         reason = np.where((reason == 0) & ~np.broadcast_to(limit.holds, reason.shape), code, reason)
     return reason
-
-
-class Caution(NamedTuple):
-    """A requirement that robots of a task break: one of accuracy, or one without which they have no answer."""
-
-    model: str
-    flag: str
-    robots: int
-    """How many."""
-    sentence: str
-    """The first of them in words."""
-    refused: bool = False
-    """Whether they have no answer for it."""
-
-
-def _refusals(task: Task, part: Part) -> list[Caution]:
-    """Why robots of a task have no answer, one for each requirement; each robot counts for the first that it breaks."""
-    left = np.any(part["outside"] != 0, axis=-1)
-    found = []
-    for limit in broken(requirements(task.batch, find_swimmer_model(task.model))):
-        of_this = left & ~np.broadcast_to(limit.holds, left.shape)
-        if of_this.any():
-            sentence = limit.sentence(int(np.argmax(of_this)))
-            found.append(Caution(task.model, limit.flag, int(np.count_nonzero(of_this)), sentence, refused=True))
-        left &= ~of_this
-    if left.any():
-        lacking = np.count_nonzero(part["outside"][int(np.argmax(left))])
-        sentence = f"no steady motion under {lacking} of {part['outside'].shape[-1]} readings of the friction"
-        found.append(Caution(task.model, "other", int(np.count_nonzero(left)), sentence, refused=True))
-    return found
-
-
-def cautions(task: Task, part: Part) -> list[Caution]:
-    """What to be careful about in a task's answer, and why robots have none, one for each kind."""
-    size = task.batch.size
-    first = Swimming(**{item.name: part[item.name][:, 0] for item in STEADY}, valid=part["outside"][:, 0] == 0)
-    found = _refusals(task, part)
-    for limit in broken(accuracy_limits(task.batch, find_swimmer_model(task.model), first)):
-        holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
-        count = int(np.count_nonzero(~holds))
-        if count:
-            found.append(Caution(task.model, limit.flag, count, limit.sentence(int(np.argmin(holds)))))
-    return found
-
-
-def summed(found: Iterable[Caution], robots: int) -> list[str]:
-    """A sentence for each kind of caution, over all tasks of a study."""
-    groups: dict[tuple[str, str, bool], list[Caution]] = {}
-    for caution in found:
-        groups.setdefault((caution.model, caution.flag, caution.refused), []).append(caution)
-    return [
-        f"{sum(caution.robots for caution in group)} of {robots} robots "
-        f"{'have no answer ' if refused else ''}({model}), the first: {group[0].sentence}"
-        for (model, _, refused), group in groups.items()
-    ]
-
-
-class Keepable(Protocol):
-    """A task as far as keeping its answer goes."""
-
-    @property
-    def file_name(self) -> str:
-        """Name of the file that keeps its answer."""
-
-    @property
-    def size(self) -> int:
-        """Number of robots."""
-
-    @property
-    def needed(self) -> set[str]:
-        """Names of the arrays that every answer has."""
-
-    @property
-    def allowed(self) -> set[str]:
-        """Names of the arrays that an answer may have."""
-
-
-def kept(task: Keepable, folder: Path | None, leading: tuple[int, ...]) -> Part | None:
-    """The answer that an earlier run has kept; None if there is none, or it is damaged or not of this task.
-
-    Args:
-        task: what was asked.
-        folder: where answers are kept; None: nowhere.
-        leading: sizes of the first axes of all its arrays.
-    """
-    if folder is None or not (folder / task.file_name).is_file():
-        return None
-    try:
-        with opened(folder / task.file_name, "a part of a study", _LARGEST_PART) as stream:
-            if any(not _as_kept(item) for item in zipfile.ZipFile(stream).infolist()):
-                return None
-            with np.load(stream, allow_pickle=False) as stored:
-                part = {name: stored[name] for name in stored.files}
-    except Exception:  # a damaged file raises whatever the libraries meet first
-        return None
-    whole = task.needed <= set(part) <= task.allowed
-    fits = all(array.dtype == np.float64 and array.shape[: len(leading)] == leading for array in part.values())
-    return part if whole and fits else None
-
-
-_LARGEST_PART = 1 << 30
-
-
-def _as_kept(item: zipfile.ZipInfo) -> bool:
-    """Whether an array stands in the file as it is: what is compressed could be a thousand times as large."""
-    return item.compress_type == zipfile.ZIP_STORED and item.compress_size == item.file_size
-
-
-def keep(task: Keepable, part: Part, folder: Path | None) -> None:
-    """Keep a finished answer."""
-    if folder is not None:
-        with whole_file(folder / task.file_name, replace="any") as path, path.open("wb") as stream:
-            np.savez(stream, **cast("dict[str, Any]", part))

@@ -6,7 +6,6 @@ contact; any other its path from the side and from above, current, powers and en
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -17,12 +16,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.events import told
 from spirillum.dynamics.run_file import robot_of
 from spirillum.errors import InputError
 from spirillum.quantities import unit_of
 from spirillum.robot.robot import Robot
 from spirillum.view.figures.cross_section import draw_cross_section
+from spirillum.view.figures.run_events import event_words, events_of, mark_events
 from spirillum.view.figures.sheet import Sheet, add_letters
 from spirillum.view.figures.style import COLOURS, COLUMN, PAGE, Scale, plain, styled
 
@@ -35,13 +34,8 @@ COLUMNS = {"single": COLUMN, "double": PAGE}
 """Widths of a figure that fills one or both columns of a page, inches."""
 _HEIGHTS = {"single": (1.2, 2.0, 0.56), "double": (1.75, 2.4, 1.15)}
 """Heights of the paths, of the cross-section, and of a panel over time, inches."""
-_MOST_EVENTS = 12
-_CROWDED = 0.05
-"""Distance of events over that of the axis below which they share a label."""
 _LETTERS_BESIDE = 40
 """Letters of a legend, with seven for each line's sample, above which its entries stand in two columns."""
-_LETTER = 0.1
-"""Share of a time axis above which the panel's letter stands."""
 _MANY_TURNS = 30.0
 """Turns of the tail above which their oscillations fill a panel, and means over a turn are drawn too."""
 _SWITCHED = 0.99
@@ -157,7 +151,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
     shown = [panel for panel in (_PANELS if tube is None else _IN_TUBE) if _has(dataset, panel, time)]
     if path is None and not shown:
         raise InputError("the run has no variable to draw; allowed: a run of `spirillum simulate`")
-    events = _events_of(dataset, time)
+    events = events_of(dataset, time)
     turn = _turn_of(dataset, time) if any(panel.mean for panel in shown) else 0
     beside = 2 if column == "double" else 1
     with styled():
@@ -172,7 +166,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
             width=COLUMNS[column],
             heights=rows,
             columns=beside,
-            notes=[*(["black: means over a turn of the tail"] if turn else []), *_event_words(events)],
+            notes=[*(["black: means over a turn of the tail"] if turn else []), *event_words(events)],
             sharey=False,
         )
         panels = list(sheet.panels.flat)
@@ -186,7 +180,7 @@ def trajectory_figure(dataset: xr.Dataset, column: str = "double") -> Figure:
         over_time = panels[heads:drawn]
         for number, (axes, panel) in enumerate(zip(over_time, shown, strict=True)):
             _draw_panel(axes, dataset, panel, time, beside, turn)
-            _mark_events(axes, events, time, numbered=number < beside)
+            mark_events(axes, events, time, numbered=number < beside)
             axes.set_xlim(float(time[0]), float(time[-1]))
             if number + beside < len(shown):
                 axes.tick_params(labelbottom=False)
@@ -400,57 +394,3 @@ def _make_room(axes: Axes, rows: float) -> None:
         axes.set_ylim(low, high * (high / low) ** (0.32 * rows))
     else:
         axes.set_ylim(low, high + 0.28 * rows * (high - low))
-
-
-def _events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
-    """Times within the run, and what happened then; what it begins with is no event in it.
-
-    Of what happens again and again, as where a contact bounces, the first time and the number of times.
-    """
-    try:
-        listed = json.loads(str(dataset.attrs.get("events", "[]")))
-        found = [(float(event["time"]), plain(str(event["what"]), 60)) for event in listed]
-    except (ValueError, TypeError, KeyError):
-        return []  # they are notes on a picture; a run without them can still be drawn
-    inside = [event for event in found if time[0] < event[0] <= time[-1]]
-    return [
-        (event.time, f"{event.what}, {event.times} times" if event.times > 1 else event.what) for event in told(inside)
-    ]
-
-
-def _event_words(events: list[tuple[float, str]]) -> list[str]:
-    """The events by number, in one note."""
-    words = [f"{number}: {what} ({when:.4g} s)" for number, (when, what) in enumerate(events[:_MOST_EVENTS], 1)]
-    if len(events) > _MOST_EVENTS:
-        words.append(f"and {len(events) - _MOST_EVENTS} more")
-    return [" · ".join(words)] if words else []
-
-
-def _mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, numbered: bool) -> None:
-    first, span = float(time[0]), float(time[-1] - time[0])
-    for when, _ in events:
-        axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
-    for numbers in _close_together(events[:_MOST_EVENTS], span) if numbered else []:
-        middle = float(np.mean([events[number][0] for number in numbers]))
-        beside_letter = first + _LETTER * span
-        axes.annotate(
-            str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
-            (max(middle, beside_letter), 1.0),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center" if middle > beside_letter else "left",
-            size=7,
-            color="#555555",
-        )
-
-
-def _close_together(events: list[tuple[float, str]], span: float) -> list[list[int]]:
-    """Numbers of the events from 0, those together that have no room for a label each."""
-    found: list[list[int]] = []
-    for number, (when, _) in enumerate(events):
-        if found and when - events[found[-1][0]][0] < _CROWDED * span:
-            found[-1].append(number)
-        else:
-            found.append([number])
-    return found
