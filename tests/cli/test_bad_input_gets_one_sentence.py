@@ -1,7 +1,9 @@
 """Bad input: one sentence on standard error, exit code 2, nothing on standard output, nothing written."""
 
 import os
+import signal
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +165,25 @@ def test_interruption_leaves_with_130(run: Callable[..., Any], tmp_path: Path, m
     assert outcome.code == 130
     assert "interrupted" in outcome.err
     assert not (tmp_path / "out" / "dataset.nc").exists()
+
+
+def test_interrupt_that_a_library_has_caught_leaves_with_130(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that is being imported may take it for an import that failed, and fail later, for another reason."""
+    from spirillum import cli
+    from spirillum.studies import run as study_run
+
+    def interrupted(*_: object, **_more: object) -> None:
+        with suppress(KeyboardInterrupt):
+            cli._interrupt(signal.SIGINT, None)
+        raise TypeError("unsupported operand")
+
+    monkeypatch.setattr(cli, "_interrupts", [])
+    monkeypatch.setattr(study_run, "shared_out", interrupted)
+    outcome = run("study", "-o", str(tmp_path / "out"))
+    assert outcome.code == 130
+    assert outcome.err.endswith("spirillum: interrupted; what was done is kept\n")
 
 
 def test_our_own_errors_are_not_hidden(run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ from io import TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
 from threading import Timer
+from types import FrameType
 from typing import Any, TextIO
 
 __all__ = ["main"]
@@ -51,7 +52,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _prepare() -> None:
     """What only a process of its own may set."""
     gc.set_threshold(_OBJECTS)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # ends as cleanly as Ctrl-C, with the work it has started
+    for ending in (signal.SIGINT, signal.SIGTERM):  # both end as cleanly, with the work that was started
+        if signal.getsignal(ending) != signal.SIG_IGN:
+            signal.signal(ending, _interrupt)
     sys.unraisablehook = _not_lost
     # A user's settings of figures are not ours, and damaged ones stop the library.
     os.environ["MATPLOTLIBRC"] = str(Path(__file__).parents[1] / "view" / "figures" / "matplotlibrc")
@@ -66,6 +69,16 @@ def _prepare() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+
+
+_interrupts: list[int] = []
+"""Signals that have come to end this process."""
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """End by a KeyboardInterrupt, and remember it: a library that is being imported may catch that, and fail later."""
+    _interrupts.append(number)
+    signal.default_int_handler(number, frame)
 
 
 def _not_lost(found: sys.UnraisableHookArgs) -> None:
@@ -125,7 +138,7 @@ def _explained(error: BaseException) -> int | None:
 
     from spirillum.errors import InputError
 
-    if isinstance(error, (KeyboardInterrupt, Abort)):
+    if isinstance(error, (KeyboardInterrupt, Abort)) or _interrupts:
         return _fail("interrupted; what was done is kept", 130)
     if isinstance(error, InputError):
         return _fail(str(error), 2)
