@@ -194,3 +194,59 @@ def test_a_start_half_way_keeps_the_mean_from_end_to_end_in_the_interval(seed: i
     assert not found.steady
     assert found.low <= 9.9667 / 19.9667 <= found.high
     assert found.high - found.low < 0.2
+
+
+def wandering(seconds: float, noise: float) -> Callable[..., Any]:
+    """Errors with a memory of some seconds, and white noise."""
+
+    def errors(rng: np.random.Generator) -> tuple[np.ndarray, list[PeriodicError]]:
+        return autoregression(rng, float(np.exp(-1.0 / (30.0 * seconds)))) + noise * rng.normal(size=FRAMES), []
+
+    return errors
+
+
+def false_alarms(errors: Callable[..., Any], trials: int) -> int:
+    """How many of some steady rates are taken to change: errors of a tenth of the whole way, of one per second."""
+    rng = np.random.default_rng(7)
+    return sum(
+        not rate_of(TIME, TIME + noise, periodic=cycles).steady
+        for noise, cycles in (errors(rng) for _ in range(trials))
+    )
+
+
+def test_errors_that_wander_are_no_change_of_the_rate() -> None:
+    assert false_alarms(wandering(3.0, 0.3), 8) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("errors", "most"),
+    [
+        *((errors, 5) for errors in (white, short_memory, long_memory, few_cycles, many_cycles)),
+        (wandering(1.0, 0.0), 5),
+        (wandering(3.0, 0.3), 5),
+        (wandering(7.0, 1.0), 20),
+    ],
+)
+def test_steady_rates_are_hardly_ever_taken_to_change(errors: Callable[..., Any], most: int) -> None:
+    """Two tests at 0.1 % each; six of 200 would come up less than once in ten thousand times.
+
+    Errors with a memory of most of the film, half hidden in white noise, look like a change in one of twenty.
+    """
+    assert false_alarms(errors, 200) <= most
+
+
+def test_a_parabola_is_told_where_errors_hang_together() -> None:
+    """A rate that falls by a third in four seconds, under errors that last for a fifth of a second."""
+    rng, time = np.random.default_rng(9), np.arange(118) / 30.0
+    for _ in range(5):
+        errors = autoregression(rng, float(np.exp(-1.0 / 6.0)))[:118]
+        rate = rate_of(time, -0.2 * time * (1.2 - 0.2 * time / time[-1]) + 2e-3 * errors)
+        assert not rate.steady
+        assert rate.low < -0.2 < rate.high
+        assert rate.thirds == pytest.approx((-0.2 * (1.2 - 0.4 / 6.0), -0.2 * (0.8 + 0.4 / 6.0)), rel=0.06)
+
+
+def test_residuals_lie_about_0_where_errors_wander() -> None:
+    rate = rate_of(TIME, TIME + wandering(7.0, 0.1)(np.random.default_rng(1))[0])
+    assert np.nanmean(rate.residual) == pytest.approx(0.0, abs=1e-9)

@@ -12,6 +12,7 @@ from spirillum.measurement.lead import without_lead
 from spirillum.measurement.rows import observation_rows
 from spirillum.measurement.summary import compared, summary_of
 from spirillum.measurement.trials import RATE_NAMES, WOBBLES, trial_of
+from spirillum.units import Hz
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.track import Track
 
@@ -208,3 +209,36 @@ def test_a_seal_that_shows_no_stripes_widens_the_velocity(make_track: Make, robo
     assert half > 1.95 * 0.1 * 0.25e-3 / 10.0  # a pixel shows a quarter of a millimetre, the film lasts 10 s
     assert half > 2.0 * (sure["forward_velocity"].high - sure["forward_velocity"].value)
     assert unsure["tail_rotation_rate"] == sure["tail_rotation_rate"]
+
+
+def test_speeds_of_nose_and_rear_that_drift_apart_lie_both_in_the_interval(
+    make_track: Callable[..., Track], robot: Any
+) -> None:
+    track = make_track(span=4.0)
+    noise = 5e-6 * np.random.default_rng(1).normal(size=track.time.size)
+    plain = trial_of(track, robot).quantities["forward_velocity"]
+    still = trial_of(replace(track, stretch=noise), robot)
+    assert "ends-drift-apart" not in {flag.name for flag in still.flags}
+    now = still.quantities["forward_velocity"]
+    assert now.high - now.low < 1.2 * (plain.high - plain.low)
+    drift = 0.2e-3 / float(np.ptp(track.time))
+    apart = trial_of(replace(track, stretch=drift * track.time + noise), robot)
+    assert any(flag.name == "ends-drift-apart" and "drift apart by 0.2 mm" in flag.sentence for flag in apart.flags)
+    wide = apart.quantities["forward_velocity"]
+    assert wide.value == pytest.approx(plain.value)
+    assert wide.low < wide.value - 0.95 * drift < wide.value + 0.95 * drift < wide.high
+
+
+def test_a_body_that_slows_down_by_a_third_is_told_with_its_rates(make_track: Callable[..., Track], robot: Any) -> None:
+    """Four seconds, less than a stripe: at a rate that falls evenly from 1.2 to 0.8 of its mean."""
+    track = make_track(span=4.0)
+    time, span, mean = track.time, float(np.ptp(track.time)), -0.2
+    errors = track.body_angle + 0.7 * time
+    slowing = replace(track, body_angle=mean * time * (1.2 - 0.2 * time / span) + 0.4 * errors)
+    trial = trial_of(slowing, robot)
+    [flag] = [flag for flag in trial.flags if flag.name == "not-steady-body-rotation-rate"]
+    first, last = (float(words.split(" Hz")[0]) * Hz for words in flag.sentence.split("from ")[1].split(" to ")[:2])
+    assert first == pytest.approx(mean * (1.2 - 0.4 / 6.0), rel=0.05)
+    assert last == pytest.approx(mean * (0.8 + 0.4 / 6.0), rel=0.05)
+    found = trial.quantities["body_rotation_rate"]
+    assert found.low < mean < found.high

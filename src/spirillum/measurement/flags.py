@@ -9,7 +9,9 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.measurement.rates import Rate
+from spirillum.measurement.stretch import Stretch
 from spirillum.robot.robot import Robot
+from spirillum.units import Hz
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import stripes_of
 from spirillum.vision.track.track import Track
@@ -36,15 +38,16 @@ _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
 
-def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot) -> tuple[Flag, ...]:
+def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, stretch: Stretch) -> tuple[Flag, ...]:
     """All flags of a trial, without duplicates and without those that another flag implies.
 
     Args:
         fits: the fitted lines, by the names of `SEEN` at least.
         track: the track, with the flags of the tracker.
         robot: the robot, for its stripes.
+        stretch: how nose and rear drift apart.
     """
-    both = (*track.flags, *_own_flags(fits, track, robot))
+    both = (*track.flags, *stretch.flags(track.scale.length_per_pixel), *_own_flags(fits, track, robot))
     flags: list[Flag] = []
     for flag in both:
         same = [other for other in flags if other.name == flag.name]
@@ -77,7 +80,7 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
         if not rate.measured:
             continue
         if not rate.steady:
-            sentence = f"the {words} changes along the video; given is its mean from end to end"
+            sentence = f"the {words} changes along the video{_how(rate, name)}; given is its mean from end to end"
             flags.append(Flag(f"not-steady-{name.replace('_', '-')}", sentence))
         if rate.outliers > _MANY_OUTLIERS * (rate.frames + rate.outliers):
             far = "1 frame lies far from its neighbours and was"
@@ -95,6 +98,15 @@ def _own_flags(fits: Mapping[str, Rate], track: Track, robot: Robot) -> list[Fla
             )
         )
     return flags
+
+
+def _how(rate: Rate, name: str) -> str:
+    """From what to what a rate changes, a clause."""
+    if not rate.thirds:
+        return ""
+    unit, size = ("mm/s", 1e3) if name == "forward_velocity" else ("Hz", 1.0 / Hz)
+    first, last = (f"{size * third:.3g} {unit}" for third in rate.thirds)
+    return f", from {first} in its first third to {last} in its last"
 
 
 def says_synthetic(words: str) -> bool:

@@ -9,7 +9,6 @@ short series with a long correlation time gets a wide interval.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -30,16 +29,22 @@ _TIMES = 8
 """Correlation times on the grid."""
 _SIZES = (0.25, 1.0)
 """Variances of the periodic errors on the grid, over the expected ones; weighted by their likelihood."""
+_FEWEST_BLOCKS = 24
+"""Fewest blocks from which a change of the rate is told."""
 _WHITE = 3.0
 """Prior odds of white noise against all correlated noises."""
 _FEWEST = 8
 """Fewest frames from which autocorrelation is estimated; errors of fewer frames are taken as independent."""
-_UNSTEADY_P = 1e-5
-"""p-value below which a rate is taken to change."""
+_UNSTEADY_P = 1e-3
+"""p-value of a curvature below which a rate is taken to change, two-sided."""
 _LARGEST_RATIO = 1e6
 """Largest variance of a periodic error over that of the noise; a larger one only adds rounding errors."""
 _UNSTEADY_SHARE = 0.1
 """Relative change of a rate below which it counts as steady."""
+_END_TO_END = np.array([0.0, 1.0, 0.0, 1.0])
+"""The mean rate (p(1) - p(-1))/2 of a series of Legendre polynomials, to which those of odd degree contribute."""
+_THIRDS = (-1.0, -1.0 / 3.0), (1.0 / 3.0, 1.0)
+"""The first and the last third of a series, in scaled time."""
 _ENDS = 5
 """Readings averaged at each end of a series."""
 _ROUNDING = 1e-12
@@ -76,6 +81,8 @@ class Rate:
     """Most likely correlation time of the errors, s; 0 for white noise."""
     residual: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """Residuals of the fit, (n,); NaN where not measured or an outlier."""
+    thirds: tuple[float, ...] = ()
+    """Mean rates over the first and the last third of the series; empty where the rate is steady."""
 
     @property
     def measured(self) -> bool:
@@ -132,25 +139,25 @@ def rate_of(
         return Rate(*found, count, int(outlier.sum()), steady=True, correlation_time=0.0, residual=residual)
     angles = [(np.where(np.isfinite(c.angle), c.angle, 0.0)[used], c.amplitude) for c in periodic]
     blocks = _Blocks.of(s, y, weights, angles)
-    changes = unsteady or _rate_changes(blocks)
-    columns = 4 if changes else 2
-    # The mean rate is (p(1) - p(-1))/2, to which Legendre polynomials of odd degree contribute.
-    fitted = _averaged(blocks, columns, level, np.array([0.0, 1.0, 0.0, 1.0])[:columns])
-    line = np.polynomial.legendre.legval(s, fitted.line)
-    residual = _residual(values, used, y - line)
-    low, high = fitted.low, fitted.high
+    straight, parabola, cubic = _fitted(blocks, (2, 3, 4))
+    changes = unsteady or _rate_changes(blocks, (parabola, cubic))
+    fitted = cubic if changes else straight
+    value, low, high = fitted.interval(_END_TO_END, level)
+    left = np.asarray(y - np.polynomial.legendre.legval(s, fitted.mean))
+    residual = _residual(values, used, left - left.mean())  # errors that wander leave the line's height open
     if changes:  # lack of fit of a cubic at a start or a stop
-        off = abs(_from_end_to_end(s, y) - fitted.value)
-        low, high = fitted.value - np.hypot(fitted.value - low, off), fitted.value + np.hypot(high - fitted.value, off)
+        off = abs(_from_end_to_end(s, y) - value)
+        low, high = value - float(np.hypot(value - low, off)), value + float(np.hypot(high - value, off))
     return Rate(
-        fitted.value / half,
-        float(low) / half,
-        float(high) / half,
+        value / half,
+        low / half,
+        high / half,
         count,
         int(outlier.sum()),
         not changes,
         fitted.correlation_time * half,
         residual,
+        tuple(_mean_slope(fitted.mean, *part) / half for part in _THIRDS) if changes else (),
     )
 
 
@@ -167,8 +174,8 @@ def mean_of(time: Samples, values: Samples, level: float = 0.95) -> tuple[float,
         return float(values[used].mean()) if used.any() else np.nan, np.nan, np.nan
     t = time[used]
     s = (t - 0.5 * (t[0] + t[-1])) / (0.5 * (t[-1] - t[0]))
-    fitted = _averaged(_Blocks.of(s, values[used], np.ones(t.size), []), 2, level, np.array([1.0, 0.0]))
-    return fitted.value, fitted.low, fitted.high
+    [line] = _fitted(_Blocks.of(s, values[used], np.ones(t.size), []), (2,))
+    return line.interval(np.array([1.0, 0.0]), level)
 
 
 def _residual(values: Samples, used: np.ndarray, inside: Samples) -> Samples:
@@ -273,13 +280,57 @@ def _first_fit(line: Samples, waves: list[Samples], total: Samples, height: Samp
 
 @dataclass(frozen=True)
 class _Fit:
-    """An estimate averaged over all noises."""
+    """Coefficients of a polynomial, averaged over all noise models: a mixture of Student's t distributions."""
 
-    value: float
-    low: float
-    high: float
-    line: Samples
+    weights: Samples
+    """Probability of each noise model, (k,)."""
+    betas: Samples
+    """Coefficients for each noise model, (k, c)."""
+    covariances: Samples
+    """Their covariances, (k, c, c)."""
+    free: int
+    """Degrees of freedom."""
     correlation_time: float
+    """That of the most likely noise model, in half lengths of the series."""
+
+    @property
+    def mean(self) -> Samples:
+        """Mean coefficients, (c,)."""
+        return np.asarray(self.weights @ self.betas)
+
+    def below(self, at: float, centres: Samples, widths: Samples) -> float:
+        """Probability that a linear combination with these centres and widths is below a value."""
+        return float(self.weights @ student_t((at - centres) / np.maximum(widths, 1e-300), self.free))
+
+    def along(self, direction: Samples) -> tuple[Samples, Samples]:
+        """Centres and standard errors of a linear combination of the coefficients for each noise model, (k,) each."""
+        direction = direction[: self.betas.shape[1]]
+        return self.betas @ direction, np.sqrt(np.einsum("i,kij,j->k", direction, self.covariances, direction))
+
+    def interval(self, direction: Samples, level: float) -> tuple[float, float, float]:
+        """Mean of a linear combination, and the ends of its confidence interval."""
+        from scipy.optimize import brentq
+
+        centres, widths = self.along(direction)
+        value, tail = float(self.weights @ centres), 0.5 * (1.0 - level)
+        reach = float(np.max(np.abs(centres - value) + 60.0 * widths)) or 1e-300
+        low, high = (
+            float(
+                brentq(
+                    lambda at, share=share: self.below(at, centres, widths) - share,
+                    value - reach,
+                    value + reach,
+                    xtol=1e-6 * reach,
+                )
+            )
+            for share in (tail, 1.0 - tail)
+        )
+        return value, low, high
+
+    def p_value(self, coefficient: int) -> float:
+        """Two-sided p-value of a coefficient against 0."""
+        below = self.below(0.0, *self.along(np.eye(self.betas.shape[1])[coefficient]))
+        return 2.0 * min(below, 1.0 - below)
 
 
 class _Noise(NamedTuple):
@@ -309,78 +360,73 @@ class _Solved(NamedTuple):
 
     likelihood: float
     """Restricted log likelihood."""
-    fit: float
-    """Log likelihood, which may be compared between design matrices."""
     beta: Samples
     """Coefficients."""
     covariance: Samples
     """Covariance of the coefficients."""
 
 
-def _solved(blocks: _Blocks, columns: int, noise: _Noise) -> _Solved:
-    """Generalised least squares with one noise model and the first columns of the design matrix."""
+def _solved(blocks: _Blocks, numbers: Sequence[int], noise: _Noise) -> list[_Solved]:
+    """Generalised least squares with one noise model, for several numbers of columns of the design matrix."""
     from scipy.linalg.lapack import dpotrf, dpotrs
 
     covariance = noise.share * noise.correlation + noise.size * blocks.returning
     covariance.flat[:: blocks.s.size + 1] += (1.0 - noise.share) * blocks.white + 1e-7
     factor, failed = dpotrf(covariance, lower=1, overwrite_a=1)
     if failed:  # rounding, where the series is almost free of noise
-        return _Solved(-np.inf, -np.inf, np.zeros(columns), np.eye(columns))
-    design = blocks.design[:, :columns]
-    both, _ = dpotrs(factor, np.concatenate([design, blocks.y[:, None]], axis=1), lower=1)
-    normal = design.T @ both[:, :columns]
-    inverse = np.linalg.inv(normal)
-    beta = inverse @ (design.T @ both[:, columns])
-    free = blocks.s.size - columns
-    misfit = float((blocks.y - design @ beta) @ (both[:, columns] - both[:, :columns] @ beta))
-    misfit = max(misfit, 1e-300)
-    half_log = float(np.sum(np.log(np.diag(factor))))
-    likelihood = -half_log + 0.5 * float(np.linalg.slogdet(inverse)[1]) - 0.5 * free * np.log(misfit)
-    fit = -half_log - 0.5 * blocks.s.size * np.log(misfit)
-    return _Solved(likelihood, fit, beta, inverse * (misfit / free))
+        return [_Solved(-np.inf, np.zeros(columns), np.eye(columns)) for columns in numbers]
+    most = max(numbers)
+    both, _ = dpotrs(factor, np.concatenate([blocks.design[:, :most], blocks.y[:, None]], axis=1), lower=1)
+    half_log, found = float(np.sum(np.log(np.diag(factor)))), []
+    for columns in numbers:
+        design, solved = blocks.design[:, :columns], both[:, :columns]
+        inverse = np.linalg.inv(design.T @ solved)
+        beta = inverse @ (design.T @ both[:, most])
+        free = blocks.s.size - columns
+        misfit = max(float((blocks.y - design @ beta) @ (both[:, most] - solved @ beta)), 1e-300)
+        likelihood = -half_log + 0.5 * float(np.linalg.slogdet(inverse)[1]) - 0.5 * free * np.log(misfit)
+        found.append(_Solved(likelihood, beta, inverse * (misfit / free)))
+    return found
 
 
-def _averaged(blocks: _Blocks, columns: int, level: float, along: Samples) -> _Fit:
-    """The linear combination `along` of the coefficients, averaged over the noise models by their likelihood."""
-    from scipy.optimize import brentq
-
+def _fitted(blocks: _Blocks, numbers: Sequence[int]) -> list[_Fit]:
+    """Polynomials with several numbers of coefficients, averaged over the noise models by their likelihood."""
     noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _TIMES), _SIZES)
-    solved = [_solved(blocks, columns, noise) for noise in noises]
-    likelihoods = np.array([item.likelihood for item in solved])
-    likelihoods[[noise.share == 0.0 for noise in noises]] += np.log(_WHITE * len(_SHARES) * _TIMES)
-    weights = np.exp(likelihoods - likelihoods.max())
-    weights /= weights.sum()
-    centres = np.array([along @ item.beta for item in solved])
-    widths = np.sqrt(np.array([along @ item.covariance @ along for item in solved]))
-    free = blocks.s.size - columns
-    value = float(weights @ centres)
-    reach = float(np.max(np.abs(centres - value) + 60.0 * widths)) or 1e-300
-
-    def quantile(share: float) -> float:
-        def excess(at: float) -> float:
-            return float(weights @ student_t((at - centres) / np.maximum(widths, 1e-300), free)) - share
-
-        return float(brentq(excess, value - reach, value + reach, xtol=1e-6 * reach))
-
-    line = np.sum(weights[:, None] * np.array([item.beta for item in solved]), axis=0)
-    best = noises[int(np.argmax(weights))]
-    tail = 0.5 * (1.0 - level)
-    return _Fit(value, quantile(tail), quantile(1.0 - tail), line, best.time)
+    white = np.log(_WHITE * len(_SHARES) * _TIMES) * np.array([noise.share == 0.0 for noise in noises])
+    solved = zip(*(_solved(blocks, numbers, noise) for noise in noises), strict=True)
+    found = []
+    for columns, items in zip(numbers, solved, strict=True):
+        likelihoods = np.array([item.likelihood for item in items]) + white
+        weights = np.exp(likelihoods - likelihoods.max())
+        weights /= weights.sum()
+        betas, covariances = np.array([item.beta for item in items]), np.array([item.covariance for item in items])
+        time = noises[int(np.argmax(weights))].time
+        found.append(_Fit(weights, betas, covariances, blocks.s.size - columns, time))
+    return found
 
 
-def _rate_changes(blocks: _Blocks) -> bool:
+def _rate_changes(blocks: _Blocks, curves: Sequence[_Fit]) -> bool:
     """Whether the rate changes significantly and by more than a tenth.
 
-    Likelihood ratio test of a cubic against a straight line, each with its most likely noise model.
+    The last coefficient of a parabola, which tells a steady change, or of a cubic is tested against 0. As its standard
+    error allows for autocorrelated noise of unknown correlation time, a series whose errors wander is no change.
+
+    Args:
+        blocks: the series.
+        curves: polynomials of rising degree.
     """
-    count = blocks.s.size
-    if count < 24 or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
+    if blocks.s.size < _FEWEST_BLOCKS or np.ptp(blocks.y) <= _ROUNDING * np.abs(blocks.y).max():
         return False
-    noises = _noises(blocks, _SHARES[1::2], np.geomspace(2.0 / count, 2.0, 5))
-    straight, cubic = ([_solved(blocks, columns, noise) for noise in noises] for columns in (2, 4))
-    gain = 2.0 * (max(item.fit for item in cubic) - max(item.fit for item in straight))
-    if gain < -2.0 * math.log(_UNSTEADY_P):  # chi-squared with two degrees of freedom: exp(-gain/2)
-        return False
-    beta = max(cubic, key=lambda item: item.fit).beta
+    return any(curve.p_value(-1) < _UNSTEADY_P and _bends(curve.mean) for curve in curves)
+
+
+def _mean_slope(beta: Samples, first: float, last: float) -> float:
+    """Mean slope of a Legendre series between two scaled times."""
+    start, end = np.polynomial.legendre.legvander([first, last], beta.size - 1) @ beta
+    return float((end - start) / (last - first))
+
+
+def _bends(beta: Samples) -> bool:
+    """Whether the slope of a Legendre series changes by more than a tenth of its mean."""
     slope = np.polynomial.legendre.legval(np.linspace(-1, 1, 41), np.polynomial.legendre.legder(beta))
-    return bool(np.ptp(slope) > _UNSTEADY_SHARE * abs(beta[1] + beta[3]))
+    return bool(np.ptp(slope) > _UNSTEADY_SHARE * abs(_mean_slope(beta, -1.0, 1.0)))

@@ -16,6 +16,7 @@ from spirillum.measurement.lead import without_lead
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.measurement.statistics import NORMAL
+from spirillum.measurement.stretch import stretch_of
 from spirillum.measurement.systematic import (
     AMPLITUDE_ERROR,
     DRIFT_ANGLE,
@@ -160,9 +161,10 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     if by_hand:
         read = np.ones(track.time.size, dtype=bool)
     fits = _fits(track, robot, read)
-    flags = flags_of(fits, track, robot)
+    stretch = stretch_of(track)
+    flags = flags_of(fits, track, robot, stretch)
     velocity, *rates = RATE_NAMES
-    quantities = {velocity: _velocity(fits[velocity], track)}
+    quantities = {velocity: _velocity(fits[velocity], track, _drift(track, stretch.error()))}
     quantities |= {
         name: _with_errors(
             fits[name],
@@ -293,15 +295,15 @@ def _drifts(track: Track, name: str) -> list[float]:
     return [_drift(track, drift) for drift in drifts]
 
 
-def _velocity(rate: Rate, track: Track) -> Measured:
-    """The forward velocity; its interval includes the uncertainty of the scale."""
+def _velocity(rate: Rate, track: Track, tilt: float) -> Measured:
+    """The forward velocity; its interval includes the uncertainty of the scale, and that by a tilt, m/s."""
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name in ("no-stripes", "stripes-do-not-fit") for flag in track.flags)  # no edges at the seal
     least = (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel
     read = any(flag.name in (BY_HAND, IMPORTED) for flag in track.flags)
     drift = _drift(track, least if read else max(least, _wander(rate)))
-    return _with_errors(rate, "m/s", drift, scale, track.drift)
+    return _with_errors(rate, "m/s", drift, scale, tilt, track.drift)
 
 
 def _wander(rate: Rate) -> float:

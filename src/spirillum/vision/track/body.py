@@ -29,6 +29,8 @@ class Placed(NamedTuple):
     """Inlier share of the edges in view, 0 to 1."""
     inside: float
     """Share of the edges that lie in the picture, 0 to 1."""
+    stretch: float = np.nan
+    """By how much nose and rear lie farther apart than the level body's edges do, m; NaN without edges at both."""
 
     @property
     def known(self) -> bool:
@@ -235,7 +237,30 @@ class BodyFinder:
             or share < 0.2
         ):
             return Placed(found, lost.error, fitting, share)
-        return Placed(found, errors, fitting, share)
+        left = np.where(known, shifts, 0.0)
+        return Placed(found, errors, fitting, share, _stretch(left, slopes, used, self.contour.group))
+
+
+def _stretch(left: Samples, slopes: Samples, used: Samples, group: np.ndarray) -> float:
+    """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
+
+    Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.
+
+    Args:
+        left: residual displacement of each edge along its normal, pixels, (n,).
+        slopes: Jacobian of the displacements by the pose, (n, 3).
+        used: weights of the edges, 0 for outliers, (n,).
+        group: index into `GROUPS` of each edge, (n,).
+    """
+    nose, behind = group == GROUPS.index("front"), np.isin(group, [GROUPS.index("rear"), GROUPS.index("seal")])
+    if min(np.count_nonzero(used[nose]), np.count_nonzero(used[behind])) < OUTLINE.fewest_at_end:
+        return np.nan
+    design = np.column_stack([slopes, np.where(nose, slopes[:, 0], 0.0)])
+    normal = design.T @ (used[:, None] * design)
+    try:
+        return float(np.linalg.solve(normal, design.T @ (used * left))[3])
+    except np.linalg.LinAlgError:  # the edges of the nose lie along its way
+        return np.nan
 
 
 def grey_part(image: np.ndarray, bounds: tuple[int, int, int, int], blur: float) -> Samples:

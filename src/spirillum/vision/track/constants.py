@@ -141,6 +141,8 @@ class OutlineConstants:
     """Contrast from which on all edges weigh the same in the body's size, of 255."""
     largest_error: float = 0.7
     """Largest standard error of a place that is kept, pixels."""
+    fewest_at_end: int = 5
+    """Fewest edges at the nose, and at rear and seal, that tell how far apart both lie."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,72 @@
+"""How far apart nose and rear are seen: a change tells a body that tilts out of the plane of the picture.
+
+From above, a nose that rises by an angle moves what is seen of the body's upper side back by the body's radius times
+that angle, and a round nose not at all. The place that is fitted to all edges lies in between, so that a tilt that
+changes on the way is taken for a part of the speed. Other causes are edges that glare or compression shift.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from spirillum.measurement.rates import rate_of
+from spirillum.measurement.statistics import NORMAL
+from spirillum.vision.flag import Flag
+from spirillum.vision.track.track import Track
+
+__all__ = ["Stretch", "stretch_of"]
+
+_CLEAR = 0.2
+"""Change beyond the ends of its interval from which on it is flagged, pixels. On clean films of bodies that do not tilt
+it is below 0.1."""
+
+
+class Stretch(NamedTuple):
+    """Change of the distance between nose and rear from the first frame to the last."""
+
+    change: float
+    """Positive where they drift apart, m; 0 where it is not known."""
+    half_width: float
+    """Of its 95 % interval, m."""
+
+    def error(self) -> float:
+        """Standard error of the robot's way by it, m.
+
+        Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
+        variance of the change itself is taken off: what is noise widens nothing.
+        """
+        return 0.5 * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
+
+    def flags(self, pixel: float) -> tuple[Flag, ...]:
+        """A flag where the change is clear.
+
+        Args:
+            pixel: m per pixel.
+        """
+        if abs(self.change) - self.half_width <= _CLEAR * pixel:
+            return ()
+        how = "drift apart" if self.change > 0.0 else "draw together"
+        size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / pixel:.2g} pixels)"
+        sentence = (
+            f"nose and rear of the body {how} by {size} during the video, as where the body tilts out of the plane of "
+            "the picture: the interval of the speed is wider and holds what each of them alone says; film a robot that "
+            "has settled, or one that swims further"
+        )
+        return (Flag("ends-drift-apart", sentence),)
+
+
+def stretch_of(track: Track) -> Stretch:
+    """The change of a track; none where its edges were not fitted on enough frames, or there is no scale.
+
+    Args:
+        track: the track.
+    """
+    if track.stretch.size != track.time.size or not math.isfinite(track.scale.length_per_pixel):
+        return Stretch(0.0, 0.0)
+    rate, length = rate_of(track.time, track.stretch), float(np.ptp(track.time))
+    if not math.isfinite(rate.low):
+        return Stretch(0.0, 0.0)
+    return Stretch(rate.value * length, 0.5 * (rate.high - rate.low) * length)
