@@ -107,7 +107,7 @@ def error_of_mean(
         scale: what both are relative to, SI.
         trials: number of trials of the mean.
     """
-    found: Samples = np.fmax(error, np.nan_to_num(stated)) * scale / np.sqrt(np.maximum(trials, 1.0))
+    found: Samples = np.fmax(error, np.fmax(stated, 0.0)) * scale / np.sqrt(np.maximum(trials, 1.0))
     return found
 
 
