@@ -8,14 +8,13 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.calibration.posterior import Sampling
 from spirillum.fitted.posterior_file import read_posterior
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
+from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
 FITTED = (8e-6, 1e-5, 1.6e-5)
-SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=500, doublings=2)
 
 
 @pytest.fixture

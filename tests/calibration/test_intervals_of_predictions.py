@@ -14,9 +14,9 @@ from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.load import load
+from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
-SHORT = Sampling(ensembles=2, walkers=24, warm_up=300, steps=500, doublings=2)
 
 
 @pytest.fixture(scope="module")

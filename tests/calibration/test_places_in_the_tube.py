@@ -13,7 +13,6 @@ from scipy.optimize import root
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.calibration.posterior import Sampling
 from spirillum.fluid.tube.tabled import tabled
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.batch import RobotBatch
@@ -22,9 +21,9 @@ from spirillum.robot.placement import Placement
 from spirillum.swimming.balance import joined
 from spirillum.swimming.drawn_resistance import TubeResistance
 from spirillum.swimming.dry_friction import swim_on_floor, weights_in_fluid, with_dry_friction
+from synthetic_experiments import SHORT
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
-FEW = Sampling(ensembles=2, walkers=24, warm_up=200, steps=400, doublings=3)
 GAP = 5e-4
 
 Speeds = tuple[float, float, float]
@@ -80,7 +79,7 @@ def one_gap(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with observations of a robot solved at one gap, and the posterior of the gap."""
     folder = tmp_path_factory.mktemp("tube")
     path = written(folder / "o.csv", {WIDE: solved(WIDE, GAP)})
-    found = sp.calibrate(path, WIDE, model="tube", free="gap", sampling=FEW)
+    found = sp.calibrate(path, WIDE, model="tube", free="gap", sampling=SHORT)
     write_calibration(found, folder / "fitted", figures=False)
     return folder
 
@@ -293,7 +292,7 @@ def test_intervals_hold_the_truth_over_many_experiments(tmp_path: Path) -> None:
 def test_tube_is_ranked_with_as_many_numbers_as_the_others(tmp_path: Path) -> None:
     truth = {WIDE: by_table(WIDE, 4e-4, 0.02), NARROW: by_table(NARROW, 3e-4, 0.02)}
     path = written(tmp_path / "o.csv", truth)
-    ranking = sp.rank_models(path, [WIDE, NARROW], models=["tube", "sbt"], sampling=FEW)
+    ranking = sp.rank_models(path, [WIDE, NARROW], models=["tube", "sbt"], sampling=SHORT)
     counts = {item.model: len(item.fit.problem.coordinates) for item in ranking.ranked}
     assert counts == {"tube": 4, "sbt": 4}
     assert "2 tails are too few" in ranking.verdict()

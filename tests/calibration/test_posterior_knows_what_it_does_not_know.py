@@ -12,9 +12,9 @@ from scipy.stats import kstest
 import spirillum as sp
 from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
+from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
-SHORT = Sampling(ensembles=2, walkers=24, warm_up=300, steps=500, doublings=2)
 
 
 @pytest.fixture(scope="module")

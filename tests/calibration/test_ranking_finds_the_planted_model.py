@@ -9,10 +9,9 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.calibration.posterior import Sampling
+from synthetic_experiments import SHORT
 
 WIDE = "biorob2012-wide"
-SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=400, doublings=2)
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,10 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
+from synthetic_experiments import SHORT
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
-SHORT = Sampling(ensembles=2, walkers=24, warm_up=250, steps=500, doublings=2)
 FEW = {"wavelengths": (15.0, 25.0), "amplitudes": (2.0, 3.0), "discrepancy": 0.03, "seed": 9}
 
 

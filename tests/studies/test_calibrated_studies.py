@@ -8,10 +8,9 @@ import pytest
 
 import spirillum as sp
 from spirillum import InputError
-from spirillum.calibration.posterior import Sampling
 from spirillum.results.calibration import write_calibration
 from spirillum.robot.load import load
-from synthetic_experiments import synthetic
+from synthetic_experiments import SHORT, synthetic
 
 WIDE, NARROW = "biorob2012-wide", "biorob2012-narrow"
 GRID = {
@@ -27,8 +26,7 @@ def fitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A posterior of a synthetic experiment in both channels."""
     folder = tmp_path_factory.mktemp("fitted")
     path = synthetic(folder / "o.csv", wavelengths=(15.0, 20.0), amplitudes=(1.5, 2.5), discrepancy=0.02)
-    few = Sampling(ensembles=2, walkers=32, warm_up=250, steps=400, doublings=2)
-    found = sp.calibrate(path, [WIDE, NARROW], sampling=few)
+    found = sp.calibrate(path, [WIDE, NARROW], sampling=SHORT)
     assert found.converged
     write_calibration(found, folder, figures=False)
     return folder
