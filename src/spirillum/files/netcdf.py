@@ -149,10 +149,10 @@ def _check(stored: h5py.File, path: Path, what: str, largest: int) -> None:
     count = total = 0
     while ahead:
         group, depth = ahead.pop()
+        count += len(group)
+        if count > MOST_VARIABLES or depth > _DEEPEST:
+            raise InputError(f"{path} holds more than {MOST_VARIABLES} variables or deep groups; {_only(what)}")
         for name in group:
-            count += 1
-            if count > MOST_VARIABLES or depth > _DEEPEST:
-                raise InputError(f"{path} holds more than {MOST_VARIABLES} variables or deep groups; {_only(what)}")
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 raise InputError(f"{path} holds a link to another place; {_only(what)}")
             item = group[name]
