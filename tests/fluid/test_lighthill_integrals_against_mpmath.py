@@ -13,8 +13,6 @@ from mpmath import mp, mpf
 
 from spirillum.fluid.closed.lighthill_integrals import ALPHA_MIN, COEFFICIENTS, lighthill_integrals
 
-PERIODS = 90
-
 
 def integrals_at(alpha: object) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The three integrals of the module, for numbers as well."""
@@ -26,27 +24,29 @@ def definition(alpha: float) -> list[float]:
     with mp.workdps(20):
         a = mpf(alpha)
 
+        # The rest is a series in the reciprocal number of periods; it converges where that number exceeds 1/(pi alpha).
+        periods = max(40, round(4.5 / alpha))
+
         def rho(theta: mpf) -> mpf:
             return mp.sqrt((a * theta) ** 2 + 2 * (1 - a**2) * (1 - mp.cos(theta)))
 
         return [
-            integral(lambda t: t * mp.sin(t) / rho(t) ** 3 - 1 / t, lambda t: t * mp.sin(t) / rho(t) ** 3),
-            integral(lambda t: mp.sin(t) ** 2 / rho(t) ** 3 - 1 / t, lambda t: mp.sin(t) ** 2 / rho(t) ** 3),
-            integral(lambda t: 1 / t - 1 / rho(t), lambda t: 1 / (a * t) - 1 / rho(t)),
+            integral(lambda t: t * mp.sin(t) / rho(t) ** 3 - 1 / t, lambda t: t * mp.sin(t) / rho(t) ** 3, periods),
+            integral(lambda t: mp.sin(t) ** 2 / rho(t) ** 3 - 1 / t, lambda t: mp.sin(t) ** 2 / rho(t) ** 3, periods),
+            integral(lambda t: 1 / t - 1 / rho(t), lambda t: 1 / (a * t) - 1 / rho(t), periods),
         ]
 
 
-def integral(to_one: Callable[[mpf], mpf], beyond: Callable[[mpf], mpf]) -> float:
-    """One integrand from 0 to 1 and another one from 1 to infinity."""
+def integral(to_one: Callable[[mpf], mpf], beyond: Callable[[mpf], mpf], periods: int) -> float:
+    """One integrand from 0 to 1 and another one from 1 to infinity, by that many periods and a series for the rest."""
     total = quadrature(to_one, [0, 1]) + quadrature(beyond, [1, mp.pi, 1.75 * mp.pi, 2 * mp.pi])
     partial_sums = [total]
-    for period in range(1, PERIODS):
+    for period in range(1, periods):
         # The integrands peak at both ends of a period.
         edges = [2 * mp.pi * (period + part) for part in (0, 0.125, 0.5, 0.875, 1)]
         total += quadrature(beyond, edges)
         partial_sums.append(total)
-    # The rest is a series in the reciprocal number of periods; it converges where that number exceeds 1/(pi alpha).
-    counts = range(PERIODS, PERIODS // 4, -5)
+    counts = range(periods, periods // 4, -(periods // 18))
     return float(extrapolated_to_zero([1 / mpf(count) for count in counts], [partial_sums[n - 1] for n in counts]))
 
 
