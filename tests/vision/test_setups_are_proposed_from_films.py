@@ -20,8 +20,14 @@ def film(flat_pictures, tmp_path_factory):
     return path
 
 
-def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, tmp_path):
-    found = sp.propose_setup(film, "biorob2012-wide", tmp_path / "setup.toml", spacing="2 mm")
+@pytest.fixture(scope="module")
+def proposed(film):
+    """What is proposed for it, written beside it."""
+    return sp.propose_setup(film, "biorob2012-wide", film.with_name("setup.toml"), spacing="2 mm")
+
+
+def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, proposed):
+    found = proposed
     assert {name: found.found(name).value for name in ("direction", "robot")} == {
         "direction": "left", "robot": "biorob2012-wide",
     }  # fmt: skip
@@ -34,17 +40,16 @@ def test_what_the_film_shows_is_found_and_the_rest_is_marked(film, tmp_path):
     assert nose[0] < rear[0]
     left = {field for field, _ in found.to_fill}
     assert left == {"camera.view", "camera.height", "tank.surface", "tank.index", "markers.height", "robot.axis_height"}
-    text = (tmp_path / "setup.toml").read_text()
-    assert text == found.text
+    written = film.with_name("setup.toml")
+    assert written.read_text() == found.text
     with pytest.raises(InputError, match=r"camera.view = 'FILL IN' is not allowed.*\(and 5 more\)"):
-        load_setup(tmp_path / "setup.toml")
+        load_setup(written)
 
 
-def test_a_filled_in_proposal_is_a_setup_that_fits_the_film(film, tmp_path):
-    text = sp.propose_setup(film, "biorob2012-wide", spacing="2 mm").text
+def test_a_filled_in_proposal_is_a_setup_that_fits_the_film(film, proposed, tmp_path):
     known = {"view": '"top"', "height": '"200 mm"', "axis_height": '"15 mm"'}
     lines, section = [], ""
-    for line in text.splitlines():
+    for line in proposed.text.splitlines():
         name = line.partition(" = ")[0]
         section = line if line.startswith("[") else section
         if section == "[tank]":

@@ -25,11 +25,21 @@ def learnt(
     true = film.truth(film.times)
     pictures = [
         (picture, BodyPose(float(x), float(y), film.heading))
-        for (_, picture), x, y in zip(film.pictures(), true["x"], true["y"], strict=True)
+        for picture, x, y in zip(drawn(film), true["x"], true["y"], strict=True)
     ]
     wire = TailWave(robot, setup, optics_of(setup, film.size, film.focal))
     wire.learn(pictures[::2])
     return wire, pictures, true["tail_phase"]
+
+
+_DRAWN: dict[str, list[np.ndarray]] = {}
+
+
+def drawn(film: Any) -> list[np.ndarray]:
+    """The pictures of a film; those of the same film are drawn once."""
+    if (key := repr(film)) not in _DRAWN:
+        _DRAWN[key] = [picture for _, picture in film.pictures()]
+    return _DRAWN[key]
 
 
 def errors(
@@ -101,8 +111,7 @@ def test_a_tail_of_another_amplitude_does_not_fit_and_its_wavelength_is_not_blam
 
 
 def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> None:
-    drawn = film(flat_pictures, wire=(150, 190, 170), noise=3.0)
-    wire, pictures, phase = learnt(drawn, tmp_path)
+    wire, pictures, phase = learnt(film(flat_pictures, wire=(150, 190, 170), noise=3.0), tmp_path)
     missed, _ = errors(wire, pictures, phase)
     assert np.isnan(missed).mean() > 0.9
     assert any("tail_rotation_rate" in flag.spoils for flag in wire.flags)
@@ -112,8 +121,7 @@ def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> No
 def test_a_tail_lost_in_noise_is_not_seen_and_is_not_said_to_have_another_shape(
     flat_pictures: ModuleType, tmp_path: Path, seed: int
 ) -> None:
-    drawn = film(flat_pictures, wire=(150, 190, 170), noise=20.0, seed=seed)
-    wire, _, _ = learnt(drawn, tmp_path)
+    wire, _, _ = learnt(film(flat_pictures, wire=(150, 190, 170), noise=20.0, seed=seed), tmp_path)
     assert [flag.name for flag in wire.flags] == ["tail-unreadable"]
     assert wire.flags[0].spoils == ("tail_rotation_rate",)
     assert "compress the film less" in wire.flags[0].sentence
