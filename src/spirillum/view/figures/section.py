@@ -1,4 +1,8 @@
-"""A robot cut by a plane: its solids filled where they are cut, outlined where they lie beyond."""
+"""A robot cut by a plane: its solids filled where they are cut, outlined where they lie beyond.
+
+Panels have their limits before anything is drawn on them. Solids are added as artists and not as patches, for which
+matplotlib looks for the extent of every segment: half a second for a tube.
+"""
 
 from __future__ import annotations
 
@@ -57,11 +61,11 @@ def draw_section(
         )
     for outline in outlines_of(robot).values():
         if (cut := _cut(outline, plane, 0.0)) is not None and offset != 0.0 and plane != "yz":
-            axes.add_patch(
+            axes.add_artist(
                 Polygon(cut / unit, closed=True, fill=False, edgecolor=_BEYOND, linewidth=0.7, linestyle="--", zorder=5)
             )
         if (cut := _cut(outline, plane, offset)) is not None:
-            axes.add_patch(Polygon(cut / unit, closed=True, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=7))
+            axes.add_artist(Polygon(cut / unit, closed=True, facecolor=_FILL, edgecolor=_EDGE, linewidth=0.8, zorder=7))
     _draw_wire_cut(axes, robot, line, (along[0], along[1], across), offset, unit)
 
 
@@ -81,8 +85,8 @@ def draw_glass(axes: Axes, seat: Seat, plane: str, offset: float, unit: float) -
     # A path with a hole: the bore runs against the frame.
     codes = [[Path.MOVETO, *[Path.LINETO] * (len(line) - 1)] for line in (frame, wall)]
     glass = Path(np.concatenate([frame, wall]), np.concatenate(codes))
-    axes.add_patch(PathPatch(glass, facecolor=_GLASS, edgecolor="none", zorder=5.5))
-    axes.add_patch(Polygon(wall, closed=True, fill=False, edgecolor=_RIM, linewidth=1.0, zorder=5.6))
+    axes.add_artist(PathPatch(glass, facecolor=_GLASS, edgecolor="none", zorder=5.5))
+    axes.add_artist(Polygon(wall, closed=True, fill=False, edgecolor=_RIM, linewidth=1.0, zorder=5.6))
 
 
 def _bore(seat: Seat, plane: str, offset: float, ends: Values) -> Values:
