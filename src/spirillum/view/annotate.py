@@ -32,6 +32,8 @@ _SHIFT = 4
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
 _WAITING = 8
+_LARGEST = 1920
+"""Longest side of an annotated frame, pixels: a larger one is reduced by a whole number."""
 
 
 class Seen(Protocol):
@@ -78,22 +80,23 @@ class Annotator:
         self._first: float | None = None
 
     def draw(self, image: np.ndarray, seen: Seen, words: tuple[str, ...] = ()) -> np.ndarray:
-        """A copy of a frame with the tracking result drawn on it.
+        """A copy of a frame with the tracking result drawn on it, reduced to at most 1920 pixels.
 
         Args:
             image: RGB bytes, (h, w, 3).
             seen: the tracking result.
             words: lines of text instead of those about this frame.
         """
-        picture = np.ascontiguousarray(image).copy()
+        picture, times = self._reduced(image)
         pose = seen.pose
         if pose is None:
-            self._write(picture, words or (f"t = {seen.time:7.2f} s   robot not seen",))
+            self._write(picture, words or (f"t = {seen.time:7.2f} s, robot not seen",))
             return picture
         from spirillum.vision.camera.optics import seen as pixels_of
 
         def line(points: Samples, colour: tuple[int, int, int], *, closed: bool = False) -> None:
-            self._line(picture, pixels_of(points, pose, seen.optics), colour, closed=closed)
+            pixels = (pixels_of(points, pose, seen.optics) + 0.5) / times - 0.5
+            self._line(picture, pixels, colour, closed=closed)
 
         line(self._outline, _BODY, closed=True)
         line(np.array([[-self._half, 0.0, 0.0], [self._half, 0.0, 0.0]]), _AXIS)
@@ -102,10 +105,19 @@ class Annotator:
         if math.isfinite(seen.body_angle):
             self._pointer(line, seen.body_angle)
         x = self._along(seen)
-        angles = f"body {_degrees(seen.body_angle)}  tail {_degrees(seen.tail_phase)}"
+        angles = f"body {_degrees(seen.body_angle)}, tail {_degrees(seen.tail_phase)}"
         self._dials(picture, seen)
-        self._write(picture, words or (f"t = {seen.time:7.2f} s   x = {1e3 * x:7.2f} mm", angles))
+        self._write(picture, words or (f"t = {seen.time:7.2f} s, x = {1e3 * x:7.2f} mm", angles))
         return picture
+
+    def _reduced(self, image: np.ndarray) -> tuple[np.ndarray, int]:
+        """A copy of a frame, reduced if it is large, and how many times."""
+        times = -(-max(image.shape[:2]) // _LARGEST)
+        if times == 1:
+            return np.ascontiguousarray(image).copy(), 1
+        height, width = (size // times for size in image.shape[:2])
+        whole = np.ascontiguousarray(image[: height * times, : width * times])
+        return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
     def _dials(self, picture: np.ndarray, seen: Seen) -> None:
         """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
@@ -270,7 +282,8 @@ class _Writer:
         item = self._next()
         if item is None:
             raise InputError(f"{self._path.name} has no frames; allowed: a video with at least one")
-        height, width = (even - even % 2 for even in item[1].shape[:2])
+        picture = self._drawn(*item)
+        height, width = (even - even % 2 for even in picture.shape[:2])
         size, first, last = (width, height), item[2].time, -1
         with h264_writer(
             self._path,
@@ -285,5 +298,6 @@ class _Writer:
         ) as film:
             while item is not None:
                 last = max(last + 1, round((item[2].time - first) * _TICKS))
-                film.add(self._drawn(*item)[:height, :width], last)
+                film.add(picture[:height, :width], last)
                 item = self._next()
+                picture = picture if item is None else self._drawn(*item)
