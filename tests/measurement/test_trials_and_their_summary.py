@@ -227,6 +227,8 @@ def test_speeds_of_nose_and_rear_that_drift_apart_lie_both_in_the_interval(
     wide = apart.quantities["forward_velocity"]
     assert wide.value == pytest.approx(plain.value)
     assert wide.low < wide.value - 0.95 * drift < wide.value + 0.95 * drift < wide.high
+    without_scale = replace(track, scale=replace(track.scale, length_per_pixel=np.nan), stretch=drift * track.time)
+    assert "ends-drift-apart" not in {flag.name for flag in trial_of(without_scale, robot).flags}
 
 
 def test_a_body_that_slows_down_by_a_third_is_told_with_its_rates(make_track: Callable[..., Track], robot: Any) -> None:

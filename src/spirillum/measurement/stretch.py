@@ -44,9 +44,9 @@ class Stretch(NamedTuple):
         """A flag where the change is clear.
 
         Args:
-            pixel: m per pixel.
+            pixel: m per pixel; NaN without a scale, and so without a known change.
         """
-        if abs(self.change) - self.half_width <= _CLEAR * pixel:
+        if not abs(self.change) - self.half_width > _CLEAR * pixel:
             return ()
         how = "drift apart" if self.change > 0.0 else "draw together"
         size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / pixel:.2g} pixels)"
