@@ -394,7 +394,7 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
     geometry: RobotGeometry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SPIRILLUM_CACHE", "off")
-    coarse = Fineness("standard", 0.05)
+    coarse = Fineness("standard", 0.05, order=4)
     tails = [geometry._replace(tail_length=0.02, wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
     seat, elsewhere = Seat(R, 0.0), Seat(R, 0.002)
     want = [Solution(((tail, (0.4,)),), seat, coarse) for tail in tails]
