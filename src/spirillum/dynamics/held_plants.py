@@ -156,7 +156,7 @@ class HeldPlants:
         asked = self._duty if duty is None else self._one_each("duty", duty, 0.0, 1.0)
         carried = self._flow if flow is None else self._one_each("flow", flow, -1e3, 1e3)
         self._duty, self._flow = asked, carried
-        kernel.advance(self.numbers, self.states, number, self._duty, self._flow)
+        kernel.advance(self.numbers, self.states, number, self._duty, self._flow, 1.0)
         self.time += number
 
     def observe(self) -> dict[str, Samples]:

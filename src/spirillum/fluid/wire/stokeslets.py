@@ -236,7 +236,7 @@ def wire_system(wires: Sequence[tuple[Wire, int]], accuracy: Accuracy) -> WireSy
     none, nothing = np.zeros((12, 12)), np.zeros((0, 0, 3, 3))
     if not wires:
         return WireSystem(np.zeros((0, 0)), np.zeros((0, 12)), none, nothing)
-    points = np.concatenate([wire.points for wire, _ in wires])
+    points = np.ascontiguousarray(np.concatenate([wire.points for wire, _ in wires]))
     e2 = np.concatenate([np.full(len(wire.points), wire.blob**2) for wire, _ in wires])
     part = np.concatenate([np.full(len(wire.points), part) for wire, part in wires])
     forces: Samples = force_matrix(points, e2)
