@@ -65,16 +65,17 @@ class _CourseTask(Task):
 
     def brief(self, plant: Plant, lab: Lab, progress: Progress | None) -> Brief:
         """Check that the robot of the file swims so fast, and find the duty at which it does."""
+        asked = self.set_speed  # before anything is run
         duration = _DURATION if self.duration is None else self.duration
         speed, full_duty = float(plant.steady.forward_velocity), plant.state.command
         way = float(np.sign(speed))
         fastest = way * _mean_speed(plant, full_duty, duration, progress)
-        if not self.set_speed < fastest:
+        if not asked < fastest:
             raise InputError(
-                f"task.speed = {show(self.set_speed, 'mm/s')}; allowed: below {show(fastest, 'mm/s')}, the mean of "
+                f"task.speed = {show(asked, 'mm/s')}; allowed: below {show(fastest, 'mm/s')}, the mean of "
                 f"{duration:g} s at the robot's own duty"
             )
-        share = self.set_speed / fastest
+        share = asked / fastest
         slower = way * _mean_speed(plant, share * full_duty, duration, progress)
         power = np.log(slower / fastest) / np.log(share) if 0.0 < slower < fastest else 1.0
         return Brief(
