@@ -186,10 +186,10 @@ def test_a_folder_named_like_a_picture_is_no_frame(tmp_path):
     assert video.flags == []
 
 
-def test_one_image_of_another_size_does_not_decide_for_all(tmp_path):
-    for index in range(5):
-        cv2.imwrite(str(tmp_path / f"{index:03d}.png"), np.full((40, 50 if index == 0 else 60, 3), 90, np.uint8))
-    video = open_video(tmp_path, 30.0)
-    assert video.size == (60, 40)
-    assert [frame.index for frame in video.frames()] == [1, 2, 3, 4]
-    assert [flag.name for flag in video.flags] == ["unreadable-frames"]
+@pytest.mark.parametrize("odd", [0, 14])
+def test_an_image_of_another_size_is_named_with_both_sizes(tmp_path, odd):
+    """Among the first ones when the folder is opened, later when it is read."""
+    for index in range(15):
+        cv2.imwrite(str(tmp_path / f"{index:03d}.png"), np.full((40, 50 if index == odd else 60, 3), 90, np.uint8))
+    with pytest.raises(InputError, match=rf"{odd:03d}\.png has 50 x 40 pixels, others in its folder 60 x 40"):
+        list(open_video(tmp_path, 30.0).frames())

@@ -9,7 +9,7 @@ from spirillum.measurement.setup_template import setup_answer
 from spirillum.vision.setup import load_setup
 
 pytest.importorskip("av")
-pytest.importorskip("cv2")
+cv2 = pytest.importorskip("cv2")
 
 
 @pytest.fixture(scope="module")
@@ -83,14 +83,33 @@ def test_without_a_ruler_the_robot_gives_the_scale_and_another_order_of_stripes_
     assert float(line.split('"')[1].removesuffix(" mm")) == pytest.approx(1e3 * (0.2 - 0.015) / 350.0, rel=0.03)
 
 
-def test_an_empty_film_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
+def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
+    """With a ruler the setup is written as far as it goes; without one there is nothing to write."""
     monkeypatch.setattr("spirillum.vision.track.scouting.best_other_size", lambda *given: None)  # it takes a while
-    flat_pictures.Flat(frames=4, start=(1.0, 0.0), noise=4.0, size=(160, 120), focal=175.0).write(tmp_path / "a.mp4")
-    found = sp.propose_setup(tmp_path / "a.mp4")
+    empty = {"frames": 4, "start": (1.0, 0.0), "noise": 4.0}
+    flat_pictures.Flat(**empty, size=(320, 240), focal=350.0).write(tmp_path / "a.mp4")
+    looks = []
+    found = sp.propose_setup(tmp_path / "a.mp4", progress=lambda what, done, total: looks.append((what, done, total)))
     assert found.found("robot").confidence == "not found"
     assert any("give the right ROBOT" in warning for warning in found.warnings)
+    assert looks[0] == ("looking for the ruler", 0, 1)
+    assert looks[-1][0] == "looking for the robot"
+    assert looks[-1][1] == looks[-1][2]
     with pytest.raises(InputError, match=r"spacing .* out of range"):
         sp.propose_setup(tmp_path / "a.mp4", spacing=0.0)
+    flat_pictures.Flat(**empty, size=(160, 120), focal=175.0).write(tmp_path / "b.mp4")
+    with pytest.raises(InputError, match=r"b\.mp4 shows neither a ruler nor a robot like 'biorob2012-wide'"):
+        sp.propose_setup(tmp_path / "b.mp4", output=tmp_path / "setup.toml")
+    assert not (tmp_path / "setup.toml").exists()
+
+
+@pytest.mark.parametrize("frames", [1, 12])
+def test_noise_is_no_robot_and_no_film(tmp_path, frames):
+    rng = np.random.default_rng(0)
+    for index in range(frames):
+        cv2.imwrite(str(tmp_path / f"{index:02d}.png"), rng.integers(0, 256, (240, 320, 3), dtype=np.uint8))
+    with pytest.raises(InputError, match=r"shows noise alone: neighbouring pixels correlate by -?0\.0"):
+        sp.propose_setup(tmp_path, fps=30.0)
 
 
 @pytest.mark.slow

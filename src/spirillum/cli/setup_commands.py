@@ -52,8 +52,8 @@ def propose(
     from spirillum.cli import renderer
     from spirillum.measurement.proposal import propose_setup
 
-    with renderer.at_work(f"looking at {film.name} (without the right ROBOT this can take a minute)", quiet=json):
-        found = propose_setup(film, robot, output, spacing=spacing, fps=fps, overwrite=force)
+    with renderer.progress_bar(quiet=json) as progress:
+        found = propose_setup(film, robot, output, spacing=spacing, fps=fps, overwrite=force, progress=progress)
     renderer.show(found.to_dict(), json=json)
 
 

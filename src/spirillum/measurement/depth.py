@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from spirillum.vision.setup import Setup
 
-__all__ = ["apparent_distance", "depth_shares"]
+__all__ = ["apparent_distance", "depth_shares", "spacing_at_axis"]
 
 _STEP = 1e-3
 
@@ -23,8 +23,14 @@ def apparent_distance(height: float, camera: float, surface: float | None, index
     return camera - surface + (surface - height) / index
 
 
-def _scale(setup: Setup, changed: str = "", by: float = 0.0) -> float:
-    """Length per pixel at the axis with one number changed, up to a factor."""
+def spacing_at_axis(setup: Setup, changed: str = "", by: float = 0.0) -> float:
+    """Length at the height of the robot's axis that looks as long as the ruler's spacing at the height of the ruler, m.
+
+    Args:
+        setup: the setup; without a ruler the spacing is 1.
+        changed: a number of the setup that is changed, by its dotted name.
+        by: how much it is changed by.
+    """
 
     def number(name: str, value: float) -> float:
         return value + by if name == changed else value
@@ -55,10 +61,10 @@ def depth_shares(setup: Setup) -> dict[str, float]:
         "markers.height": markers.height_uncertainty,
         "robot.axis_height": setup.robot.axis_height_uncertainty,
     }
-    scale = _scale(setup)
+    scale = spacing_at_axis(setup)
     found = {}
     for name, error in uncertain.items():
         if error > 0:
-            change = _scale(setup, name, _STEP * error) - _scale(setup, name, -_STEP * error)
+            change = spacing_at_axis(setup, name, _STEP * error) - spacing_at_axis(setup, name, -_STEP * error)
             found[name] = abs(change / (2.0 * _STEP * scale))
     return found

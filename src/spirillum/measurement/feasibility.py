@@ -10,7 +10,7 @@ from typing import Any
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
-from spirillum.measurement.depth import depth_shares
+from spirillum.measurement.depth import depth_shares, spacing_at_axis
 from spirillum.measurement.statistics import NORMAL
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
@@ -304,7 +304,7 @@ def _pixels(setup: Setup, robot: Robot, pixel: float, stripes: int) -> list[Chec
     if stripes:
         sizes["stripe"] = ("a stripe that faces the camera", math.pi * robot.body.diameter / stripes)
     if setup.markers.spacing is not None:
-        sizes["spacing"] = ("the ruler's spacing", setup.markers.spacing)
+        sizes["spacing"] = ("the ruler's spacing", spacing_at_axis(setup))
     long = (robot.body.length + robot.coupling.length + robot.tail.length) / pixel
     if long < (limit := _NEEDED["robot"]):
         sentence = f"the whole robot is {long:.3g} pixels long, fewer than the {limit:g} without which it is not found"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -113,6 +113,7 @@ def propose_setup(
     spacing: str | float | None = None,
     fps: float | None = None,
     overwrite: bool = False,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> Proposal:
     """Look at a film and propose its setup.
 
@@ -123,12 +124,14 @@ def propose_setup(
         spacing: from each line of the ruler to the next, with its unit or a float in m; None: left to be filled in.
         fps: frames a second of a folder of images, or in place of a film's own times.
         overwrite: replace a file that is there.
+        progress: told what is looked for, how many looks are done, and how many there are at most.
 
     Returns:
         What was found and how sure it is, what is left to be filled in, and the text of the file.
 
     Raises:
-        InputError: if the film or the robot cannot be read, or the file cannot be written.
+        InputError: if the film or the robot cannot be read, the film shows neither a ruler nor the robot, or the file
+            cannot be written.
     """
     target = None
     if output is not None:
@@ -139,7 +142,12 @@ def propose_setup(
     name = PAPER_ROBOTS[0] if robot is None else str(robot)
     loaded = load(name)
     video = open_video(film, fps or (_USUAL_RATE if Path(film).is_dir() else None))
-    seen_there = scouted(video, loaded, apart)
+    seen_there = scouted(video, loaded, apart, progress)
+    if seen_there.known is None and seen_there.lines is None:
+        raise InputError(
+            f"{video.name} shows neither a ruler nor a robot like '{loaded.name}' at any scale; allowed: a film in "
+            "which all of the robot is in view and moves, with the right ROBOT"
+        )
     if robot is None:
         name = _by_walls(seen_there, loaded)
     timed = not video.images or fps is not None

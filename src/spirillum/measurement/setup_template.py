@@ -171,15 +171,21 @@ def setup_answer(path: str | Path, film: str | Path | None = None) -> dict[str, 
 
 
 def _as_in_example(setup: Setup) -> list[str]:
-    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names."""
+    """Fields that only the experimenter knows and that hold value and uncertainty of the example, by dotted names.
+
+    A value without an uncertainty, such as the spacing of a ruler, may well be the one of the example.
+    """
     example, fields = Setup.model_validate(tomllib.loads(setup_text())), [name.split(".") for name in KNOWN]
-    pairs = [(part, key) for part, key in fields if hasattr(getattr(example, part), f"{key}_uncertainty")]
 
     def held(one: Setup, part: str, key: str) -> tuple[float | None, float]:
         table = getattr(one, part)
-        return getattr(table, key), getattr(table, f"{key}_uncertainty")
+        return getattr(table, key), getattr(table, f"{key}_uncertainty", 0.0)
 
-    return [f"{part}.{key}" for part, key in pairs if held(setup, part, key) == held(example, part, key)]
+    return [
+        f"{part}.{key}"
+        for part, key in fields
+        if (own := held(example, part, key))[1] > 0.0 and held(setup, part, key) == own
+    ]
 
 
 def _seen_in(film: str | Path, setup: Setup, robot: Robot, folder: Path) -> tuple[dict[str, Any], tuple[Flag, ...]]:

@@ -232,6 +232,11 @@ class ScoutingConstants:
     """Most looks from one guess, each at the size that the one before has found."""
     most_colours: int = 5
     """Most colours of stripes whose orders are tried."""
+    alone: int = 5
+    """Fewest frames on which a robot has to be found where neither ruler nor stripes speak for it: a single picture of
+    noise may show one."""
+    correlation: float = 0.3
+    """Least correlation of the brightness of neighbouring pixels in the static background: below it is noise alone."""
     along: int = 160
     """Places along the channel at which its walls are looked for."""
     widest: float = 2.2

@@ -7,7 +7,7 @@ that the search for the robot corrects. Finding and learning are those of every 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import permutations
 from typing import NamedTuple
 
@@ -79,27 +79,56 @@ class Scouted(NamedTuple):
         return float(np.polyfit(time - time.mean(), x, 1)[0]) / self.optics.length_per_pixel
 
 
-def scouted(video: Video, robot: Robot, spacing: float | None = None) -> Scouted:
+def scouted(
+    video: Video,
+    robot: Robot,
+    spacing: float | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Scouted:
     """Look at a film without a setup.
 
     Args:
         video: the film.
         robot: the robot in front of the camera.
         spacing: of the ruler's lines, m, where it is known.
+        progress: told what is looked for, how many looks are done, and how many there are at most.
 
     Raises:
-        InputError: if no frame can be read.
+        InputError: if no frame can be read, or the pictures show noise alone.
     """
+    tell = progress or (lambda _what, _done, _total: None)
     anywhere = _setup(robot, video.size, 1e-4, "right")
     frames = samples_of(video, anywhere.start, anywhere.end)
     stills = _Stills(frames)
+    _check_no_noise(stills.at(1), video)
+    tell("looking for the ruler", 0, 1)
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
-    for guess in _guesses(robot, video.size, lines, spacing):
-        for direction, known in _found_at(video, robot, (guess, lines, directions), stills):
+    guesses = _guesses(robot, video.size, lines, spacing)
+    looks = 2 * len(guesses) * len(directions)
+    for place, guess in enumerate(guesses):
+        found = _found_at(video, robot, (guess, lines, directions), stills)
+        for done, (direction, known) in enumerate(found, 1 + 2 * len(directions) * place):
+            tell("looking for the robot", done, looks)
+            if known is None:
+                continue
             stripes = _stripes_seen(robot, known)
+            if lines is None and not stripes and len(known.start.path) < SCOUTING.alone:
+                continue
             walls = _walls(stills.at(factor), known, lines)
             return Scouted(lines, known, direction, stripes, walls, frames, factor)
     return Scouted(lines, None, "right", (), None, frames, factor)
+
+
+def _check_no_noise(still: Samples, video: Video) -> None:
+    """Refuse pictures whose neighbouring pixels have nothing in common, before a robot is looked for at all scales."""
+    grey = still.mean(axis=2) - still.mean()
+    total = float(np.mean(grey**2))
+    shared = 0.5 * float(np.mean(grey[1:] * grey[:-1]) + np.mean(grey[:, 1:] * grey[:, :-1]))
+    if shared < SCOUTING.correlation * total:
+        raise InputError(
+            f"{video.name} shows noise alone: neighbouring pixels correlate by {shared / total:.2f}; allowed: a film "
+            "in which all of the robot is in view"
+        )
 
 
 class _Stills:
@@ -163,8 +192,8 @@ def _found_at(
     robot: Robot,
     guess: tuple[float, Lines | None, tuple[str, ...]],
     stills: _Stills,
-) -> Iterator[tuple[str, Identified]]:
-    """The robot near a guessed scale, with the direction of its nose; then at half to twice of it."""
+) -> Iterator[tuple[str, Identified | None]]:
+    """Looks for the robot near a guessed scale, in each direction of its nose; then at half to twice of it."""
     finders = {}
     pixel, lines, directions = guess
     for direction in directions:
@@ -173,24 +202,30 @@ def _found_at(
         if lines is not None:
             optics = optics.moved({"rotation": first_rotation(optics, lines)})
         finders[direction] = setup, BodyFinder(robot, optics, bounds_of(setup, video))
-    frames, most = stills.frames, reduction(video.size)
+    most = reduction(video.size)
     for sized in (False, True):
         for direction, (setup, finder) in finders.items():
             factor = searched_at(finder.shape().width, most)
-            images, still = [frame.reduced(factor) for frame in frames], stills.at(factor)
+            images, still = [frame.reduced(factor) for frame in stills.frames], stills.at(factor)
             size = best_other_size(finder, images, still) if sized else 1.0
-            body = finder if size is None else resized(finder, size)
-            for _ in range(0 if size is None else SCOUTING.rounds):
-                try:
-                    known = identified_at(video.name, setup, body, frames, still, 1.0)  # no size is stated
-                except InputError:
-                    break
-                tail = known.wire.readable
-                if not known.start.flags and (tail > IDENTITY.sure_share or known.robot):
-                    yield direction, known
-                if known.start.flags or tail < IDENTITY.least_share:
-                    break
-                body = resized(known.start.body, 1.0)  # it looks otherwise large: once more from there
+            body = None if size is None else resized(finder, size)
+            yield direction, None if body is None else _looked(video, setup, body, stills, factor)
+
+
+def _looked(video: Video, setup: Setup, body: BodyFinder, stills: _Stills, factor: int) -> Identified | None:
+    """The robot at about the size of a body, looked at anew at the size that was found; None where it is not there."""
+    for _ in range(SCOUTING.rounds):
+        try:
+            known = identified_at(video.name, setup, body, stills.frames, stills.at(factor), 1.0)  # no size is stated
+        except InputError:
+            return None
+        tail = known.wire.readable
+        if not known.start.flags and (tail > IDENTITY.sure_share or known.robot):
+            return known
+        if known.start.flags or tail < IDENTITY.least_share:
+            return None
+        body = resized(known.start.body, 1.0)  # it looks otherwise large: once more from there
+    return None
 
 
 def _stripes_seen(robot: Robot, known: Identified) -> tuple[str, ...]:

@@ -153,12 +153,10 @@ class Video:
 
     def _image(self, index: int) -> Frame | None:
         picture = _read_image(self.images[index])
-        if picture is None or picture.shape[1::-1] != self.size:
-            self._note(
-                "unreadable-frames",
-                f"{self.images[index].name} cannot be read or is not as large as most: such images are left out",
-            )
+        if picture is None:
+            self._note("unreadable-frames", f"{self.images[index].name} cannot be read: such images are left out")
             return None
+        _check_same_size(self.images[index], picture.shape[1::-1], self.size)
         return Frame(index, float(self._stamps()[index]), picture)
 
     def _note(self, name: str, sentence: str) -> None:
@@ -332,11 +330,13 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
     steps = np.diff(numbers)
     if len(names) > 1 and (steps.min() != 1 or steps.max() > 1e6):
         numbers = np.arange(len(names))
-    sizes = [picture.shape[1::-1] for picture in map(_read_image, names[:_FEW]) if picture is not None]
-    if not sizes:
+    first = [(name, picture.shape[1::-1]) for name in names[:_FEW] if (picture := _read_image(name)) is not None]
+    if not first:
         raise InputError(f"{path}: {names[0].name} cannot be read as an image; allowed: {_WHAT}")
-    width, height = Counter(sizes).most_common(1)[0][0]
+    width, height = Counter(size for _, size in first).most_common(1)[0][0]
     _check_size(path, (width, height))
+    for name, size in first:
+        _check_same_size(name, size, (width, height))
     counted = tuple(int(number - numbers[0]) for number in numbers)
     duration = (counted[-1] + 1) / frames_per_second
     return Video(
@@ -364,6 +364,15 @@ def _check_size(path: Path, size: tuple[int, int]) -> None:
         raise InputError(
             f"{path} has pictures of {size[0]} x {size[1]} pixels; allowed: sides of at least {SMALLEST_SIDE} and at "
             f"most {MOST_PIXELS // 1_000_000} million pixels"
+        )
+
+
+def _check_same_size(image: Path, size: tuple[int, ...], expected: tuple[int, int]) -> None:
+    """Pictures of one folder are of one camera, and of one part of what it sees: else no place can be compared."""
+    if size != expected:
+        raise InputError(
+            f"{image} has {size[0]} x {size[1]} pixels, others in its folder {expected[0]} x {expected[1]}; allowed: "
+            "images of one size"
         )
 
 
