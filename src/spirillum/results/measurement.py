@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from spirillum.measurement.series import movement_of, series_of
 from spirillum.measurement.trials import Trial
 from spirillum.results.measurement_report import write_measurement_report
 from spirillum.view.annotate import annotated_film
+from spirillum.vision.setup import stripes_of
+from spirillum.vision.track.colours import pattern_period
 from spirillum.vision.video.frames import open_video
 
 __all__ = ["measure"]
@@ -164,7 +167,9 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
     words = {"title": f"{path.name}, annotated"}
     if says_synthetic(video.words):
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
-    with whole_file(target) as temporary, annotated_film(temporary, asked.robot, words, thumbnail) as on_frame:
+    period = pattern_period(stripes_of(asked.setup, asked.robot))
+    film = partial(annotated_film, robot=asked.robot, words=words, thumbnail=thumbnail, period=period)
+    with whole_file(target) as temporary, film(temporary) as on_frame:
         trial = measured_trial(asked, number, video, progress=tell, on_frame=on_frame)
     folder.files.append(target.name)
     return trial

@@ -27,6 +27,12 @@ __all__ = ["Annotator", "Seen", "annotated_film"]
 
 _BODY, _AXIS, _POINTER, _WIRE = (40, 220, 60), (255, 255, 255), (255, 40, 200), (0, 225, 255)
 _INK = (255, 255, 255)
+_TEXT, _SMALLEST_TEXT = 0.45, 0.4
+"""Scale of the font in a picture 480 pixels high, and the least one that can be read."""
+_DIAL = 16.0
+"""Radius of a dial in a picture 480 pixels high, pixels."""
+_MOST_OF_HEIGHT = 0.25
+"""Largest share of a picture's height that words cover."""
 _SHIFT = 4
 """Lines are drawn at sixteenths of a pixel."""
 _TICKS = 90_000
@@ -63,34 +69,35 @@ class Seen(Protocol):
 class Annotator:
     """Draws tracking results over frames of one robot."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, period: float = 2.0 * math.pi) -> None:
         """Prepare the outline and the wire.
 
         Args:
             robot: the robot.
+            period: of its stripes: by whole multiples of it the body's angle is not known, rad.
         """
         from spirillum.robot.mesh import tail_line
 
         self._cv2 = required("cv2", "an annotated video", "video")
         body = robot.body
+        self._period = period
         self._half, self._radius = 0.5 * body.length, 0.5 * body.diameter
         self._outline = _outline_of(robot)
         self._wire = np.asarray(tail_line(robot, fineness=0.6).points)
         self._seal = robot.seal.length if robot.seal else 0.3 * body.length
         self._first: float | None = None
 
-    def draw(self, image: np.ndarray, seen: Seen, words: tuple[str, ...] = ()) -> np.ndarray:
+    def draw(self, image: np.ndarray, seen: Seen) -> np.ndarray:
         """A copy of a frame with the tracking result drawn on it, reduced to at most 1920 pixels.
 
         Args:
             image: RGB bytes, (h, w, 3).
             seen: the tracking result.
-            words: lines of text instead of those about this frame.
         """
         picture, times = self._reduced(image)
         pose = seen.pose
         if pose is None:
-            self._write(picture, words or (f"t = {seen.time:7.2f} s, robot not seen",))
+            self._write(picture, (f"t = {seen.time:.2f} s", "robot not seen"))
             return picture
         from spirillum.vision.camera.optics import seen as pixels_of
 
@@ -104,10 +111,16 @@ class Annotator:
             line(_turned(self._wire, seen.tail_phase), _WIRE)
         if math.isfinite(seen.body_angle):
             self._pointer(line, seen.body_angle)
-        x = self._along(seen)
-        angles = f"body {_degrees(seen.body_angle)}, tail {_degrees(seen.tail_phase)}"
         self._dials(picture, seen)
-        self._write(picture, words or (f"t = {seen.time:7.2f} s, x = {1e3 * x:7.2f} mm", angles))
+        self._write(
+            picture,
+            (
+                f"t = {seen.time:.2f} s",
+                f"x = {1e3 * self._along(seen):.2f} mm",
+                f"body {_degrees(seen.body_angle, self._period)}",
+                f"tail {_degrees(seen.tail_phase)}",
+            ),
+        )
         return picture
 
     def _reduced(self, image: np.ndarray) -> tuple[np.ndarray, int]:
@@ -120,19 +133,25 @@ class Annotator:
         return self._cv2.resize(whole, (width, height), interpolation=self._cv2.INTER_AREA), times
 
     def _dials(self, picture: np.ndarray, seen: Seen) -> None:
-        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root."""
-        unit = max(picture.shape[0] / 480.0, 0.6)
-        radius = 16.0 * unit
+        """Body and tail as seen from the rear, in the upper right corner: the hand is stripe 1, or the wire's root.
+
+        Where stripes repeat, the body has a hand for each that may be stripe 1.
+        """
+        radius = _DIAL * _unit(picture)
         around = np.linspace(0.0, 2.0 * np.pi, 33)
-        for place, angle, colour in ((3.4, seen.body_angle, _POINTER), (1.2, seen.tail_phase, _WIRE)):
+        for place, angle, colour, period in (
+            (3.4, seen.body_angle, _POINTER, self._period),
+            (1.2, seen.tail_phase, _WIRE, 2.0 * math.pi),
+        ):
             centre = np.array([picture.shape[1] - place * radius, 1.3 * radius])
             circle = centre + radius * np.stack([np.cos(around), np.sin(around)], axis=1)
             self._line(picture, circle, colour, closed=True)
             if math.isfinite(angle):
                 # From the rear +y is to the left; stripe 1 starts at +z, the wire at +y.
-                turned = angle if colour is _POINTER else angle - 0.5 * math.pi
-                tip = centre + radius * np.array([math.sin(turned), -math.cos(turned)])
-                self._line(picture, np.stack([centre, tip]), colour, closed=False)
+                first = angle if colour is _POINTER else angle - 0.5 * math.pi
+                for turned in first + np.arange(0.0, 2.0 * math.pi - 1e-9, period):
+                    tip = centre + radius * np.array([math.sin(turned), -math.cos(turned)])
+                    self._line(picture, np.stack([centre, tip]), colour, closed=False)
 
     def _pointer(self, line: Callable[..., None], angle: float) -> None:
         """A line along the middle of stripe 1 where it faces the camera, and a clock hand on the body's end."""
@@ -160,14 +179,39 @@ class Annotator:
         self._cv2.polylines(picture, [whole], closed, colour, 1, self._cv2.LINE_AA, _SHIFT)
 
     def _write(self, picture: np.ndarray, words: tuple[str, ...]) -> None:
-        unit = max(picture.shape[0] / 480.0, 0.6)
-        font, size = self._cv2.FONT_HERSHEY_SIMPLEX, 0.45 * unit
-        longest = max(self._cv2.getTextSize(text, font, size, 1)[0][0] for text in words)
-        ground = picture[: round((6 + 18 * len(words)) * unit), : round(longest + 16 * unit)]
+        """Write words into the upper left corner, beside the dials, in a few lines; leave out what does not fit."""
+        unit = _unit(picture)
+        font, size = self._cv2.FONT_HERSHEY_SIMPLEX, _TEXT * unit
+
+        def width(text: str) -> int:
+            return int(self._cv2.getTextSize(text, font, size, 1)[0][0])
+
+        room = picture.shape[1] - (16.0 + 5.0 * _DIAL) * unit
+        lines = _lines_of(words, width, room)[: max(int((_MOST_OF_HEIGHT * picture.shape[0] / unit - 6.0) / 18.0), 0)]
+        if not lines:
+            return
+        longest = max(width(line) for line in lines)
+        ground = picture[: round((6 + 18 * len(lines)) * unit), : round(longest + 16 * unit)]
         ground //= 3  # dark behind the words
-        for row, text in enumerate(words):
+        for row, line in enumerate(lines):
             place = (round(8 * unit), round((16 + 18 * row) * unit))
-            self._cv2.putText(picture, text, place, font, size, _INK, 1, self._cv2.LINE_AA)
+            self._cv2.putText(picture, line, place, font, size, _INK, 1, self._cv2.LINE_AA)
+
+
+def _unit(picture: np.ndarray) -> float:
+    """Size of words and dials over that in a picture 480 pixels high; letters stay large enough to be read."""
+    return max(int(picture.shape[0]) / 480.0, _SMALLEST_TEXT / _TEXT)
+
+
+def _lines_of(words: tuple[str, ...], width: Callable[[str], int], room: float) -> list[str]:
+    """Words put into as few lines as they need; what does not fit into a line by itself is left out."""
+    lines: list[str] = []
+    for word in words:
+        if lines and width(longer := f"{lines[-1]}  {word}") <= room:
+            lines[-1] = longer
+        elif width(word) <= room:
+            lines.append(word)
+    return lines
 
 
 def _outline_of(robot: Robot) -> Samples:
@@ -183,13 +227,22 @@ def _turned(points: Samples, angle: float) -> Samples:
     return np.stack([points[:, 0], cos * y - sin * z, sin * y + cos * z], axis=1)
 
 
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle) % 360.0:5.1f} deg" if math.isfinite(angle) else "  not read"
+def _degrees(angle: float, period: float = 2.0 * math.pi) -> str:
+    """An angle in degrees; where it is known up to multiples of a period only, with these."""
+    if not math.isfinite(angle):
+        return "not read"
+    known = f"{math.degrees(angle % period):.1f} deg"
+    return known if period > 2.0 * math.pi - 1e-9 else f"{known} + k {math.degrees(period):.4g}"
 
 
 @contextmanager
 def annotated_film(
-    path: Path, robot: Robot, words: dict[str, str], thumbnail: Callable[[bytes], None] | None = None
+    path: Path,
+    robot: Robot,
+    words: dict[str, str],
+    thumbnail: Callable[[bytes], None] | None = None,
+    *,
+    period: float = 2.0 * math.pi,
 ) -> Iterator[Callable[[int, np.ndarray, Seen], None]]:
     """A film of annotated frames at their true times, drawn and encoded by a thread of its own.
 
@@ -198,11 +251,12 @@ def annotated_film(
         robot: the robot.
         words: title and comment of the film.
         thumbnail: takes a frame as JPEG, when the film is complete.
+        period: of the robot's stripes: by whole multiples of it the body's angle is not known, rad.
 
     Raises:
         InputError: if a package is missing, or no encoder is there.
     """
-    annotator = Annotator(robot)
+    annotator = Annotator(robot, period)
     kept: list[np.ndarray] = []
 
     def drawn(index: int, image: np.ndarray, seen: Seen) -> np.ndarray:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["measurement_figures", "trial_figure", "trials_figure"]
 
 _MOST_POINTS = 4000
+_LEFT_OUT = "#999999"
 _SERIES = (
     ("forward_velocity", "position", "m"),
     ("body_rotation_rate", "body's angle", "turn"),
@@ -43,8 +44,8 @@ def measurement_figures(measurement: Measurement) -> dict[str, Picture]:
     for trial in measurement.trials:
         found[f"series-{trial.name}"] = Picture(
             f"Series of {plain(trial.name)}",
-            "Left: what was seen on every frame (dots) and the fitted line. Right: residuals; frames that were "
-            "left out are not shown.",
+            "Left: what was seen on every frame (dots) and the fitted line; grey are frames that were left out of it: "
+            "stray ones, and the first six of a compressed film whose first picture is ahead. Right: residuals.",
             f"Position, body angle and tail phase of {plain(trial.name)} over time, with residuals",
             lambda trial=trial: trial_figure(trial),  # type: ignore[misc]
         )
@@ -69,7 +70,8 @@ def trial_figure(trial: Trial) -> Figure:
             left.text(0.02, 0.96, "not given: see the flags", transform=left.transAxes, va="top", color="#9c3d00")
     for axes in panels[-1]:
         axes.set_xlabel("time, s")
-    panels[0][0].set_title("measured, with the fitted line", loc="left")
+    left_out = any(_left_out(values[name], trial.fits[name]).any() for name, _, _ in _SERIES)
+    panels[0][0].set_title(f"measured{' (grey: left out)' if left_out else ''}, with the fitted line", loc="left")
     panels[0][1].set_title("residuals", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
@@ -92,7 +94,10 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     values = values - values[known][0]
     scale = Scale.of(values, "m") if unit == "m" else Scale(2 * np.pi, "turns")
     few = slice(None, None, max(1, time.size // _MOST_POINTS))
-    left.plot(time[few], scale(values)[few], ".", color=COLOURS["sky"], markersize=2.5, rasterized=True)
+    out = _left_out(values, rate)
+    for shown, colour in ((~out, COLOURS["sky"]), (out, _LEFT_OUT)):
+        dots = np.where(shown, scale(values), np.nan)
+        left.plot(time[few], dots[few], ".", color=colour, markersize=2.5, rasterized=True)
     left.set_ylabel(f"{words}, {scale.unit}")
     if not rate.measured or rate.residual.size != time.size:
         return
@@ -105,6 +110,13 @@ def _series(left: Axes, right: Axes, time: Samples, values: Samples, rate: Rate,
     right.plot(time[few], small(rate.residual)[few], ".", color=COLOURS["blue"], markersize=2.0, rasterized=True)
     right.axhline(0.0, color="#444444", linewidth=0.6)
     right.set_ylabel(f"residual, {small.unit}")
+
+
+def _left_out(values: Samples, rate: Rate) -> np.ndarray:
+    """Frames that were read and are left out of the line, (n,)."""
+    if rate.residual.size != values.size:
+        return np.zeros(values.shape, dtype=bool)
+    return np.isfinite(values) & ~np.isfinite(rate.residual)
 
 
 def trials_figure(measurement: Measurement) -> Figure:

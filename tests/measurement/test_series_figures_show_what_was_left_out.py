@@ -1,0 +1,30 @@
+"""Frames that are left out of a line are grey in its figure, and its title says so."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spirillum.measurement.lead import without_lead
+from spirillum.measurement.trials import trial_of
+from spirillum.view.figures.measurement import trial_figure
+from spirillum.vision.track.track import Track
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+def test_the_first_frames_of_a_film_that_is_ahead_are_grey(
+    make_track: Callable[..., Track], robot: Any, ahead: bool
+) -> None:
+    track = make_track(span=3.0)
+    if ahead:
+        position, tail = track.position.copy(), track.tail_phase.copy()
+        position[0, 0] += 1e-4
+        tail[0] += 0.2
+        track = replace(track, position=position, tail_phase=tail)
+    assert (without_lead(track) is not track) is ahead
+    axes = trial_figure(trial_of(track, robot)).axes
+    assert ("grey: left out" in axes[0].get_title(loc="left")) is ahead
+    grey = next(line for line in axes[0].lines if line.get_color() == "#999999")
+    assert np.isfinite(np.asarray(grey.get_ydata(), dtype=float)).sum() == (6 if ahead else 0)
