@@ -1,4 +1,4 @@
-"""Words on an annotated frame: large enough to be read, inside the picture, and no surer than the stripes are."""
+"""Annotated frames: words large enough to be read and no surer than the stripes are; large frames are reduced."""
 
 from types import SimpleNamespace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spirillum.robot.load import load
+from spirillum.view import annotate
 from spirillum.view.annotate import Annotator, _degrees, _lines_of
 from spirillum.vision.camera.optics import BodyPose, Optics
 
@@ -58,3 +59,20 @@ def test_a_dial_has_a_hand_for_each_stripe_that_may_be_the_first() -> None:
         inside = (slice(row - 9, row + 10), slice(column - 9, column + 10))
         counts.append(np.count_nonzero((drawn[inside] != picture[inside]).any(axis=2)))
     assert 1.5 < counts[0] / counts[1] < 2.5
+
+
+def outline(picture: np.ndarray) -> np.ndarray:
+    """Where the body's green outline ends to the left, to the right, above and below, pixels."""
+    red, green, blue = (picture[..., channel].astype(int) for channel in range(3))
+    rows, columns = np.nonzero((green > red + 40) & (green > blue + 40))
+    return np.array([columns.min(), columns.max(), rows.min(), rows.max()])
+
+
+def test_a_large_frame_is_reduced_with_what_is_drawn_on_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where its width is no multiple of the reduction."""
+    _, whole = annotated(801, 600)
+    monkeypatch.setattr(annotate, "_LARGEST", 500)
+    _, half = annotated(801, 600)
+    assert whole.shape == (600, 801, 3)
+    assert half.shape == (300, 400, 3)
+    assert np.abs(outline(half) - ((outline(whole) + 0.5) / 2.0 - 0.5)).max() <= 1.0
