@@ -250,3 +250,15 @@ def test_a_parabola_is_told_where_errors_hang_together() -> None:
 def test_residuals_lie_about_0_where_errors_wander() -> None:
     rate = rate_of(TIME, TIME + wandering(7.0, 0.1)(np.random.default_rng(1))[0])
     assert np.nanmean(rate.residual) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_fast_start_is_a_part_of_the_rate_and_no_outlier() -> None:
+    """A body that settles: the first tenth lies far from the line, and belongs to the way from end to end."""
+    rng, time = np.random.default_rng(10), np.arange(99) / 10.0
+    values = -0.13 * time - 0.08 * (1.0 - np.exp(-time / 1.5)) + 2e-4 * rng.normal(size=time.size)
+    rate = rate_of(time, values)
+    truth = -0.13 - 0.08 * (1.0 - np.exp(-time[-1] / 1.5)) / time[-1]
+    assert not rate.steady
+    assert rate.outliers == 0
+    assert rate.low < truth < rate.high
+    assert rate.value == pytest.approx(truth, rel=0.01)

@@ -244,3 +244,19 @@ def test_a_body_that_slows_down_by_a_third_is_told_with_its_rates(make_track: Ca
     assert last == pytest.approx(mean * (0.8 + 0.4 / 6.0), rel=0.05)
     found = trial.quantities["body_rotation_rate"]
     assert found.low < mean < found.high
+
+
+def test_the_first_frames_of_a_robot_whose_rate_changes_are_kept(make_track: Make, robot: Any) -> None:
+    """They may be ahead because it starts, and not because the film is compressed."""
+    track = make_track(span=4.0)
+    time, position, tail = track.time, track.position.copy(), track.tail_phase.copy()
+    position[0, 0] += 1e-4
+    tail[0] += 0.2
+    errors = track.body_angle + 0.7 * time
+    slowing = -0.2 * time - 0.15 * (1.0 - np.exp(-time / 0.8)) + 0.2 * errors
+    track = replace(track, position=position, tail_phase=tail, body_angle=slowing)
+    assert without_lead(track) is not track
+    trial = trial_of(track, robot)
+    assert np.isfinite(trial.fits["body_rotation_rate"].residual[:6]).all()
+    found = trial.quantities["body_rotation_rate"]
+    assert found.low < -0.2 - 0.15 * (1.0 - np.exp(-time[-1] / 0.8)) / time[-1] < found.high

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import spirillum as sp
 
@@ -11,10 +12,14 @@ RADIUS, START, LENGTH = 0.009, 4.0, 9.8
 """Of the body, m; begin and length of the film in the run, s."""
 
 
+@pytest.fixture(scope="module")
+def run() -> xr.Dataset:
+    return sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})
+
+
 @pytest.mark.slow
-def test_run_in_the_tube_is_measured_within_the_stated_intervals(tmp_path: Path) -> None:
+def test_run_in_the_tube_is_measured_within_the_stated_intervals(run: xr.Dataset, tmp_path: Path) -> None:
     """From above one sees the top of the body, which a nose that rises moves back by the radius (known limit L50)."""
-    run = sp.simulate("biorob2012-wide", model="tube", timing={"duration": "14 s", "samples_per_turn": 40})
     late = run.sel(time=slice(START, None))
     film = tmp_path / "film.mp4"
     sp.render("biorob2012-wide", film, run=late, trial={"duration": LENGTH}, camera={"size": "400x300", "fps": 10.0})
@@ -37,3 +42,18 @@ def test_run_in_the_tube_is_measured_within_the_stated_intervals(tmp_path: Path)
         assert width < (0.2 if name == "body_rotation_rate" else 0.02) * abs(value), name
     assert rate(late["azimuth"]) < 0.0  # a film carries it the way in which its body turns
     assert truth["body_rotation_rate"] < 0.0
+
+
+@pytest.mark.slow
+def test_a_robot_that_settles_on_film_is_flagged_and_its_speed_lies_in_the_interval(
+    run: xr.Dataset, tmp_path: Path
+) -> None:
+    """In its first four seconds its nose rises by a degree, which hides a tenth of its way, and its body slows down."""
+    film, length = tmp_path / "film.mp4", 3.9
+    sp.render("biorob2012-wide", film, run=run, trial={"duration": length})
+    trial = sp.measure(film, film.with_suffix(".setup.toml"), annotated=False, figures=False).trials[0]
+    assert {"ends-drift-apart", "not-steady-body-rotation-rate"} <= {flag.name for flag in trial.flags}
+    speed = float(np.interp(length, run["time"], run["position"][:, 0])) / length
+    found = trial.quantities["forward_velocity"]
+    assert found.low < speed < found.high
+    assert found.value < 0.96 * speed

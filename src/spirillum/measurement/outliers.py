@@ -23,7 +23,9 @@ _LEAST = 0.25
 series' own scatter is no outlier, however smooth its neighbours are."""
 
 
-def outlying_frames(time: Samples, values: Samples, error: Samples | None = None) -> np.ndarray:
+def outlying_frames(
+    time: Samples, values: Samples, error: Samples | None = None, *, straight: bool = True
+) -> np.ndarray:
     """Frames that lie more than six standard deviations (from the median absolute deviation) from their neighbours.
 
     First from the median of nine neighbours about a robust line, which finds single frames; then from the line
@@ -34,6 +36,7 @@ def outlying_frames(time: Samples, values: Samples, error: Samples | None = None
         values: the series, (n,); NaN where it was not measured.
         error: standard error of frames that are known to be less sure than their neighbours, such as those read by
             hand, (n,); NaN of others. Such a frame is an outlier only beyond six of it.
+        straight: whether the series may be compared with a line at all; else its neighbours alone tell an outlier.
 
     Returns:
         Truth values, (n,).
@@ -48,6 +51,8 @@ def outlying_frames(time: Samples, values: Samples, error: Samples | None = None
     single = _far(near, np.maximum(_LEAST * _scale(residual), own[known]))
     kept = known[~single]
     found[known[single]] = True
+    if not straight:
+        return found
     residual = values[kept] - repeated_median_line(time[kept], values[kept]).at(time[kept])
     bursts = _far(residual, own[kept])
     if bursts.mean() < 0.1:

@@ -120,7 +120,8 @@ def rate_of(
         The slope; where the rate changes, the mean rate from end to end.
     """
     known = np.isfinite(values) & np.isfinite(time)
-    outlier = outlying_frames(time, values, None if read is None or error is None else np.where(read, error, np.nan))
+    own = None if read is None or error is None else np.where(read, error, np.nan)
+    outlier = outlying_frames(time, values, own, straight=not unsteady)
     used = known & ~outlier
     count = int(used.sum())
     if count < 2 or np.ptp(time[used]) <= 0:
@@ -141,12 +142,14 @@ def rate_of(
     blocks = _Blocks.of(s, y, weights, angles)
     straight, parabola, cubic = _fitted(blocks, (2, 3, 4))
     changes = unsteady or _rate_changes(blocks, (parabola, cubic))
+    if changes and not unsteady and outlier.any():  # what lies far from a line may belong to a curve
+        return rate_of(time, values, error, periodic, level, read=read, unsteady=True)
     fitted = cubic if changes else straight
     value, low, high = fitted.interval(_END_TO_END, level)
     left = np.asarray(y - np.polynomial.legendre.legval(s, fitted.mean))
     residual = _residual(values, used, left - left.mean())  # errors that wander leave the line's height open
-    if changes:  # lack of fit of a cubic at a start or a stop
-        off = abs(_from_end_to_end(s, y) - value)
+    if changes:  # lack of fit of a cubic at a start or a stop, whose frames may have been taken for outliers
+        off = abs(_from_end_to_end((time[known] - middle) / half, values[known]) - value)
         low, high = value - float(np.hypot(value - low, off)), value + float(np.hypot(high - value, off))
     return Rate(
         value / half,
@@ -195,9 +198,9 @@ def _weights(error: Samples | None, used: np.ndarray) -> Samples:
 
 
 def _from_end_to_end(s: Samples, y: Samples) -> float:
-    """Slope from the first few readings to the last few."""
+    """Slope from the median of the first few readings to that of the last few."""
     ends = slice(None, _ENDS), slice(-_ENDS, None)
-    first, last = (np.array([s[end].mean(), y[end].mean()]) for end in ends)
+    first, last = (np.array([np.median(s[end]), np.median(y[end])]) for end in ends)
     return float((last[1] - first[1]) / (last[0] - first[0]))
 
 

@@ -192,8 +192,15 @@ def _with_interval(item: Measured) -> Measured:
 
 
 def _fits(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
-    if read is None:
-        track = without_lead(track)
+    """Fitted lines, without the first frames of a compressed film that are ahead, unless the robot slows down there."""
+    shorter = track if read is not None else without_lead(track)
+    fits = _fits_of(shorter, robot, read)
+    if shorter is track or all(rate.steady for rate in fits.values()):
+        return fits
+    return _fits_of(track, robot, read)
+
+
+def _fits_of(track: Track, robot: Robot, read: np.ndarray | None) -> dict[str, Rate]:
     time, pixel = track.time, track.scale.length_per_pixel
     body, tail = _smooth(time, track.body_angle), _smooth(time, track.tail_phase)
     x = track.position[:, 0]
