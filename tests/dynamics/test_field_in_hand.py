@@ -57,6 +57,9 @@ def test_a_run_in_a_tilted_field_comes_to_swim_along_its_axis() -> None:
         speeds += [float(np.mean(lag)) for lag in lags]
     assert speeds[3:] == pytest.approx(speeds[:3], rel=1e-3)
     assert run.attrs["field_yaw"] == pytest.approx(yaw)
+    said = run.attrs["warnings"]
+    assert "(yaw 20 deg, pitch 10 deg), and velocities are those along x" in said
+    assert float(said.partition("it swims at ")[2].split()[0]) == pytest.approx(1e3 * speeds[0], rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,10 @@ def test_unknown_numbers_are_predicted_as_predict_does_or_left_out(setup_file: P
         predict("biorob2012-wide", tail_rate="1.2 Hz", band=False),
     )
     for name in ("forward_velocity", "body_rotation_rate"):
-        assert found.expected[name] == (pytest.approx(getattr(said, name), rel=1e-9), f"predicted by {said.model.name}")
+        assert found.expected[name] == (
+            pytest.approx(getattr(said, name), rel=1e-9),
+            "predicted by tube, held at its place",
+        )
     assert dict(found.intervals) == {}
     assert "nothing says how large a pixel is" in found.warnings[-1]
 

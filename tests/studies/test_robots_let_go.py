@@ -103,3 +103,17 @@ def test_nothing_fitted_goes_with_it(given: str, tmp_path) -> None:
         sp.study(LET, **{given: tmp_path / "a.toml"})
     with pytest.raises(InputError, match="settled with a store"):
         sp.study(LET, store=tmp_path / "a.zarr")
+
+
+def test_robots_that_are_not_let_go_are_told_by_what_they_lack() -> None:
+    """A table, or room where they would be laid down; then nothing is said of what settled speeds are."""
+    grid = {**LET["grid"], "amplitudes": ["2.4 mm", "9.3 mm"]}
+    said = sp.study({**LET, "models": ["rft"], "grid": grid}).attrs["warnings"]
+    assert "1 of 2 robots have no table of their tube and were not let go in it, the first: " in said
+    assert "1 of 2 robots cannot lie where they would be laid down and were not let go, the first: " in said
+    assert "a settled speed is that of" not in said
+
+
+def test_asperities_that_would_carry_more_than_the_weight_are_refused() -> None:
+    with pytest.raises(InputError, match=r"contact\.roughness = 1200 um with a gap of 500 um"):
+        sp.study({**LET, "contact": {"roughness": "1.2 mm"}})

@@ -166,7 +166,24 @@ def simulate(  # noqa: PLR0913 - the options of the command
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     more = {"model_reason": choice.reason} if choice.reason else {}
     more |= {f"field_{name}": angle for name, angle in about.model_dump(exclude_none=True).items()}
+    said += _along_tilted_axis(dataset, about)
     return dataset.assign_attrs(warnings="\n".join([*said, *warnings]), **more)
+
+
+def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[str]:
+    """A sentence on the speed along the axis of a tilted field; none for one along x."""
+    yaw, pitch = about.yaw or 0.0, about.pitch or 0.0
+    if not (yaw or pitch):
+        return []
+    late = dataset.isel(time=slice(dataset.sizes["time"] // 3, None))
+    way = late["position"].values[-1] - late["position"].values[0]
+    axis = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
+    return [
+        f"the axis of the field is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg), and "
+        f"velocities are those along x: along that axis it swims at {speed:.4g} mm/s over the last two thirds of the "
+        "run"
+    ]
 
 
 def _table(

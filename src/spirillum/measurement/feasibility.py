@@ -243,8 +243,9 @@ def _expected(
         answer = predict(robot, model=choice.model, tail_rate=given["tail_rotation_rate"], band=False)
     except InputError as error:
         raise InputError(f"the robot's motion cannot be predicted ({error}); allowed: --expect-... for all") from error
+    held = ", held at its place" if answer.model.placed else ""
     for name in given:
-        found.setdefault(name, (float(getattr(answer, name)), f"predicted by {choice.model}"))
+        found.setdefault(name, (float(getattr(answer, name)), f"predicted by {choice.model}{held}"))
     return {name: found[name] for name in given}, (choice.caution,) if choice.caution else ()
 
 

@@ -32,13 +32,26 @@ class Stretch(NamedTuple):
     half_width: float
     """Of its 95 % interval, m."""
 
-    def error(self) -> float:
+    def error(self, pixel: float) -> float:
         """Standard error of the robot's way by it, m.
 
         Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
-        variance of the change itself is taken off: what is noise widens nothing.
+        variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
+        goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
+
+        Args:
+            pixel: m per pixel; NaN without a scale, and so without a known change.
         """
-        return 0.5 * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
+        share = 1.0 if self.clear(pixel) else 0.5
+        return share * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
+
+    def clear(self, pixel: float) -> bool:
+        """Whether the change is more than noise and what clean films of bodies show that do not tilt.
+
+        Args:
+            pixel: m per pixel; NaN without a scale, and so without a known change.
+        """
+        return abs(self.change) - self.half_width > _CLEAR * pixel
 
     def flags(self, pixel: float) -> tuple[Flag, ...]:
         """A flag where the change is clear.
@@ -46,14 +59,14 @@ class Stretch(NamedTuple):
         Args:
             pixel: m per pixel; NaN without a scale, and so without a known change.
         """
-        if not abs(self.change) - self.half_width > _CLEAR * pixel:
+        if not self.clear(pixel):
             return ()
         how = "drift apart" if self.change > 0.0 else "draw together"
         size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / pixel:.2g} pixels)"
         sentence = (
-            f"nose and rear of the body {how} by {size} during the video, as where the body tilts out of the plane of "
-            "the picture: the interval of the speed is wider and holds what each of them alone says; film a robot that "
-            "has settled, or one that swims further"
+            f"nose and rear of the body {how} by {size} during the video, as where the nose rises or sinks: the speed "
+            "of the body's middle may be off by up to twice that over the video, and its interval is as wide; film a "
+            "robot that has settled, or one that swims further"
         )
         return (Flag("ends-drift-apart", sentence),)
 

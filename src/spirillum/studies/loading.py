@@ -26,6 +26,7 @@ from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.problems import problems_in
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
 from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
@@ -156,6 +157,7 @@ def load_study(
         check_placement(study.placement, *(SWIMMER_MODELS[model] for model in study.models))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
+    _check_contact(study, robots, name)
     placements = _fitted_places(study, robots, fitted, str(calibration))
     known = fitted_of(fitted, drawn, "" if calibration is None else str(calibration))
     question = {"study": study.model_dump(), "robots": [robot.model_dump() for robot in robots]}
@@ -216,6 +218,25 @@ def _check_different(robots: Sequence[Robot], entries: Sequence[tuple[str, dict[
                 for source, varied in (entries[first], entries[number])
             )
             raise InputError(f"{name}: robots {one} and {other} are the same; allowed: each once")
+
+
+def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
+    """Refuse asperities on which robots that are let go would be pressed by more than their weight.
+
+    Raises:
+        InputError: for such a study.
+    """
+    if not study.settled or study.contact.roughness is None:
+        return
+    from spirillum.dynamics.tube_start import check_roughness  # loads compiled loops
+
+    for robot in robots:
+        if robot.channel is not None:
+            gap = gap_of(study.placement, robot.body.diameter, 0.5 * robot.channel.diameter)
+            try:
+                check_roughness(study.contact.roughness, gap)
+            except InputError as error:
+                raise InputError(f"{name}: contact.{error}") from error
 
 
 def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]]) -> tuple[Robot, ...]:

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING
 from spirillum.crews import Crew, shared_out
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.tube.tabled import TabledTube
 from spirillum.robot.batch import RobotBatch
+from spirillum.robot.limits import broken
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.studies.band import BandTask, band_tasks, left_out
 from spirillum.studies.cautions import cautions, summed
@@ -27,6 +30,7 @@ from spirillum.swimming.band import left_open
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.comparison import uneven_models
 from spirillum.swimming.model_choice import has_table
+from spirillum.swimming.steady import requirements
 from spirillum.version import own_version
 
 if TYPE_CHECKING:
@@ -88,6 +92,7 @@ def computed_study(
     laid_down = [(task, parts_of[task.number]) for task in runs]
     settled = [(task, parts_of[task.number]) for task in let_go]
     warnings = warnings_of(loaded)
+    warnings += [settled_basis(loaded.study.contact)] if let_go else []
     warnings += summed((caution for pair in answers for caution in cautions(*pair)), loaded.count)
     warnings += left_out(band)
     if followed:
@@ -126,7 +131,6 @@ def warnings_of(loaded: LoadedStudy) -> list[str]:
         )
     asked = [find_swimmer_model(name) for name in loaded.study.models]
     warnings += _of_places(loaded, asked)
-    warnings += [settled_basis(loaded.study.contact)] if loaded.study.settled else []
     warnings += loaded.fitted.idle_warnings(loaded.robots, asked)
     warnings += loaded.fitted.origin_warnings(loaded.robots, asked)
     warnings += loaded.fitted.reading_warnings(loaded.study.friction)
@@ -178,13 +182,25 @@ def _with_table(loaded: LoadedStudy) -> dict[int, Robot]:
 
 def _without_table(loaded: LoadedStudy, with_table: Mapping[int, Robot]) -> list[str]:
     """A sentence on the robots that are not followed in their tubes for want of a table; none where all are."""
-    missing = [loaded.robot_at(index) for index in range(loaded.count) if index not in with_table]
-    if not missing:
-        return []
+    tails = loaded.count // len(loaded.robots)
+    found: dict[str, list[Robot]] = {}
+    for index in range(loaded.count):
+        if index not in with_table:
+            robot = loaded.robot_at(index)
+            why = _why_without_table(robot, loaded.placement_of(index // tails))
+            found.setdefault(why, []).append(robot)
     return [
-        f"{len(missing)} of {loaded.count} robots have no table of their tube and were not let go in it, the first: "
-        f"{missing[0].with_tail}; `spirillum prepare` makes one"
+        f"{len(robots)} of {loaded.count} robots {why.format(robots[0].with_tail)}" for why, robots in found.items()
     ]
+
+
+def _why_without_table(robot: Robot, placement: Placement) -> str:
+    """What robots have not that are not let go; a place for the name of the first."""
+    if robot.channel is None:
+        return "have no channel in which they could be let go, the first: {}"
+    if broken(requirements(RobotBatch.of(robot, placement), TabledTube({}))):
+        return "cannot lie where they would be laid down and were not let go, the first: {}"
+    return "have no table of their tube and were not let go in it, the first: {}; `spirillum prepare` makes one"
 
 
 _NAMED = 3

@@ -88,7 +88,7 @@ def show_lying(lying: Answer, console: Console) -> None:
 
 
 _TIMES = {
-    "followed_time": "found after a simulated time of",
+    "followed_time": "simulated for",
     "approach_time": "approached with a time constant of",
 }
 _STATES = {

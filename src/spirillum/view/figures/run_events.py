@@ -21,7 +21,7 @@ _MOST_EVENTS = 12
 """Events that are named."""
 _CROWDED = 0.05
 """Distance of events over that of the axis below which they share a label."""
-_LETTER = 0.1
+_LETTER = 0.07
 """Share of a time axis above which the panel's letter stands."""
 
 
@@ -63,7 +63,7 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
             xycoords=axes.get_xaxis_transform(),
             xytext=(0, 2),
             textcoords="offset points",
-            ha="center" if middle > beside_letter else "left",
+            ha="center" if middle > beside_letter + 0.02 * span else "left",
             size=7,
             color="#555555",
         )

@@ -38,8 +38,6 @@ _LETTERS_BESIDE = 40
 """Letters of a legend, with seven for each line's sample, above which its entries stand in two columns."""
 _MANY_TURNS = 30.0
 """Turns of the tail above which their oscillations fill a panel, and means over a turn are drawn too."""
-_SWITCHED = 0.99
-"""Share of the run with the drive on below which its speed is the one while on."""
 _DECADES = 5
 """Range of a logarithmic axis."""
 _DECADES_BARE = 30.0
@@ -215,7 +213,8 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
     name = plain(str(dataset.attrs.get("robot", "a robot")), 50)
     if not in_tube or path is None:
         return f"{name}: a run in time"
-    swims = _speed_in_words(dataset)
+    time = dataset["time"].values
+    swims = f"swims {1e3 * (path[-1, 0] - path[0, 0]):.3g} mm in {float(time[-1] - time[0]):.4g} s"
     azimuth = np.degrees(np.asarray(dataset["azimuth"].values, dtype=float))
     around, swing = float(azimuth[-1] - azimuth[0]), float(np.ptp(azimuth))
     if swing < _STILL:
@@ -227,16 +226,6 @@ def _headline(dataset: xr.Dataset, path: Samples | None, *, in_tube: bool) -> st
         "" if turned == 0 else " with its body's rotation" if turned * around > 0 else " against its body's rotation"
     )
     return f"{name} {swims} and goes {abs(around):.2g}° around the tube{sense}"
-
-
-def _speed_in_words(dataset: xr.Dataset) -> str:
-    """How fast it swims; while its drive is on, where that is switched off for a part of the run."""
-    time = dataset["time"].values
-    span = float(time[-1] - time[0])
-    switched = "time_on" in dataset and float(dataset["time_on"]) < _SWITCHED * span
-    name, when = ("mean_forward_velocity_on", "while on") if switched else ("mean_forward_velocity", "on average")
-    speed = float(dataset[name]) if name in dataset else np.nan
-    return f"swims at {1e3 * speed:.3g} mm/s {when}" if np.isfinite(speed) else "moves"
 
 
 def _facts(dataset: xr.Dataset, *, in_tube: bool) -> list[str]:
