@@ -20,7 +20,7 @@ from spirillum.files import checked_path, opened
 from spirillum.files.limits import MOST_IMAGES, MOST_PIXELS, SMALLEST_SIDE
 from spirillum.vision.flag import Flag
 from spirillum.vision.video.pictures import read_image, reduced
-from spirillum.vision.video.provenance import one_line, words_of_images
+from spirillum.vision.video.provenance import one_line, stated_size, words_of_images
 from spirillum.vision.video.read_ahead import ahead
 
 __all__ = ["FILMS", "PICTURES", "Frame", "Video", "converter", "open_video"]
@@ -335,7 +335,8 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
         raise InputError(f"{path}: {names[0].name} cannot be read as an image; allowed: {_WHAT}")
     width, height = Counter(size for _, size in first).most_common(1)[0][0]
     _check_size(path, (width, height))
-    for name, size in first:
+    stated = ((name, stated_size(name)) for name in names)
+    for name, size in (*first, *((name, size) for name, size in stated if size is not None)):
         _check_same_size(name, size, (width, height))
     counted = tuple(int(number - numbers[0]) for number in numbers)
     duration = (counted[-1] + 1) / frames_per_second

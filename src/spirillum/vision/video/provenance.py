@@ -10,7 +10,7 @@ from spirillum.errors import InputError
 from spirillum.files import opened, read_bytes
 from spirillum.files.limits import LARGEST_PICTURE
 
-__all__ = ["one_line", "words_of_images"]
+__all__ = ["one_line", "stated_size", "words_of_images"]
 
 _MOST_WORDS = 2000
 
@@ -36,6 +36,19 @@ def words_of_images(folder: Path, image: Path) -> str:
             with suppress(InputError), opened(place / name, "a text", sys.maxsize) as file:
                 found.append(file.read(_MOST_WORDS).decode("utf-8", "replace"))
     return one_line(" ".join(found))
+
+
+def stated_size(image: Path) -> tuple[int, int] | None:
+    """Width and height that a PNG file states at its start, pixels; None for any other file.
+
+    Args:
+        image: the file.
+    """
+    with suppress(InputError), opened(image, "an image", LARGEST_PICTURE) as file:
+        start = file.read(24)
+        if start[:8] == b"\x89PNG\r\n\x1a\n" and start[12:16] == b"IHDR" and len(start) == 24:
+            return int.from_bytes(start[16:20], "big"), int.from_bytes(start[20:24], "big")
+    return None
 
 
 def one_line(text: str) -> str:
