@@ -40,7 +40,7 @@ COMMANDS: dict[str, list[str]] = {
     "recording": ["export", "run.nc", "out.mcap"],
     "sweep": ["magnetic-sweep", "magnetic-helix", "-o", "out.nc", "--rate", "1Hz", "--turns", "4", "--plot", "out.png"],
     "track": ["track", "b.mp4", "--setup", "b.setup.toml", "--pace", "fast", "--learn", "1s"],
-    "propose": ["setup", "propose", "a.mp4", "--spacing", "2mm", "-o", "out.toml"],
+    "propose": ["setup", "propose", "b.mp4", "--spacing", "2mm", "-o", "out.toml"],
     "setup": ["setup", "new", "out.toml"],
     "page": ["page", "--no-browser"],
     "virtual": ["virtual-experiment", "s.toml", "-o", "out", "--trials", "2", *_SIZE],
