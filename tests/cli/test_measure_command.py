@@ -93,6 +93,7 @@ def test_feasibility_says_yes_and_no(run: Run, setup_file: str) -> None:
         (["a.mp4", "--setup", "SETUP", "--marks", "none.csv"], "none.csv does not exist"),
         (["nowhere.mp4", "--setup", "SETUP"], "nowhere.mp4 does not exist"),
         (["a.mp4", "b.mp4", "--feasibility", "--setup", "SETUP"], "--feasibility with 2 videos"),
+        (["--feasibility", "--setup", "SETUP", "--start", "1s"], "--start = 1s with --feasibility"),
     ],
 )
 def test_bad_usage_is_one_sentence_and_leaves_nothing(

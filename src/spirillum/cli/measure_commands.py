@@ -55,7 +55,7 @@ def measure(
     feasibility: Annotated[
         bool,
         typer.Option(
-            "--feasibility", help="Does this camera resolve the expected rates?", rich_help_panel=_FEASIBILITY
+            "--feasibility", help="Does the camera of --setup resolve the expected rates?", rich_help_panel=_FEASIBILITY
         ),
     ] = False,
     expect_tail_rate: Annotated[str | None, _Rate] = None,
@@ -95,6 +95,9 @@ def measure(
 
         if videos and len(videos) > 1:
             raise InputError(f"--feasibility with {len(videos)} videos; allowed: none, or one that shows the ruler")
+        for name, value in (("start", start), ("end", end)):
+            if value is not None:
+                raise InputError(f"--{name} = {value[:40]} with --feasibility; allowed: to measure a part of a video")
         found = verdict(
             setup,
             tail_rate=expect_tail_rate,

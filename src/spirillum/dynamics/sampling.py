@@ -31,11 +31,9 @@ def stated_duration(turns: float, duration: str | float | None) -> float | None:
     Raises:
         InputError: for a length that is none.
     """
-    if duration is not None:
-        return parse_option("duration", duration, KINDS["time"])
     if not _SHORTEST <= turns <= 1e5:
         raise InputError(f"turns = {turns}; allowed: {_SHORTEST:g} to 1e5")
-    return None
+    return None if duration is None else parse_option("duration", duration, KINDS["time"])
 
 
 def duration_of(turns: float, turn: float, duration: str | float | None) -> float:
