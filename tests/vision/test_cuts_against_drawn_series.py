@@ -6,7 +6,7 @@ A robot whose tail turns while it stays where it is has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.cuts import cuts_in, jumps_of_time, stands_still
+from spirillum.vision.track.cuts import cuts_in, jumps_of_time, one_picture, stands_still
 from spirillum.vision.track.motion import Motion
 
 PIXEL = 2.5e-4
@@ -102,7 +102,7 @@ def test_slow_and_resting_robots_are_not_said_to_stand():
         Motion(true, slow, body, tail),
         Motion(true, x, body, tail),
         Motion(true, rest, 0.01 * body, 0.01 * tail),
-        Motion(true, rest, 1e-9 * body, np.full(x.size, np.nan)),
+        Motion(true, rest, np.zeros(x.size), np.full(x.size, np.nan)),
         Motion(true, np.full(x.size, np.nan), body, tail),
     ):
         assert stands_still(motion, PIXEL) == ()
@@ -112,8 +112,9 @@ def test_one_picture_again_and_again_gives_nothing():
     """Without the noise of any camera; of few frames nothing is said, for their rates have wide intervals."""
     true, x, body, tail = (values[:40] for values in series())
     same = [np.full(40, values[0]) for values in (x, body, tail)]
-    (flag,) = stands_still(Motion(true, *same), PIXEL)
+    (flag,) = one_picture(Motion(true, *same))
     assert flag.name == "one-picture"
     assert set(flag.spoils) >= {"forward_velocity", "body_rotation_rate", "tail_rotation_rate"}
-    assert stands_still(Motion(true, *same[:2], np.full(40, np.nan)), PIXEL)[0].name == "one-picture"
-    assert stands_still(Motion(*(values[:20] for values in (true, *same))), PIXEL) == ()
+    assert one_picture(Motion(true, *same[:2], np.full(40, np.nan)))[0].name == "one-picture"
+    assert one_picture(Motion(*(values[:20] for values in (true, *same)))) == ()
+    assert one_picture(Motion(true, *same[:2], tail)) == ()

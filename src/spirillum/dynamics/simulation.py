@@ -18,7 +18,7 @@ from spirillum.dynamics.start import reach_of, turning_rate
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube, check_not_resolved, with_contact
 from spirillum.dynamics.tube_simulation import check_in_tube, run_in_tube
-from spirillum.dynamics.turning_field import Field, in_tilted_field
+from spirillum.dynamics.turning_field import Field, TurningField, in_tilted_field
 from spirillum.dynamics.two_links import TwoLinks
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
@@ -177,7 +177,7 @@ def _along_tilted_axis(dataset: xr.Dataset, about: Field) -> list[str]:
         return []
     late = dataset.isel(time=slice(dataset.sizes["time"] // 3, None))
     way = late["position"].values[-1] - late["position"].values[0]
-    axis = np.array([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    axis = TurningField(rotation_rate=0.0, strength=0.0, yaw=yaw, pitch=pitch).axis
     speed = 1e3 * float(way @ axis) / float(late["time"][-1] - late["time"][0])
     return [
         f"the axis of the field is tilted (yaw {np.degrees(yaw):.3g} deg, pitch {np.degrees(pitch):.3g} deg), and "

@@ -13,7 +13,7 @@ from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
-from spirillum.vision.track.cuts import cuts_in, jumps_of_time, stands_still
+from spirillum.vision.track.cuts import cuts_in, jumps_of_time, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import Learnt
@@ -91,7 +91,12 @@ def track_of(
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
-    cuts = (*cuts_in(motion, pixel), *jumps_of_time(motion, pixel, known.stripes.period), *stands_still(motion, pixel))
+    cuts = (
+        *cuts_in(motion, pixel),
+        *jumps_of_time(motion, pixel, known.stripes.period),
+        *one_picture(motion),
+        *stands_still(motion, pixel),
+    )
     return Track(
         time=time,
         frame=frame,

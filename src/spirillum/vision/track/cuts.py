@@ -21,7 +21,7 @@ from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.warnings import EVERYTHING
 
-__all__ = ["cuts_in", "jumps_of_time", "stands_still"]
+__all__ = ["cuts_in", "jumps_of_time", "one_picture", "stands_still"]
 
 
 def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
@@ -79,8 +79,26 @@ def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tup
     return (Flag("times-do-not-fit", sentence, EVERYTHING),)
 
 
+def one_picture(motion: Motion) -> tuple[Flag, ...]:
+    """Flag frames that are the same to the last digit: a camera that is stuck, or copies of one picture.
+
+    Args:
+        motion: the robot's motion.
+    """
+    _, *series = motion
+    seen = [values[np.isfinite(values)] for values in series]
+    frames = seen[0].size
+    if frames < CUTS.long_window or any(values.size and np.ptp(values) > 0.0 for values in seen):
+        return ()
+    sentence = (
+        f"{frames} frames show the robot at the same place and angles to the last digit, without the noise of any "
+        "camera: they are one picture; nothing is given"
+    )
+    return (Flag("one-picture", sentence, EVERYTHING),)
+
+
 def stands_still(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
-    """Flag a robot that turns, but does not advance by half a pixel, and one picture in place of a video.
+    """Flag a robot that turns, but does not advance by half a pixel.
 
     A video codec repeats parts of a picture that have changed by less than its quantisation, so that strong compression
     leaves out slow motion; a cable or a reflection that stands still may be taken for an edge of the body.
@@ -91,13 +109,6 @@ def stands_still(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
     """
     time, x, body_angle, tail_phase = motion
     known = np.isfinite(x)
-    series = (values[np.isfinite(values)] for values in (x, body_angle, tail_phase))
-    if known.sum() >= CUTS.long_window and all(values.size == 0 or np.ptp(values) == 0.0 for values in series):
-        sentence = (
-            f"{known.sum()} frames show the robot at the same place and angles to the last digit, without the noise of "
-            "any camera: they are one picture; nothing is given"
-        )
-        return (Flag("one-picture", sentence, EVERYTHING),)
     turns, turned = (_turned(angle) for angle in (tail_phase, body_angle))
     if known.sum() < CUTS.long_window or max(turns / CUTS.tail_turns, turned / CUTS.body_turns) < 1.0:
         return ()
