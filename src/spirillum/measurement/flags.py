@@ -47,7 +47,7 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, stretch: Stre
         robot: the robot, for its stripes.
         stretch: how nose and rear drift apart.
     """
-    both = (*track.flags, *stretch.flags(track.scale.length_per_pixel), *_own_flags(fits, track, robot))
+    both = (*track.flags, *stretch.flags(), *_own_flags(fits, track, robot))
     flags: list[Flag] = []
     for flag in both:
         same = [other for other in flags if other.name == flag.name]

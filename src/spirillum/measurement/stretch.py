@@ -31,38 +31,30 @@ class Stretch(NamedTuple):
     """Positive where they drift apart, m; 0 where it is not known."""
     half_width: float
     """Of its 95 % interval, m."""
+    pixel: float
+    """Length per pixel, m; NaN without a scale, and so without a known change."""
 
-    def error(self, pixel: float) -> float:
+    def error(self) -> float:
         """Standard error of the robot's way by it, m.
 
         Half of the change, so that a 95 % interval holds what the nose alone says, and what the rear alone says. The
         variance of the change itself is taken off: what is noise widens nothing. All of a clear change: a body that
         goes around the tube while it tilts hides up to a half of it, and the place that is fitted follows the rear.
-
-        Args:
-            pixel: m per pixel; NaN without a scale, and so without a known change.
         """
-        share = 1.0 if self.clear(pixel) else 0.5
+        share = 1.0 if self.clear else 0.5
         return share * math.sqrt(max(self.change**2 - (self.half_width / NORMAL) ** 2, 0.0))
 
-    def clear(self, pixel: float) -> bool:
-        """Whether the change is more than noise and what clean films of bodies show that do not tilt.
+    @property
+    def clear(self) -> bool:
+        """Whether the change is more than noise and what clean films of bodies show that do not tilt."""
+        return abs(self.change) - self.half_width > _CLEAR * self.pixel
 
-        Args:
-            pixel: m per pixel; NaN without a scale, and so without a known change.
-        """
-        return abs(self.change) - self.half_width > _CLEAR * pixel
-
-    def flags(self, pixel: float) -> tuple[Flag, ...]:
-        """A flag where the change is clear.
-
-        Args:
-            pixel: m per pixel; NaN without a scale, and so without a known change.
-        """
-        if not self.clear(pixel):
+    def flags(self) -> tuple[Flag, ...]:
+        """A flag where the change is clear."""
+        if not self.clear:
             return ()
         how = "drift apart" if self.change > 0.0 else "draw together"
-        size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / pixel:.2g} pixels)"
+        size = f"{1e3 * abs(self.change):.2g} mm ({abs(self.change) / self.pixel:.2g} pixels)"
         sentence = (
             f"nose and rear of the body {how} by {size} during the video, as where the nose rises or sinks: the speed "
             "of the body's middle may be off by up to twice that over the video, and its interval is as wide; film a "
@@ -77,9 +69,10 @@ def stretch_of(track: Track) -> Stretch:
     Args:
         track: the track.
     """
-    if track.stretch.size != track.time.size or not math.isfinite(track.scale.length_per_pixel):
-        return Stretch(0.0, 0.0)
+    pixel = track.scale.length_per_pixel
+    if track.stretch.size != track.time.size or not math.isfinite(pixel):
+        return Stretch(0.0, 0.0, pixel)
     rate, length = rate_of(track.time, track.stretch), float(np.ptp(track.time))
     if not math.isfinite(rate.low):
-        return Stretch(0.0, 0.0)
-    return Stretch(rate.value * length, 0.5 * (rate.high - rate.low) * length)
+        return Stretch(0.0, 0.0, pixel)
+    return Stretch(rate.value * length, 0.5 * (rate.high - rate.low) * length, pixel)

@@ -164,8 +164,7 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     stretch = stretch_of(track)
     flags = flags_of(fits, track, robot, stretch)
     velocity, *rates = RATE_NAMES
-    tilted = stretch.error(track.scale.length_per_pixel)
-    quantities = {velocity: _velocity(fits[velocity], track, _drift(track, tilted))}
+    quantities = {velocity: _velocity(fits[velocity], track, _drift(track, stretch.error()))}
     quantities |= {
         name: _with_errors(
             fits[name],
