@@ -217,17 +217,17 @@ def test_speeds_of_nose_and_rear_that_drift_apart_lie_both_in_the_interval(
     track = make_track(span=4.0)
     noise = 5e-6 * np.random.default_rng(1).normal(size=track.time.size)
     plain = trial_of(track, robot).quantities["forward_velocity"]
-    still = trial_of(replace(track, stretch=noise), robot)
+    still = trial_of(replace(track, elongation=noise), robot)
     assert "ends-drift-apart" not in {flag.name for flag in still.flags}
     now = still.quantities["forward_velocity"]
     assert now.high - now.low < 1.2 * (plain.high - plain.low)
     drift = 0.2e-3 / float(np.ptp(track.time))
-    apart = trial_of(replace(track, stretch=drift * track.time + noise), robot)
+    apart = trial_of(replace(track, elongation=drift * track.time + noise), robot)
     assert any(flag.name == "ends-drift-apart" and "drift apart by 0.2 mm" in flag.sentence for flag in apart.flags)
     wide = apart.quantities["forward_velocity"]
     assert wide.value == pytest.approx(plain.value)
     assert wide.low < wide.value - 0.95 * drift < wide.value + 0.95 * drift < wide.high
-    without_scale = replace(track, scale=replace(track.scale, length_per_pixel=np.nan), stretch=drift * track.time)
+    without_scale = replace(track, scale=replace(track.scale, length_per_pixel=np.nan), elongation=drift * track.time)
     assert "ends-drift-apart" not in {flag.name for flag in trial_of(without_scale, robot).flags}
 
 

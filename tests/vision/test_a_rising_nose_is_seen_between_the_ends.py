@@ -20,7 +20,7 @@ pytest.importorskip("cv2")
 FRAMES, SIZE, HEIGHT, WAY = 10, (320, 240), 0.0125, 2e-3
 
 
-def stretch_of_a_film(rise: float) -> np.ndarray:
+def elongation_of_a_film(rise: float) -> np.ndarray:
     """By how much nose and rear are seen to drift apart in a drawn film whose nose rises evenly, m, (n,)."""
     robot = load("biorob2012-wide")
     time, share = np.arange(FRAMES) / 10.0, np.linspace(-0.5, 0.5, FRAMES)
@@ -36,12 +36,12 @@ def stretch_of_a_film(rise: float) -> np.ndarray:
     body = BodyFinder(robot, optics, (0, 0, *SIZE))
     poses = [BodyPose(float(x), 0.0, 0.0) for x in position[:, 0]]
     body.learn(pictures, poses, time)
-    return np.array([body.place(picture, pose).stretch for picture, pose in zip(pictures, poses, strict=True)])
+    return np.array([body.place(picture, pose).elongation for picture, pose in zip(pictures, poses, strict=True)])
 
 
 @pytest.mark.parametrize("degrees", [0.0, 1.2, -1.2])
 def test_ends_drift_apart_by_the_radius_times_the_rise(degrees: float) -> None:
-    stretch = stretch_of_a_film(np.deg2rad(degrees))
+    elongation = elongation_of_a_film(np.deg2rad(degrees))
     radius, pixel = 9e-3, 0.5e-3
-    change = np.polyfit(np.linspace(0.0, 1.0, FRAMES), stretch, 1)[0]
+    change = np.polyfit(np.linspace(0.0, 1.0, FRAMES), elongation, 1)[0]
     assert change == pytest.approx(radius * np.deg2rad(degrees), abs=0.15 * pixel)

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.measurement.elongation import Elongation
 from spirillum.measurement.rates import Rate
-from spirillum.measurement.stretch import Stretch
 from spirillum.robot.robot import Robot
 from spirillum.units import Hz
 from spirillum.vision.flag import Flag
@@ -38,16 +38,16 @@ _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
 
-def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, stretch: Stretch) -> tuple[Flag, ...]:
+def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: Elongation) -> tuple[Flag, ...]:
     """All flags of a trial, without duplicates and without those that another flag implies.
 
     Args:
         fits: the fitted lines, by the names of `SEEN` at least.
         track: the track, with the flags of the tracker.
         robot: the robot, for its stripes.
-        stretch: how nose and rear drift apart.
+        elongation: how nose and rear drift apart.
     """
-    both = (*track.flags, *stretch.flags(), *_own_flags(fits, track, robot))
+    both = (*track.flags, *elongation.flags(), *_own_flags(fits, track, robot))
     flags: list[Flag] = []
     for flag in both:
         same = [other for other in flags if other.name == flag.name]

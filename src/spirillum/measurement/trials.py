@@ -11,12 +11,12 @@ import numpy as np
 
 from spirillum.answer import quantity
 from spirillum.arrays import Samples
+from spirillum.measurement.elongation import elongation_of
 from spirillum.measurement.flags import BY_HAND, IMPORTED, SEEN, SYNTHETIC, flags_of
 from spirillum.measurement.lead import without_lead
 from spirillum.measurement.outliers import outlying_frames
 from spirillum.measurement.rates import PeriodicError, Rate, mean_of, rate_of
 from spirillum.measurement.statistics import NORMAL
-from spirillum.measurement.stretch import stretch_of
 from spirillum.measurement.systematic import (
     AMPLITUDE_ERROR,
     DRIFT_ANGLE,
@@ -161,10 +161,10 @@ def trial_of(track: Track, robot: Robot, name: str = "", read: np.ndarray | None
     if by_hand:
         read = np.ones(track.time.size, dtype=bool)
     fits = _fits(track, robot, read)
-    stretch = stretch_of(track)
-    flags = flags_of(fits, track, robot, stretch)
+    elongation = elongation_of(track)
+    flags = flags_of(fits, track, robot, elongation)
     velocity, *rates = RATE_NAMES
-    quantities = {velocity: _velocity(fits[velocity], track, _drift(track, stretch.error()))}
+    quantities = {velocity: _velocity(fits[velocity], track, _drift(track, elongation.error()))}
     quantities |= {
         name: _with_errors(
             fits[name],

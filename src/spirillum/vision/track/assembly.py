@@ -66,7 +66,7 @@ def track_of(
     optics = body.optics  # fitted to the apparent size; lengths are converted to the stated scale below
     seen_flags = sight_flags(time, pose, errors, record.placed, optics, setup)
     cut = cut_off(record.placed)
-    stretch = np.where(seen & ~cut, [one.stretch for one in record.placed], np.nan)
+    elongation = np.where(seen & ~cut, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = Along(position, pose[:, 2], ())
@@ -115,7 +115,7 @@ def track_of(
         words=video.words,
         time_uncertainty=restored.relative_error,
         drift=math.hypot(swayed.drift, glare),
-        stretch=stretch * optics.focal / sight.optics.focal,
+        elongation=elongation * optics.focal / sight.optics.focal,
         body_angle_drift=STRIPES.under_glare if known.stripes.under_glare else 0.0,
         flags=(*swayed.flags, *early, *cuts, *roll_flags, *tail_flags, *odd),
     )

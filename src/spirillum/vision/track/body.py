@@ -29,7 +29,7 @@ class Placed(NamedTuple):
     """Inlier share of the edges in view, 0 to 1."""
     inside: float
     """Share of the edges that lie in the picture, 0 to 1."""
-    stretch: float = np.nan
+    elongation: float = np.nan
     """By how much nose and rear lie farther apart than the level body's edges do, m; NaN without edges at both."""
 
     @property
@@ -238,10 +238,10 @@ class BodyFinder:
         ):
             return Placed(found, lost.error, fitting, share)
         left = np.where(known, shifts, 0.0)
-        return Placed(found, errors, fitting, share, _stretch(left, slopes, used, self.contour.group))
+        return Placed(found, errors, fitting, share, _elongation(left, slopes, used, self.contour.group))
 
 
-def _stretch(left: Samples, slopes: Samples, used: Samples, group: np.ndarray) -> float:
+def _elongation(left: Samples, slopes: Samples, used: Samples, group: np.ndarray) -> float:
     """By how much the edges of the nose are ahead of those at rear and seal, by weighted least squares, m.
 
     Both move alike with the body's place. A fourth parameter beside the pose moves those of the nose alone.

@@ -60,5 +60,5 @@ class Track:
     """Standard uncertainty of the body's angle from end to end, by glare on its stripes, rad."""
     time_uncertainty: float = 0.0
     """Relative standard uncertainty of the film's length in time, where lost frames were put back in doubt."""
-    stretch: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
+    elongation: Samples = field(repr=False, default_factory=lambda: np.zeros(0))
     """By how much nose and rear lie farther apart than a level body's do, m, (n,); empty where no edges were fitted."""

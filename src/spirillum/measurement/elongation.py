@@ -1,4 +1,4 @@
-"""How far apart nose and rear are seen: a change tells a body that tilts out of the plane of the picture.
+"""Apparent elongation of the body: nose and rear seen to drift apart tell a tilt out of the plane of the picture.
 
 From above, a nose that rises by an angle moves what is seen of the body's upper side back by the body's radius times
 that angle, and a round nose not at all. The place that is fitted to all edges lies in between, so that a tilt that
@@ -17,14 +17,14 @@ from spirillum.measurement.statistics import NORMAL
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.track import Track
 
-__all__ = ["Stretch", "stretch_of"]
+__all__ = ["Elongation", "elongation_of"]
 
 _CLEAR = 0.2
 """Change beyond the ends of its interval from which on it is flagged, pixels. On clean films of bodies that do not tilt
 it is below 0.1."""
 
 
-class Stretch(NamedTuple):
+class Elongation(NamedTuple):
     """Change of the distance between nose and rear from the first frame to the last."""
 
     change: float
@@ -63,16 +63,16 @@ class Stretch(NamedTuple):
         return (Flag("ends-drift-apart", sentence),)
 
 
-def stretch_of(track: Track) -> Stretch:
+def elongation_of(track: Track) -> Elongation:
     """The change of a track; none where its edges were not fitted on enough frames, or there is no scale.
 
     Args:
         track: the track.
     """
     pixel = track.scale.length_per_pixel
-    if track.stretch.size != track.time.size or not math.isfinite(pixel):
-        return Stretch(0.0, 0.0, pixel)
-    rate, length = rate_of(track.time, track.stretch), float(np.ptp(track.time))
+    if track.elongation.size != track.time.size or not math.isfinite(pixel):
+        return Elongation(0.0, 0.0, pixel)
+    rate, length = rate_of(track.time, track.elongation), float(np.ptp(track.time))
     if not math.isfinite(rate.low):
-        return Stretch(0.0, 0.0, pixel)
-    return Stretch(rate.value * length, 0.5 * (rate.high - rate.low) * length, pixel)
+        return Elongation(0.0, 0.0, pixel)
+    return Elongation(rate.value * length, 0.5 * (rate.high - rate.low) * length, pixel)
