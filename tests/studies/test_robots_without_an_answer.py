@@ -37,6 +37,18 @@ def test_drive_without_a_steady_motion_is_told_by_its_readings() -> None:
     )
 
 
+def test_a_tail_that_does_not_fit_takes_no_walls_from_the_others() -> None:
+    robots = {"robots": ["biorob2012-wide"], "friction": ["none"]}
+    both = sp.study(robots | {"vary": {"tail.amplitude": ["2.5 mm", "12 mm"]}})
+    alone = sp.study(robots)
+    assert both["model"].values.tolist() == alone["model"].values.tolist() == ["tube"]
+    assert np.isfinite(both["forward_velocity"].values).ravel().tolist() == [True, False]
+    found, wanted = both["forward_velocity"].values.ravel()[0], alone["forward_velocity"].values.item()
+    assert found == pytest.approx(wanted, rel=1e-12)
+    (nobody,) = sp.study(robots | {"vary": {"tail.amplitude": ["12 mm"]}})["model"].values.tolist()
+    assert nobody == "slender"
+
+
 @pytest.mark.parametrize(("amplitudes", "code"), [('["2.5 mm", "25 mm"]', 0), ('["25 mm"]', 2)])
 def test_study_without_any_answer_ends_as_bad_input_does(
     amplitudes: str, code: int, tmp_path, capsys, monkeypatch: pytest.MonkeyPatch

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -29,7 +29,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO, WALLED, choose_model
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
 
 __all__ = ["LARGEST_STUDY", "LoadedStudy", "load_study"]
 
@@ -321,8 +321,8 @@ def _with_models(
     if AUTO not in study.models:
         return study, ()
     loaded = LoadedStudy(study, tuple(robots), {})
-    for index in range(loaded.count):  # until the first robot without a table: one model answers for all
-        choice = choose_model(
+    choices = (
+        choose_model(
             AUTO,
             loaded.robot_at(index),
             placement=study.placement,
@@ -332,11 +332,27 @@ def _with_models(
             other_way=f"--model {WALLED} answers without one at one place, in some ten seconds of one core a robot",
             among=True,
         )
-        if choice.fitted or choice.model != WALLED:
-            break
+        for index in range(loaded.count)
+    )
+    choice = _for_all(choices)
     models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
     cautions = (choice.caution,) if choice.caution else ()
     return study.model_copy(update={"models": tuple(models)}), cautions
+
+
+def _for_all(choices: Iterable[ModelChoice]) -> ModelChoice:
+    """The model of all robots: with walls if each has a table, but for those that break its requirements."""
+    one = outside = None
+    for choice in choices:
+        if choice.outside:
+            outside = outside or choice
+            continue
+        one = choice
+        if choice.fitted or choice.model != WALLED:
+            break
+    found = one or outside
+    assert found is not None  # noqa: S101 - a study has a robot
+    return found
 
 
 def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:

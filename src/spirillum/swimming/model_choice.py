@@ -51,6 +51,8 @@ class ModelChoice:
     """What to be careful about: a sentence where the robot has a channel that the model does not know, else empty."""
     fitted: bool = False
     """Whether it is the model of a calibration or a posterior."""
+    outside: bool = False
+    """Whether the robot breaks a requirement of the model with walls, which would answer for it otherwise."""
 
 
 def posterior_alone(
@@ -107,29 +109,19 @@ def choose_model(
         return fitted
     if robot.channel is None:
         return ModelChoice(UNBOUNDED, "the robot has no channel")
-    why = _why_without_walls(
-        robot, placement or Placement(), tables_only=tables_only, motion=motion, other_way=other_way, among=among
-    )
-    if not why:
+    batch = RobotBatch.of(robot, placement or Placement())
+    outside = broken(requirements(batch, find_swimmer_model(WALLED)))
+    if outside and (placement is None or not placement.is_given):
+        why = f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
+    elif not outside and (tables_only or motion == "free") and not has_table(batch):
+        lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
+        lacks = lacks if among else "the robot has no table for its tube"
+        why = f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
+    else:  # a place that was asked for is refused by the model that knows places
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
     makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
     caution = f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
-    return ModelChoice(UNBOUNDED, why.partition(":")[0], caution)
-
-
-def _why_without_walls(
-    robot: Robot, placement: Placement, *, tables_only: bool, motion: str, other_way: str, among: bool
-) -> str:
-    """Why a robot in a channel is answered for without its walls; empty where it is not."""
-    batch = RobotBatch.of(robot, placement)
-    outside = broken(requirements(batch, find_swimmer_model(WALLED)))
-    if outside:  # a place that was asked for is refused by the model that knows places
-        return "" if placement.is_given else f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
-    if (tables_only or motion == "free") and not has_table(batch):
-        lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
-        lacks = lacks if among else "the robot has no table for its tube"
-        return f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
-    return ""
+    return ModelChoice(UNBOUNDED, why.partition(":")[0], caution, outside=bool(outside))
 
 
 def has_table(batch: RobotBatch) -> bool:
