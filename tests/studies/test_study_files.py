@@ -34,6 +34,11 @@ GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\
             'robots = ["biorob2012-wide"]\nvary = {"tail.length" = ["40 mm", "4 cm"]}\n',
             "tail.length = 40 mm and biorob2012-wide, tail.length = 4 cm are the same",
         ),
+        (
+            'robots = ["biorob2012-wide"]\nvary = {"tail.length" = ["40 mm", "4 s"]}\n',
+            'study.toml, with vary: preset biorob2012-wide: tail.length = "4 s": "s" is not a unit of length',
+        ),
+        ("settled = 1 \npredicted = 2\n" + GRID, "(and 1 more: settled)"),
         ("settled = 1\n" + GRID, "settled = 1 is not allowed; allowed: true or false"),
         ("a = [[[[", "is not TOML"),
         ("a = " + "[" * 5000 + "]" * 5000, "nested too deeply"),

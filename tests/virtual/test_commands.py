@@ -48,6 +48,18 @@ def test_a_virtual_experiment_is_answered(run: Run, tmp_path: Path) -> None:
     assert "2 of them there before" in out
 
 
+def test_a_film_is_of_a_robot_that_is_named_or_of_a_run(run: Run, tmp_path: Path) -> None:
+    code, out, err = run("render", "-o", str(tmp_path / "a.mp4"), "--set", "tail.length=40mm")
+    assert (code, out, err) == (
+        2,
+        "",
+        "spirillum: set = tail.length=40mm without a robot; allowed: with a preset's name or a robot file\n",
+    )
+    code, out, err = run("render", "-o", str(tmp_path / "a.mp4"))
+    assert (code, out) == (2, "")
+    assert err.startswith("spirillum: no robot; allowed: a preset's name or a robot file, or a run")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

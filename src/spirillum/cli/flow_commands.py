@@ -112,7 +112,6 @@ def flow(
     from spirillum.fields.answer import flow_answer
     from spirillum.fields.flow import box_around, plane_around, seat_in_tube
     from spirillum.fields.flow import flow as answer
-    from spirillum.fluid.tube.announced import OF_A_RUN
     from spirillum.results.flow import check_targets, write_flow
 
     check_targets(output, volume)
@@ -146,10 +145,11 @@ def flow(
         def around() -> Flow:
             from spirillum.dynamics.flow_of_run import flow_of_run
 
-            return flow_of_run(run, str(time), frame=frame, resolution=fineness)
+            return flow_of_run(run, str(time), frame=frame, resolution=fineness, progress=progress)
 
     with renderer.progress_bar(quiet=json) as progress:
-        progress("flow: forces on the robot" if run is None else OF_A_RUN, 0, 1)
+        if run is None:
+            progress("flow: forces on the robot", 0, 1)
         found = around()
         written = {}
         if output is not None:

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Friction, Json, Model, RobotArgument, Settings, TailRate, starting
+from spirillum.cli.options import Friction, Json, Model, Settings, TailRate, complete_robots, starting
+from spirillum.errors import InputError
 
 if TYPE_CHECKING:
     from spirillum.robot.arguments import Options
+    from spirillum.robot.robot import Robot
 
 __all__ = ["render", "virtual_experiment"]
 
@@ -113,7 +115,11 @@ _Trouble = Annotated[
 
 
 def render(
-    robot: RobotArgument,
+    robot: Annotated[
+        str | None,
+        typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file; else that of --run."),
+    ] = None,
+    *,
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
     ],
@@ -218,7 +224,7 @@ def render(
 
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
-            loaded_robot(robot, settings),
+            _robot(robot, settings),
             output,
             motion=_fields(MotionOptions, given),
             run=run,
@@ -231,6 +237,19 @@ def render(
             progress=progress,
         )
     renderer.show(found.to_dict(), json=json)
+
+
+def _robot(robot: str | None, settings: list[str] | None) -> Robot | None:
+    """The robot with its fields set; None, for that of a run, where none is named.
+
+    Raises:
+        InputError: if it or a field is wrong, or fields are set of none.
+    """
+    if robot is not None:
+        return loaded_robot(robot, settings)
+    if settings:
+        raise InputError(f"set = {settings[0]} without a robot; allowed: with a preset's name or a robot file")
+    return None
 
 
 def _fields(options: type[Options], given: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from spirillum.dynamics.run_file import open_run, robot_of
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
+from spirillum.fluid.tube.announced import OF_A_RUN
 from spirillum.fluid.tube.tube import Tube
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
@@ -26,7 +27,7 @@ from spirillum.swimming.steady import requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     import xarray as xr
 
@@ -49,6 +50,7 @@ def flow_of_run(
     *,
     frame: str = "lab",
     resolution: Resolution | Mapping[str, Any] | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> Flow:
     """The flow around a robot at a moment of a run by `simulate` with the model `tube`.
 
@@ -62,6 +64,7 @@ def flow_of_run(
         time: the moment, with its unit (``"0.5 s"``) or a float in s; of the run's samples the nearest is taken.
         frame: `lab` (that of the channel), or `body` (moving with the robot's velocity along the channel).
         resolution: `accuracy` and `tolerance` of the model; None: the robot's own, but a tolerance of 0.03.
+        progress: told that the flow is being solved for, once the run is known to be right.
 
     Raises:
         InputError: for another run, a moment outside it, or a place that cannot be resolved.
@@ -95,6 +98,8 @@ def flow_of_run(
             f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
         )
         now = now.assign_attrs(warnings="\n".join([said, str(now.attrs.get("warnings", ""))]))
+    if progress is not None:
+        progress(OF_A_RUN, 0, 1)
     prediction, phase, body, rotor = _motion(now, resolution)
     field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
     around = Flow(prediction, field, phase, cast("Frame", frame))

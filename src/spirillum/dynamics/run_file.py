@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 from spirillum.units import Kind
 
@@ -68,7 +68,7 @@ def robot_of_settings(table: Any, whose: str) -> Robot:
     robot = problems_in(Robot, _with_units(Robot, table))
     if isinstance(robot, Robot):
         return robot
-    raise InputError(f"{whose} settings: {robot[0]}", [f"{whose} settings: {problem}" for problem in robot])
+    raise refused_table(robot, f"{whose} settings")
 
 
 def _with_units(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.robot.fields import (
     AlsoReads,
@@ -25,7 +24,7 @@ from spirillum.robot.fields import (
 )
 from spirillum.robot.options import Calibration, known_model
 from spirillum.robot.placement import Placement
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
 __all__ = [
@@ -195,7 +194,7 @@ def read_calibration(path: str | Path) -> CalibrationFile:
     single = [name for name, entry in tables.items() if isinstance(entry, Mapping)] if isinstance(tables, dict) else []
     for name in single:  # the file says [calibration.sbt], not the first of a list
         checked = [problem.replace(f"calibration.{name}.0.", f"calibration.{name}.") for problem in checked]
-    raise InputError(f"{path}: {checked[0]}", [f"{path}: {problem}" for problem in checked])
+    raise refused_table(checked, str(path))
 
 
 def with_calibration(robot: Robot, path: str | Path) -> Robot:

@@ -24,7 +24,7 @@ __all__ = ["Check", "Feasibility", "feasibility"]
 
 _FRAMES_PER_SECOND = 30.0
 _WIDTH = 640
-_DURATION = 20.0
+_DURATION, _LONGEST = 20.0, 86400.0
 _POSITION_ERROR = 0.05
 """Standard error of the position on a frame, pixels."""
 _EDGE_ERROR = 0.25
@@ -177,8 +177,8 @@ def feasibility(
     if not 0.01 <= rate <= 1e5:
         raise InputError(f"fps = {rate:g}; allowed: 0.01 to 100000")
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
-    if span <= 0:
-        raise InputError(f"duration = {span:g} s; allowed: more than 0 s")
+    if not 0.0 < span <= _LONGEST:
+        raise InputError(f"duration = {span:g} s; allowed: more than 0 s, at most {_LONGEST:g} s (a day)")
     if not 32 <= picture_width <= 100_000:
         raise InputError(f"width = {picture_width}; allowed: 32 to 100000 pixels")
     pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, picture_width, video)

@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.robot.fields import Section, field_values
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 
 __all__ = ["Options", "in_range", "one_of", "refusal", "whole", "within"]
 
@@ -54,7 +54,7 @@ class Options(Section):
         given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
         checked = problems_in(cls, given, cls.argument if cls.prefixed else "")
         if isinstance(checked, list):
-            raise InputError(checked[0], checked)
+            raise refused_table(checked)
         return checked
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.robot.options import Resolution
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
 __all__ = [
@@ -337,5 +337,4 @@ def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> R
     if isinstance(problems, Robot):
         problems._warnings = (*warnings, *_floating(problems))  # noqa: SLF001 - it is the loader's to set
         return problems
-    more = f" (and {len(problems) - 1} more: `spirillum robot check` lists them)" if len(problems) > 1 else ""
-    raise InputError(f"{source}: {problems[0]}{more}", [f"{source}: {problem}" for problem in problems])
+    raise refused_table(problems, source)

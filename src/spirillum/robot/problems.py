@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
-__all__ = ["problems_in", "refused_value"]
+__all__ = ["problems_in", "refused_table", "refused_value"]
 
 _OTHERWISE = {
     "tail.turns": "tail.length over tail.wavelength is the number of turns",
@@ -21,6 +21,8 @@ _OTHERWISE = {
 """What gives a field that a robot file has not, though the field's words know it."""
 _LONGEST_FIELD = 200
 """Characters of a field's name in a sentence, so that what is allowed has room."""
+_MOST_NAMED = 6
+"""Fields with further problems that a sentence names."""
 _M = TypeVar("_M", bound=BaseModel)
 
 
@@ -43,6 +45,21 @@ def problems_in(model: type[_M], table: Mapping[str, Any], under: str = "") -> _
         return list(dict.fromkeys(sentences))
     except RecursionError:
         return ["its tables are nested too deeply; see `spirillum schema robot`"]
+
+
+def refused_table(problems: Sequence[str], source: str = "") -> InputError:
+    """All problems of a table as one error: the first as its sentence, the fields of the others by name.
+
+    Args:
+        problems: what is wrong, a sentence each that begins with its field.
+        source: file or table, which every sentence begins with; empty: none.
+    """
+    every = [f"{source}: {problem}" for problem in problems] if source else list(problems)
+    if len(problems) == 1:
+        return InputError(every[0])
+    fields = [re.split(r"[^\w.-]", problem, maxsplit=1)[0][:_LONGEST_FIELD] for problem in problems[1:]]
+    named = ", ".join(fields[:_MOST_NAMED]) + (", ..." if len(fields) > _MOST_NAMED else "")
+    return InputError(f"{every[0]} (and {len(fields)} more: {named})", every)
 
 
 def _sentences(model: type[BaseModel], problem: Mapping[str, Any], under: str) -> Iterable[str]:

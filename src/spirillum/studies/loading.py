@@ -24,7 +24,7 @@ from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
@@ -138,7 +138,7 @@ def load_study(
         store = f", or {LARGEST_STORED} in a store (--store study.zarr)" if largest < LARGEST_STORED else ""
         raise InputError(f"{name}: the study asks for {study.size} results; allowed: at most {largest}{store}")
     entries = list(_entries_of(study))
-    robots = tuple(_robot(entry, folder, {**(overrides or {}), **varied}) for entry, varied in entries)
+    robots = tuple(_robot(entry, folder, overrides or {}, varied, name) for entry, varied in entries)
     if study.grid is None:
         _check_different(robots, entries, name)
     robots = _named_apart(robots, [varied for _, varied in entries])
@@ -190,8 +190,7 @@ def _read(source: str | Path | Mapping[str, Any], instead: Mapping[str, Any]) ->
         table, name, folder = read_toml(Path(source), _WHAT), str(source), Path(source).parent
     study = problems_in(Study, {**table, **instead})
     if isinstance(study, list):
-        more = f" (and {len(study) - 1} more)" if len(study) > 1 else ""
-        raise InputError(f"{name}: {study[0]}{more}", [f"{name}: {problem}" for problem in study])
+        raise refused_table(study, name)
     return study, name, folder
 
 
@@ -374,7 +373,17 @@ def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot],
             )
 
 
-def _robot(entry: str, folder: Path, overrides: Mapping[str, Any]) -> Robot:
-    """A robot of the study; a file stands relative to the study's folder."""
+def _robot(entry: str, folder: Path, overrides: Mapping[str, Any], varied: Mapping[str, Any], name: str) -> Robot:
+    """A robot of the study; a file stands relative to the study's folder.
+
+    Raises:
+        InputError: if it is wrong; where that may be for what is varied, the sentence names the study first.
+    """
     beside = folder / entry
-    return load(beside if Path(entry).suffix and not Path(entry).is_absolute() else entry, **overrides)
+    source = beside if Path(entry).suffix and not Path(entry).is_absolute() else entry
+    try:
+        return load(source, **{**overrides, **varied})
+    except InputError as error:
+        if not varied:
+            raise
+        raise InputError(f"{name}, with vary: {error}") from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -114,28 +113,27 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
     return Motion(trajectory, source, warnings)
 
 
-def motion_of_run(robot: Robot, run: xr.Dataset | str | Path, trial: TrialOptions, camera: CameraOptions) -> Motion:
+def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: CameraOptions) -> Motion:
     """The motion of a run.
 
     Args:
         robot: a checked robot.
-        run: the run, or its file.
+        run: a run of `spirillum.simulate`.
         trial: duration; the pose is the run's.
         camera: where the camera stands.
 
     Raises:
         InputError: if the run is of another robot, ends too early, or cannot be shown.
     """
-    from spirillum.dynamics.run_file import open_run, robot_of
+    from spirillum.dynamics.run_file import robot_of
 
-    dataset = open_run(run) if isinstance(run, str | Path) else run
-    own = robot_of(dataset)
+    own = robot_of(run)
     if own != robot:
         raise InputError(f"the run's robot {own.name!r} is not {robot.name!r}; allowed: the robot of the run")
     level = float(_resting_place(robot, TrialOptions().gap, 0.0)[2])  # for a run without a gap of its own
     axis = tube_height(robot, camera.view)
-    trajectory = run_trajectory(dataset, camera.view, leftwards=camera.leftwards, axis=axis, level=level)
-    model = str(dataset.attrs.get("model", ""))[:60]
+    trajectory = run_trajectory(run, camera.view, leftwards=camera.leftwards, axis=axis, level=level)
+    model = str(run.attrs.get("model", ""))[:60]
     if trial.duration is not None:
         trajectory = trajectory.until(trial.duration)
     return Motion(trajectory, f"run, {model}" if model else "run")

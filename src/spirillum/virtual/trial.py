@@ -90,7 +90,7 @@ class VirtualTrial(Shown):
 
 
 def render(
-    robot: str | Path | Mapping[str, Any] | Robot,
+    robot: str | Path | Mapping[str, Any] | Robot | None,
     path: str | Path,
     *,
     motion: MotionOptions | Mapping[str, Any] | None = None,
@@ -111,7 +111,7 @@ def render(
     unit or are floats in SI.
 
     Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        robot: a preset's name, a robot file, its tables, or a loaded robot; None: that of the run.
         path: the video (`.mp4`), or a new folder of PNG files (without an ending).
         motion: `MotionOptions`: the model of steady swimming, and prescribed rates.
         run: a run of `spirillum.simulate` instead, or its file.
@@ -136,8 +136,17 @@ def render(
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
     seed, setup_errors = Seeded.of({"seed": seed}).seed, SetupErrors.of(setup_errors)
-    robot = load(robot)
-    shown = motion_of(robot, motion, trial, camera) if run is None else motion_of_run(robot, run, trial, camera)
+    from spirillum.dynamics.run_file import open_run, robot_of
+
+    if run is None:
+        if robot is None:
+            raise InputError("no robot; allowed: a preset's name or a robot file, or a run, which has its own")
+        robot = load(robot)
+        shown = motion_of(robot, motion, trial, camera)
+    else:
+        dataset = open_run(run) if isinstance(run, str | Path) else run
+        robot = robot_of(dataset) if robot is None else load(robot)
+        shown = motion_of_run(robot, dataset, trial, camera)
     tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))
     check_size(robot, tank, lens)
     trajectory = framed(shown.trajectory, robot, lens, trial.start)

@@ -8,12 +8,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from spirillum.errors import InputError
 from spirillum.files import read_toml
 from spirillum.robot.fields import Length, LengthOrZero, Section, Text, Time
 from spirillum.robot.load import load
 from spirillum.robot.parts import Stripes
-from spirillum.robot.problems import problems_in
+from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
 __all__ = [
@@ -178,8 +177,7 @@ def load_setup(path: str | Path) -> tuple[Setup, Robot]:
     path = Path(path)
     checked = problems_in(Setup, read_toml(path, WHAT))
     if isinstance(checked, list):
-        more = "" if len(checked) == 1 else f" (and {len(checked) - 1} more)"
-        raise InputError(f"{path}: {checked[0]}{more}", [f"{path}: {problem}" for problem in checked])
+        raise refused_table(checked, str(path))
     name = checked.robot.file
     beside = path.parent / name
     return checked, load(beside if beside.is_file() else name)

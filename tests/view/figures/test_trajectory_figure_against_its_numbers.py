@@ -120,8 +120,10 @@ def test_events_that_cannot_be_read_cost_only_themselves(run: Any, events: str) 
 def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
     gone = [name for name in run.data_vars if str(name).startswith(("motor", "electrical"))]
     run = run.drop_vars(gone).assign(wobble_angle=("time", 0.1 + 0 * TIME), phase_lag=("time", 0.5 + 0 * TIME))
-    shown = panels(run)
+    shown = panels(run.assign(friction_power=0.0 * run["friction_power"]))
     assert not {"motor current (A)", "motor current (mA)"} & set(shown)
+    (power,) = (axes for label, axes in shown.items() if label.startswith("power"))
+    assert [line.get_label() for line in power.lines] == ["shaft", "in the fluid"]
     assert shown["wobble angle (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.1) + 0 * TIME)
     assert shown["phase lag (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.5) + 0 * TIME)
 

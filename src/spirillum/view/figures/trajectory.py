@@ -6,7 +6,6 @@ contact; any other its path from the side and from above, current, powers and en
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -274,13 +273,16 @@ def _path_of(dataset: xr.Dataset, time: Samples) -> Samples | None:
     return values if values.shape == (time.size, 3) and np.any(np.isfinite(values)) else None
 
 
-def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> Iterator[tuple[str, Samples]]:
-    """Words and SI values of the lines of a panel that the run has."""
+def _lines(dataset: xr.Dataset, panel: _Panel, time: Samples) -> list[tuple[str, Samples]]:
+    """Words and SI values of the lines of a panel that the run has; one that is always 0 only where all are."""
+    found = []
     for name, words in panel.lines:
         if name in dataset and dataset[name].dims == ("time",):
             values = np.asarray(dataset[name].values, dtype=float)
             if values.size == time.size and np.any(np.isfinite(values)):
-                yield words, values
+                found.append((words, values))
+    moving = [(words, values) for words, values in found if np.any(np.nan_to_num(values))]
+    return moving or found
 
 
 def _draw_path(axes: Axes, path: Samples, across: int, name: str) -> None:
@@ -309,7 +311,7 @@ def _draw_panel(axes: Axes, dataset: xr.Dataset, panel: _Panel, time: Samples, b
 
     The mean over `turn` samples is drawn too, where the panel has one; 0: none.
     """
-    lines = list(_lines(dataset, panel, time))
+    lines = _lines(dataset, panel, time)
     values = np.concatenate([line for _, line in lines])
     scale = Scale.of(values, unit_of(panel.lines[0][0]))
     film = panel.film and bool(np.all(values[np.isfinite(values)] > 0))

@@ -332,6 +332,7 @@ def _folder(path: Path, frames_per_second: float | None) -> Video:
         numbers = np.arange(len(names))
     first = [(name, picture.shape[1::-1]) for name in names[:_FEW] if (picture := _read_image(name)) is not None]
     if not first:
+        read_image(names[0])  # says where it is no picture for its size
         raise InputError(f"{path}: {names[0].name} cannot be read as an image; allowed: {_WHAT}")
     width, height = Counter(size for _, size in first).most_common(1)[0][0]
     _check_size(path, (width, height))
