@@ -154,6 +154,9 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
         )
     assert found.model.startswith("run")
     whole = motion_of_run(sp.load(ROBOT), run, TrialOptions(), CameraOptions())
+    few = motion_of_run(sp.load(ROBOT), run.isel(time=[0, -1]), TrialOptions(), CameraOptions())
+    assert not found.warnings
+    assert [line.startswith("the tail turns by up to") for line in few.warnings] == [True]
     assert whole.trajectory.duration == pytest.approx(0.6)
     with pytest.raises(sp.InputError, match=r"duration = 0\.7 s, but the run ends at 0\.6 s"):
         motion_of_run(sp.load(ROBOT), run, TrialOptions(duration="0.7 s"), CameraOptions())

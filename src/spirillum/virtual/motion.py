@@ -24,6 +24,8 @@ __all__ = ["Motion", "motion_of", "motion_of_run", "steady_rates"]
 
 _USUAL = 20.0
 """Length of a film of steady swimming, s."""
+_LARGEST_STEP = 0.5 * np.pi
+"""Largest turn of the tail between two samples of a run above which a film says that it interpolates, rad."""
 _WITHOUT_A_TABLE = f"--model {WALLED} answers without one, in some ten seconds of one core"
 """How else to come to a film with walls than by `spirillum prepare`, a clause."""
 
@@ -136,7 +138,18 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     model = str(run.attrs.get("model", ""))[:60]
     if trial.duration is not None:
         trajectory = trajectory.until(trial.duration)
-    return Motion(trajectory, f"run, {model}" if model else "run")
+    return Motion(trajectory, f"run, {model}" if model else "run", _between_samples(trajectory))
+
+
+def _between_samples(trajectory: TrialTrajectory) -> tuple[str, ...]:
+    """A sentence where the samples of a run are too few for what the tail does between them."""
+    step = float(np.abs(np.diff(trajectory.tail_phase)).max())
+    if step <= _LARGEST_STEP:
+        return ()
+    return (
+        f"the tail turns by up to {np.degrees(step):.3g} deg from one sample of the run to the next: the film shows "
+        "what is interpolated between them, without what happens within a turn",
+    )
 
 
 def _clearance(robot: Robot) -> float:
