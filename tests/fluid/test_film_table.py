@@ -15,7 +15,7 @@ MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 @pytest.fixture(scope="module")
 def table():
-    return FilmTable.of(CAPSULE, TUBE, intervals=9)
+    return FilmTable.of(CAPSULE, TUBE, intervals=11)
 
 
 def offset_at(packed, gap, p, psi):
@@ -26,11 +26,11 @@ def offset_at(packed, gap, p, psi):
     return low
 
 
-def errors(table, seed, count, pitch):
+def errors(table, seed, count, pitch, gaps=(1e-3, 0.2)):
     rng = np.random.default_rng(seed)
     found = []
     for _ in range(count):
-        gap = A * np.exp(rng.uniform(np.log(1e-3), np.log(0.2)))
+        gap = A * np.exp(rng.uniform(*np.log(gaps)))
         p, psi = pitch * rng.uniform(-1, 1) * rng.uniform() ** 2, rng.uniform(-0.12, 0.12)
         e = offset_at(table.packed, gap, p, psi)
         film, smallest = table.at(e, p, psi)
@@ -47,6 +47,16 @@ def test_coarse_table_is_near_the_direct_solution(table):
     assert np.median(found) < 2e-3
 
 
+@pytest.mark.parametrize(("pitch", "yaw"), [(0.0, 0.0), (0.0, 0.004), (0.002, -0.02), (-0.005, 0.1)])
+def test_film_as_thin_as_asperities_is_near_the_direct_solution(table, pitch, yaw):
+    """Where a robot rests: 2e-5 to 1e-3 of the radius. A level robot is met by the smallest yaw of the nodes."""
+    for gap in A * np.geomspace(2e-5, 1e-3, 4):
+        e = offset_at(table.packed, gap, pitch, yaw)
+        direct = film_resistance(CAPSULE, TUBE, e, pitch, yaw)
+        roots = np.sqrt(np.diag(direct))
+        assert np.abs((table.at(e, pitch, yaw)[0] - direct) / np.outer(roots, roots)).max() < 1e-2
+
+
 @pytest.mark.slow
 def test_table_is_the_direct_solution():
     table = FilmTable.of(CAPSULE, TUBE)
@@ -54,7 +64,10 @@ def test_table_is_the_direct_solution():
     assert few_degrees.max() < 3e-3
     assert np.median(few_degrees) < 3e-4
     assert errors(table, 1, 100, 0.2).max() < 1e-2
-    assert table.packed.nbytes < 100_000
+    thin = errors(table, 2, 100, 0.01, gaps=(2e-5, 1e-3))
+    assert thin.max() < 1e-2
+    assert np.median(thin) < 5e-4
+    assert table.packed.nbytes < 140_000
 
 
 def test_table_is_symmetric_positive_and_mirrored_anywhere(table):

@@ -163,7 +163,7 @@ def test_options_of_the_tube() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ((WIDE, "--gap", "0.0008mm"), "placement.gap = 0.0008 mm; allowed: at least 0.0009 mm"),
+        ((WIDE, "--gap", "0.0001mm"), "placement.gap = 0.0001 mm; allowed: at least 0.00018 mm"),
         (("biorob2012-narrow", "--pitch", "30deg"), "there is no more room in the channel at placement.pitch = 30 deg"),
     ],
 )

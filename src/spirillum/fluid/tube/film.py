@@ -45,8 +45,10 @@ _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
 _SHEARED = 0.2
 """Thickness, over the body's radius, above which what shears in the tube is no film: its shear is left out there."""
-_THINNEST, _INTERVALS, _YAWS = 1e-4, 14, 4
+_THINNEST, _INTERVALS, _YAWS = 2e-5, 15, 5
 """Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
+_LEAST_YAW = 0.03
+"""Coordinate of the smallest yaw at the nodes of a table."""
 _STEEPEST = 0.5
 """Largest sine of pitch at the nodes of a table."""
 _SHORTEST = 0.3
@@ -254,7 +256,7 @@ class FilmTable:
         head = _head(body, radius, yaw, pitch, intervals)
         places = np.concatenate([[0.0, 1 / 3], np.arange(1, intervals), [intervals - 1 / 3, intervals]])
         grids = [low + (high - low) * places / intervals for low, high in (head[7:9], head[10:12])]
-        etas = np.cos((np.arange(_YAWS) + 0.5) * 0.5 * np.pi / _YAWS)
+        etas = _yaw_nodes(_YAWS)
         nodes = np.empty((places.size, places.size, _YAWS, table.ENTRIES))
         for i, first in enumerate(grids[0]):
             for j, second in enumerate(grids[1]):
@@ -280,6 +282,13 @@ class FilmTable:
         """Resistance at a place, as of `film_resistance`, and the body's smallest gap, m."""
         out = np.empty((6, 6))
         return out, float(table.film_at(self.packed, e, p, psi, out))
+
+
+def _yaw_nodes(count: int) -> Samples:
+    """Coordinates of yaw at which a film is solved for, the smallest next to 0: most films are level."""
+    found = np.cos((np.arange(count) + 0.5) * 0.5 * np.pi / (count - 0.5))
+    found[-1] = _LEAST_YAW
+    return np.asarray(found)
 
 
 def _head(body: FilmBody, radius: float, yaw: float, pitch: float, intervals: int) -> Samples:

@@ -27,7 +27,7 @@ from spirillum.robot.options import ModelOptions
 
 __all__ = ["TabledTube", "along_the_tube", "mean_resistances_along", "tabled", "tables_of"]
 
-_THINNEST_GAP = 5e-5
+_THINNEST_GAP = 1e-5
 """Thinnest gap over the body's diameter: the thinnest film that is tabulated."""
 _HELD = [0, 1, 3, 4]
 """Places of U, Omega, omega and the mean flow in the axial form of both parts and the flow."""
