@@ -41,16 +41,19 @@ class Placed(NamedTuple):
 class BodyFinder:
     """Fits the pose of a body frame by frame, with templates of its edges that it learns from the video."""
 
-    def __init__(self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int]) -> None:
+    def __init__(
+        self, robot: Robot, optics: Optics, bounds: tuple[int, int, int, int], contour: Contour | None = None
+    ) -> None:
         """Compute the apparent contour of the body.
 
         Args:
             robot: the robot.
             optics: the camera.
             bounds: part of the picture to look at: left, top, right, bottom.
+            contour: the apparent contour of this body before this camera, where it is known already.
         """
         self.robot, self.optics, self.bounds = robot, optics, bounds
-        self.contour: Contour = contour_of(robot, optics)
+        self.contour = contour_of(robot, optics) if contour is None else contour
         self._shapes: dict[int, Shape] = {}
         self.half = OUTLINE.half_profile
         self.offsets = np.arange(-self.half, self.half + 1, dtype=float)

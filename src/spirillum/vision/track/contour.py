@@ -121,25 +121,30 @@ def contour_of(robot: Robot, optics: Optics) -> Contour:
     count = sum(size for _, size in kinds)
     nodes = [np.cos(np.pi * (np.arange(count) + 0.5) / count) for count in _NODES]
     surfaces = {name: _surface(outline) for name, outline in outlines.items()}
-    found = np.empty((*_NODES, 2, count, 2))
-    for i, a in enumerate(nodes[0] * reach[0]):
-        for j, b in enumerate(nodes[1] * reach[1]):
-            hulls = {name: _hull(on_plane(surface, a, b)) for name, surface in surfaces.items()}
-            for level, sign in enumerate((1.0, -1.0)):
-                parts = []
-                for flat, stations, outward in ((_flat(outline, 0), wide, 1.0), (_flat(outline, -1), behind, -1.0)):
-                    if flat is None:
-                        parts.append(np.stack([_chain(hulls["body"], stations, outward, 1), stations], axis=1))
-                    else:  # stripes end at the upper rim, also when the flat end is in view
-                        upper = 1.0 if striped and outward < 0.0 else sign
-                        parts.append(_rim(flat, stations, upper, on_plane, a, b))
-                for outward in (1.0, -1.0):
-                    parts += [
-                        np.stack([stations, _chain(hulls[part], stations, outward, 0)], axis=1)
-                        for part, _, stations in sides
-                    ]
-                parts.append(on_plane(seal, a, b))
-                found[i, j, level] = np.concatenate(parts)
+    flats = [(_flat(outline, 0), wide, 1.0), (_flat(outline, -1), behind, -1.0)]
+
+    def edges_at(a: float, b: float) -> Samples:
+        """Edge points seen from a place of the lens, with the upper and with the lower rims of flat ends."""
+        hulls = {name: _hull(on_plane(surface, a, b)) for name, surface in surfaces.items()}
+        lengthwise = {name: _walks(hull, 0) for name, hull in hulls.items()}
+        crosswise = _walks(hulls["body"], 1)
+        ends: list[list[Samples]] = [[], []]
+        for flat, stations, outward in flats:
+            if flat is None:
+                round_end = np.stack([_outermost(crosswise, stations, outward, 1), stations], axis=1)
+            for level, sign in zip(ends, (1.0, -1.0), strict=True):
+                # Stripes end at the upper rim, also when the flat end is in view.
+                upper = 1.0 if striped and outward < 0.0 else sign
+                level.append(round_end if flat is None else _rim(flat, stations, upper, on_plane, a, b))
+        common = [
+            np.stack([stations, _outermost(lengthwise[part], stations, outward, 0)], axis=1)
+            for outward in (1.0, -1.0)
+            for part, _, stations in sides
+        ]
+        common.append(on_plane(seal, a, b))
+        return np.stack([np.concatenate(level + common) for level in ends])
+
+    found = np.array([[edges_at(a, b) for b in nodes[1] * reach[1]] for a in nodes[0] * reach[0]])
     basis = np.einsum(
         "ia,jb->ijab", chebyshev.chebvander(nodes[0], _ORDERS[0]), chebyshev.chebvander(nodes[1], _ORDERS[1])
     ).reshape(_NODES[0] * _NODES[1], -1)
@@ -244,16 +249,20 @@ def _hull(points: Samples) -> Samples:
     return np.asarray(points[chosen[:, 0]])
 
 
-def _chain(hull: Samples, stations: Samples, outward: float, along: int) -> Samples:
-    """Outermost coordinate of a convex polygon at stations of the other one (`along`: 0 for x, 1 for y)."""
-    other = 1 - along
+def _walks(hull: Samples, along: int) -> list[Samples]:
+    """Both ways along a convex polygon from end to end, in the order of one coordinate (0 for x, 1 for y)."""
     ends = int(np.argmin(hull[:, along])), int(np.argmax(hull[:, along]))
     walks = []
     for first, last in (ends, ends[::-1]):
         count = (last - first) % len(hull)
-        walks.append(hull[(first + np.arange(count + 1)) % len(hull)])
-    heights = [walk[np.argsort(walk[:, along], kind="stable")] for walk in walks]
-    values = [np.interp(stations, walk[:, along], walk[:, other]) for walk in heights]
+        walk = hull[(first + np.arange(count + 1)) % len(hull)]
+        walks.append(walk[np.argsort(walk[:, along], kind="stable")])
+    return walks
+
+
+def _outermost(walks: list[Samples], stations: Samples, outward: float, along: int) -> Samples:
+    """Outermost coordinate of a convex polygon at stations of the other one, along which its `walks` are ordered."""
+    values = [np.interp(stations, walk[:, along], walk[:, 1 - along]) for walk in walks]
     return np.asarray(np.maximum(*values) if outward > 0 else np.minimum(*values))
 
 

@@ -96,7 +96,7 @@ def identify(name: str, setup: Setup, stated: BodyFinder, frames: list[Frame], s
     images = [frame.reduced(frames[0].image.shape[1] // still.shape[1]) for frame in frames]
     for about in _SIZES[:1] if half else _SIZES:
         least = FIRST_LOOK.clearness if half else SIZE.clearness
-        size = best_other_size(resized(stated, about), images, still, least)
+        size = best_other_size(stated, images, still, least, about)
         if size is not None:
             with suppress(InputError):
                 other = identified_at(name, setup, resized(stated, about * size), frames, still, about * size)

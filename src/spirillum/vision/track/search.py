@@ -10,7 +10,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.extras import required
 from spirillum.kernels.edges import edge_scores
-from spirillum.vision.camera.optics import BodyPose, Optics
+from spirillum.vision.camera.optics import BodyPose
 from spirillum.vision.track.constants import SEARCH
 from spirillum.vision.track.contour import GROUPS
 from spirillum.vision.track.shape import Shape
@@ -43,34 +43,42 @@ def candidates(image: np.ndarray, still: Samples, body: Shape, *, turn: float = 
     length, height = slope_u.shape
     shift = np.array([-0.5 * SEARCH.column_step, -0.5 * height])
     scores = np.empty((SEARCH.column_step, height + 1))
-    found: list[tuple[float, BodyPose]] = []
+    peaks, places, headings = [], [], []
     for column in range(SEARCH.column_step // 2, length + SEARCH.column_step // 2, SEARCH.column_step):
-        for heading in np.deg2rad(SEARCH.headings):
-            start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
-            at = optics.points(start, optics.axis_height)[0]
-            if not np.isfinite(at).all():
-                continue
-            pose = BodyPose(float(at[0]), float(at[1]), float(heading) + turn)
-            pixels, normals, _, _ = contour.places(pose, optics)
+        start = np.array([[left + factor * column, 0.5 * (top + bottom)]], dtype=float)
+        at = optics.points(start, optics.axis_height)[0]
+        if not np.isfinite(at).all():
+            continue
+        for heading in (np.deg2rad(SEARCH.headings) + turn).tolist():
+            pixels, normals, _, _ = contour.places(BodyPose(float(at[0]), float(at[1]), heading), optics)
             small = (pixels - np.array([left, top])) / factor - 0.5 + 0.5 / factor
             edge_scores(slope_u, slope_v, small, normals, contour.group, len(GROUPS), tuple(shift), scores)
             best = np.argpartition(scores, -SEARCH.peaks, axis=None)[-SEARCH.peaks :]
-            places = start + factor * (shift + np.column_stack(np.unravel_index(best, scores.shape)))
-            for k, there in zip(best, optics.points(places, optics.axis_height), strict=True):
-                pose = BodyPose(float(there[0]), float(there[1]), float(heading) + turn)
-                found.append((float(scores.flat[k]) / usual, pose))
-    return _apart(found, optics, width)
+            peaks.append(scores.ravel()[best])
+            places.append(start + factor * (shift + np.column_stack(np.divmod(best, scores.shape[1]))))
+            headings.append(np.full(best.size, heading))
+    if not peaks:
+        return []
+    points = optics.points(np.concatenate(places), optics.axis_height)
+    poses = np.column_stack([points[:, :2], np.concatenate(headings)])
+    return _apart(np.concatenate(peaks) / usual, poses, width * optics.length_per_pixel)
 
 
-def _apart(found: list[tuple[float, BodyPose]], optics: Optics, width: float) -> list[Candidate]:
-    """The best candidates without near duplicates."""
-    far = width * optics.length_per_pixel
+def _apart(scores: Samples, poses: Samples, far: float) -> list[Candidate]:
+    """The best candidates without near duplicates.
+
+    Args:
+        scores: of the places that were tried, (n,).
+        poses: x, y and heading there, (n, 3).
+        far: least distance between two candidates, m.
+    """
     kept: list[Candidate] = []
-    for score, pose in sorted(found, key=lambda entry: -entry[0]):
-        if score <= 0.0 or len(kept) == SEARCH.candidates:
-            break
-        if all(np.hypot(pose.x - other.pose.x, pose.y - other.pose.y) > far for other in kept):
-            kept.append(Candidate(pose, score))
+    left = np.argsort(-scores, kind="stable")
+    left = left[scores[left] > 0.0]
+    while left.size and len(kept) < SEARCH.candidates:
+        best = left[0]
+        kept.append(Candidate(BodyPose(*poses[best].tolist()), float(scores[best])))
+        left = left[np.hypot(*(poses[left, :2] - poses[best, :2]).T) > far]
     return kept
 
 

@@ -30,7 +30,7 @@ __all__ = ["LENGTHS", "OutlineFit", "best_other_size", "checked_scale", "clearne
 
 _THREADS = 2
 _SIZES = 2.0 ** (np.array([*range(-8, -1), *range(2, 9)]) / 8.0)
-"""Candidate sizes over the stated one; sizes in between are fitted to the edges."""
+"""Candidate sizes over the expected one; sizes in between are fitted to the edges."""
 _RUNS = tuple(map(tuple, np.split(_SIZES, 2)))
 """Sizes that are looked for with one computed outline, that of the least of them: its camera sees farthest."""
 _FINE = 8
@@ -59,26 +59,28 @@ def _resemblance(found: Sequence[Sequence[Candidate]]) -> float:
 
 
 def best_other_size(
-    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, least: float = SIZE.clearness
+    body: BodyFinder, images: Sequence[np.ndarray], still: Samples, least: float = SIZE.clearness, about: float = 1.0
 ) -> float | None:
-    """The size, from half to twice the stated one, at which an object resembles the robot most.
+    """The size, from half to twice the expected one, at which an object resembles the robot most.
 
     Args:
         body: the robot's body at the stated scale.
         images: some frames, 8-bit RGB, (h, w, 3) each; they and the background may be reduced by a whole factor.
         still: static background of the frames, (h, w, 3).
         least: clearness from which on a detection counts.
+        about: the expected size over the stated one.
 
     Returns:
-        The size over the stated one; None if no detection is clear.
+        The size over the expected one; None if no detection is clear.
     """
     few = [images[k] for k in np.unique(np.linspace(0, len(images) - 1, SIZE.looked_at).round().astype(int))]
     factor = body.optics.size[0] // still.shape[1]
-    contours = {run: contour_of(body.robot, _magnified(body.optics, min(run))) for run in _RUNS}
+    expected = _magnified(body.optics, about)
+    contours = {run: contour_of(body.robot, _magnified(expected, min(run))) for run in _RUNS}
 
     def at(size: float) -> float:
         [contour] = [contour for run, contour in contours.items() if size in run]
-        other = Shape.of(contour, _magnified(body.optics, size).reduced(factor), body.bounds, factor)
+        other = Shape.of(contour, _magnified(expected, size).reduced(factor), body.bounds, factor)
         places: list[list[Candidate]] = []
         for image in few:
             places.append(close_places(image, still, other))
@@ -100,7 +102,8 @@ def resized(body: BodyFinder, size: float) -> BodyFinder:
         body: the body.
         size: factor.
     """
-    return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds)
+    contour = body.contour if size == 1.0 else None
+    return BodyFinder(body.robot, _magnified(body.optics, size), body.bounds, contour)
 
 
 def _magnified(optics: Optics, size: float) -> Optics:
