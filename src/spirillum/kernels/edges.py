@@ -131,7 +131,7 @@ def _score(sums: Samples, seen: Samples, all_of: Samples, place: int) -> float:
         used += 1.0
     if score <= 0.0 or used == 0.0:
         return 0.0
-    score = score ** (1.0 / used)
+    score = math.sqrt(math.sqrt(score)) if used == 4.0 else score ** (1.0 / used)
     if groups > 4 and seen[4, place] > 0.0:
         score += 0.3 * min(sums[4, place] / seen[4, place], 2.0 * score)
     return float(score)
