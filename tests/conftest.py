@@ -133,6 +133,12 @@ def wide(batch_of: Callable[..., Any]) -> Any:
     return batch_of()
 
 
+@pytest.fixture
+def unplaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Panels and words stay where they are made: finding room for them takes most of the time of a figure."""
+    monkeypatch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)
+
+
 @dataclass(frozen=True)
 class StokesSphere:
     """The exact flow around a sphere at the origin: a stand-in for a robot's flow with a known truth; SI."""

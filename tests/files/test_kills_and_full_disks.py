@@ -40,7 +40,7 @@ def limited(folder: Path, command: list[str], limit: int) -> subprocess.Complete
 @pytest.mark.parametrize(
     "command",
     [
-        ["simulate", "biorob2012-wide", "-o", "out.nc", "--duration", "0.1s"],
+        ["simulate", "biorob2012-wide", "--model", "rft", "-o", "out.nc", "--duration", "0.1s"],
         ["render", "biorob2012-wide", "-o", "out.mp4", "--size", "64x64", "--fps", "5", "--duration", "0.6s"],
     ],
 )

@@ -2,6 +2,7 @@
 
 import base64
 import json
+import tomllib
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.papers import biorob2012
 from spirillum.papers.claim import Claim
 from spirillum.results.study_content import FRICTION_MEANINGS
 from spirillum.results.study_report import write_report
@@ -17,6 +19,7 @@ from spirillum.view.figures.picture import Picture
 from spirillum.view.figures.style import new_figure
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
+STUDY = Path(biorob2012.__file__).with_name("study.toml")
 HOSTILE = "<script>alert(1)</script>"
 
 
@@ -71,8 +74,11 @@ def blank(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, Any]:
+    """The report of the paper's study, with one of its four wavelengths and two of its four amplitudes."""
     folder = tmp_path_factory.mktemp("paper")
-    dataset = sp.study()
+    study = tomllib.loads(STUDY.read_text("utf-8"))
+    study["grid"] |= {"wavelengths": ["25 mm"], "amplitudes": ["2.5 mm", "3.5 mm"]}
+    dataset = sp.study(study)
     return folder, written(dataset, folder), dataset
 
 
@@ -182,6 +188,7 @@ def test_hostile_words_stay_words(tmp_path: Path) -> None:
     assert page.text.count(HOSTILE) >= 3
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_hostile_channel_names_stay_in_the_folder(tmp_path: Path) -> None:
     grid = {
         "channels": {"../x": "biorob2012-wide", "a/b": "biorob2012-narrow"},

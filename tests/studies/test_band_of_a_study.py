@@ -137,6 +137,7 @@ def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, 
     assert "no model of this study knows the channel's walls" in slower.reason
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_figures_draw_the_band_and_name_it(leaning: Any, question: dict[str, object]) -> None:
     dataset = sp.study(question, band=True)
     pictures = figures_of(dataset)

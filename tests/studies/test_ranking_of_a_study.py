@@ -61,6 +61,7 @@ def test_band_counts_the_places_at_which_the_fastest_is_the_fastest() -> None:
     assert ranking_of(dataset).best[0].of_places == 4
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_report_starts_with_the_ranking(tmp_path: Path) -> None:
     dataset = sp.study(GRID)
     found = ranking_of(dataset)

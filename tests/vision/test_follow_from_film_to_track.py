@@ -157,10 +157,10 @@ def test_a_robot_in_full_view_for_a_while_is_measured_then(flat_pictures, tmp_pa
 
 
 def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
-    empty = flat_pictures.Flat(frames=2, start=(1.0, 0.0), noise=4.0)
+    empty = flat_pictures.Flat(frames=1, start=(1.0, 0.0), noise=4.0)
     with pytest.raises(InputError, match="no robot like 'biorob2012-wide'"):
         track(empty, tmp_path)
-    bare = flat_pictures.Flat(frames=1, ruler=False)
+    bare = flat_pictures.Flat(frames=1, ruler=False, size=(240, 180))
     setup = bare.write(tmp_path / "b.mp4")
     setup.write_text(flat_pictures.Flat().setup_text())
     with pytest.raises(InputError, match="shows no ruler"):

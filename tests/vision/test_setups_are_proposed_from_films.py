@@ -1,5 +1,7 @@
 """What a film tells of its setup is found at any scale, and what it cannot tell is left to be filled in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.measurement.setup_template import setup_answer
 from spirillum.vision.setup import load_setup
+from spirillum.vision.track import scouting
 
 pytest.importorskip("av")
 cv2 = pytest.importorskip("cv2")
@@ -85,8 +88,9 @@ def test_without_a_ruler_the_robot_gives_the_scale_and_another_order_of_stripes_
 
 def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, monkeypatch):
     """With a ruler the setup is written as far as it goes; without one there is nothing to write."""
-    monkeypatch.setattr("spirillum.vision.track.scouting.best_other_size", lambda *given: None)  # it takes a while
-    empty = {"frames": 4, "start": (1.0, 0.0), "noise": 4.0}
+    monkeypatch.setattr(scouting, "best_other_size", lambda *given: None)  # it takes a while
+    monkeypatch.setattr(scouting, "SCOUTING", replace(scouting.SCOUTING, shares=(0.25,)))
+    empty = {"frames": 2, "start": (1.0, 0.0), "noise": 4.0}
     flat_pictures.Flat(**empty, size=(320, 240), focal=350.0).write(tmp_path / "a.mp4")
     looks = []
     found = sp.propose_setup(tmp_path / "a.mp4", progress=lambda what, done, total: looks.append((what, done, total)))

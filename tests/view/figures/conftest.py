@@ -46,9 +46,3 @@ def journal_width(monkeypatch: pytest.MonkeyPatch) -> None:
             super().__init__(figsize=figsize)
 
     monkeypatch.setattr("spirillum.view.figures.style.Figure", Checked)
-
-
-@pytest.fixture
-def unplaced(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Panels and words stay where they are made: finding room for them takes most of the time of a figure."""
-    monkeypatch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)

@@ -132,6 +132,7 @@ def test_words_name_plane_frame_phase_and_motion(around: Flow) -> None:
     assert "frame of the swimming robot" in _words(flow_figure(turned, turned.plane(resolution=20)))
 
 
+@pytest.mark.usefixtures("unplaced")
 @pytest.mark.parametrize(("plane", "resolution"), [("xz", 2), ("yz", 2), ("yz", 3), ("xz", 5)])
 def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str, tmp_path: Path) -> None:
     save_as(flow_figure(around, around.plane(plane, resolution=resolution)), tmp_path / "flow.png")
@@ -140,7 +141,6 @@ def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str,
 @pytest.mark.parametrize(
     ("fields", "suffixes"),
     [
-        ({"name": "$x_{1}$ of a very long name " * 6, "channel": "none"}, ("png", "pdf", "svg")),
         ({"tail.handedness": "left", "drive.kind": "rate", "drive.rate": "-1 Hz"}, ("png",)),
         ({"body.diameter": "2 um", "body.length": "4 um", "tail.length": "20 um", "tail.wavelength": "5 um",
           "tail.amplitude": "0.8 um", "tail.wire_diameter": "100 nm", "coupling.length": "0 mm", "channel": "none"},
@@ -148,7 +148,17 @@ def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str,
         ({"body.diameter": "0.9 m", "body.length": "1 m", "channel": "none"}, ("pdf",)),
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("unplaced")
 def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
+    _drawn(fields, suffixes, sphere, tmp_path)
+
+
+def test_a_very_long_name_finds_room(sphere: Any, tmp_path: Path) -> None:
+    fields = {"name": "$x_{1}$ of a very long name " * 6, "channel": "none"}
+    _drawn(fields, ("png", "pdf", "svg"), sphere, tmp_path)
+
+
+def _drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
     robot = sp.load(WIDE, **fields)
     flow = Flow(sp.predict(robot, model="sbt"), replace(sphere, radius=0.5 * robot.body.diameter), 0.0, "lab")
     figure = flow_figure(flow, flow.plane(resolution=30))
@@ -157,6 +167,7 @@ def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...
         assert (tmp_path / f"flow.{suffix}").stat().st_size > 5_000
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_a_plane_inside_a_solid_is_drawn(around: Flow, sphere: Any, tmp_path: Path) -> None:
     solid = replace(around, field=replace(sphere, radius=1.0))
     save_as(flow_figure(solid, solid.plane(resolution=20)), tmp_path / "flow.png")
@@ -184,7 +195,7 @@ def test_the_glass_covers_all_beyond_the_wall(
     np.testing.assert_array_equal(drawn[clear], (rho > 0.02)[clear])
 
 
-@pytest.mark.usefixtures("without_lines")
+@pytest.mark.usefixtures("without_lines", "unplaced")
 def test_words_and_the_third_panel_tell_of_the_tube(in_tube: Callable[..., Flow]) -> None:
     flow = in_tube(gap="1 mm", pitch="2 deg", ends="closed", tail_drop="1 mm")
     data = flow.plane(resolution=30)

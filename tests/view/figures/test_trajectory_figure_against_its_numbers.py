@@ -99,6 +99,7 @@ def test_time_axis_is_shared_and_spans_the_run(run: Any) -> None:
     assert sum(axes.get_xlabel() == "time (s)" for axes in over_time) == 2
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_events_are_marked_and_named(run: Any) -> None:
     figure = trajectory_figure(run)
     words = " ".join(text.get_text() for text in figure.findobj(Text))
@@ -240,6 +241,7 @@ def test_robot_that_does_not_move_can_be_drawn(run: Any) -> None:
     assert all(np.all(np.isfinite(axes.get_ylim())) for axes in trajectory_figure(run).axes)
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_held_run_has_no_path_but_its_rates() -> None:
     run = sp.simulate("biorob2012-wide", motion="held", timing={"duration": 0.2, "samples_per_turn": 50}, model="rft")
     shown = panels(run)
