@@ -42,8 +42,22 @@ def question(small: dict[str, object]) -> dict[str, object]:
     return {**small, "friction": ["none", "rotor"], "models": MODELS, "claims": "biorob2012"}
 
 
-def test_every_entry_is_what_predict_says(leaning: Any, question: dict[str, object]) -> None:
-    dataset = sp.study(question, band=True)
+@pytest.fixture(scope="module")
+def kept() -> list[Any]:
+    """The study with its band, once it was asked for."""
+    return []
+
+
+@pytest.fixture
+def banded(leaning: Any, question: dict[str, object], kept: list[Any]) -> Any:
+    """The study with its band, computed once for all tests, which do not change it."""
+    if not kept:
+        kept.append(sp.study(question, band=True))
+    return kept[0]
+
+
+def test_every_entry_is_what_predict_says(leaning: Any, banded: Any) -> None:
+    dataset = banded
     assert dataset["forward_velocity_at_place"].dims[-1] == "place"
     for channel, wavelength, amplitude in (("wide", 0.020, 0.0015), ("narrow", 0.025, 0.0025)):
         tail = {"tail.wavelength": f"{wavelength} m", "tail.amplitude": f"{amplitude} m"}
@@ -61,14 +75,13 @@ def test_every_entry_is_what_predict_says(leaning: Any, question: dict[str, obje
     assert "band" in dataset["forward_velocity_low"].attrs["long_name"]
 
 
-def test_without_a_band_nothing_of_it_is_there(leaning: Any, question: dict[str, object]) -> None:
+def test_without_a_band_nothing_of_it_is_there(leaning: Any, question: dict[str, object], banded: Any) -> None:
     dataset = sp.study(question)
     assert not [name for name in dataset.data_vars if str(name).endswith(("_low", "_high", "_at_place"))]
     assert "place" not in dataset.dims
     assert "gap and pitch are not given: model 'walled' answers at one place" in dataset.attrs["warnings"]
-    whole = sp.study({**question, "band": True})
-    assert "answers at one place" not in whole.attrs["warnings"]
-    assert dataset.attrs["fingerprint"] != whole.attrs["fingerprint"]
+    assert "answers at one place" not in banded.attrs["warnings"]
+    assert dataset.attrs["fingerprint"] != banded.attrs["fingerprint"]
 
 
 def test_models_and_band_override_the_file(leaning: Any, question: dict[str, object]) -> None:
@@ -78,10 +91,9 @@ def test_models_and_band_override_the_file(leaning: Any, question: dict[str, obj
 
 
 def test_interrupted_band_resumes_where_it_stopped(
-    leaning: Any, question: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    leaning: Any, question: dict[str, object], banded: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("spirillum.results.study.write_report", lambda *_: None)
-    whole = sp.study(question, band=True)
     done: list[int] = []
     original = BandTask.answer
 
@@ -97,7 +109,7 @@ def test_interrupted_band_resumes_where_it_stopped(
     (parts,) = (tmp_path / "out").glob("parts-*")
     assert len(list(parts.glob("*.npz"))) == 4 + 3
     monkeypatch.setattr(BandTask, "answer", original)
-    assert sp.study(question, band=True, output=tmp_path / "out").identical(whole)
+    assert sp.study(question, band=True, output=tmp_path / "out").identical(banded)
 
 
 def test_robots_that_share_a_place_come_one_after_the_other(leaning: Any, question: dict[str, object]) -> None:
@@ -109,7 +121,9 @@ def test_robots_that_share_a_place_come_one_after_the_other(leaning: Any, questi
     assert all(words.endswith("2 robots") for words in band if "pitch 0 deg" not in words)
 
 
-def test_drop_is_judged_over_the_band_and_nothing_is_called_fitted(leaning: Any, question: dict[str, object]) -> None:
+def test_drop_is_judged_over_the_band_and_nothing_is_called_fitted(
+    leaning: Any, question: dict[str, object], banded: Any
+) -> None:
     def by_walled(dataset: Any) -> Any:
         (claim,) = [c for c in evaluated(dataset) if c.claim.endswith("wide to narrow, by walled")]
         return claim
@@ -118,7 +132,7 @@ def test_drop_is_judged_over_the_band_and_nothing_is_called_fitted(leaning: Any,
     assert alone.verdict == "undecidable"
     assert "gap 0.5 mm, level" in alone.computed
     assert "no factor is fitted" in alone.reason
-    dataset = sp.study(question, band=True)
+    dataset = banded
     over = by_walled(dataset)
     assert "over the band, at the same gap and pitch in both channels" in over.computed
     drops = Evidence(dataset).drops_of_the_band("walled")
@@ -138,8 +152,8 @@ def test_models_without_walls_say_nothing_about_the_channel(question: dict[str, 
 
 
 @pytest.mark.usefixtures("unplaced")
-def test_figures_draw_the_band_and_name_it(leaning: Any, question: dict[str, object]) -> None:
-    dataset = sp.study(question, band=True)
+def test_figures_draw_the_band_and_name_it(banded: Any) -> None:
+    dataset = banded
     pictures = figures_of(dataset)
     assert list(pictures) == ["fig5-wide", "fig6-narrow", "bound", "drop"]
     figures = {name: picture.figure() for name, picture in pictures.items()}

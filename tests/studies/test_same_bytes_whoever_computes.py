@@ -40,6 +40,16 @@ def small_regions(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(regions, "BLOCK", 11)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The store of the grid in six regions, written by one process without a break; nobody changes it."""
+    store = tmp_path_factory.mktemp("whole") / "study.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(regions, "BLOCK", 11)
+        sp.study(GRID, store=store)
+    return store
+
+
 def tree(folder: Path) -> dict[str, str]:
     """All files with what stands in them, as a hash."""
     files = [path for path in folder.rglob("*") if path.is_file()]
@@ -58,13 +68,13 @@ def same(one: xr.Dataset, other: xr.Dataset) -> None:
 
 
 @pytest.mark.usefixtures("small_regions")
-def test_store_holds_what_the_study_answers(tmp_path: Path) -> None:
-    stored = sp.study(GRID, store=tmp_path / "study.zarr")
+def test_store_holds_what_the_study_answers(whole: Path) -> None:
+    stored = sp.study(GRID, store=whole)  # which is there: it is opened
     same(sp.study(GRID), stored)
     assert stored.attrs["finished"] == "yes"
     assert stored.attrs["unanswered"] == int(np.count_nonzero(stored["outside"])) > 0
-    assert not (tmp_path / "study.zarr" / "notes").exists()
-    chunks = [path for path in (tmp_path / "study.zarr" / "outside" / "c").rglob("*") if path.is_file()]
+    assert not (whole / "notes").exists()
+    chunks = [path for path in (whole / "outside" / "c").rglob("*") if path.is_file()]
     assert len(chunks) == 6
 
 
@@ -84,9 +94,8 @@ def test_store_of_a_list_with_observed_rates_holds_what_the_study_answers(
 
 
 @pytest.mark.usefixtures("small_regions")
-def test_interrupted_store_adds_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    store, whole = tmp_path / "part.zarr", tmp_path / "whole.zarr"
-    sp.study(GRID, store=whole)
+def test_interrupted_store_adds_what_is_missing(tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = tmp_path / "part.zarr"
     done: list[int] = []
     original, most = study_store.write_pieces, 4
 
@@ -213,17 +222,16 @@ def cluster() -> Iterator[Any]:
 
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.usefixtures("small_regions")
-def test_a_cluster_leaves_the_bytes_of_one_process(tmp_path: Path) -> None:
+def test_a_cluster_leaves_the_bytes_of_one_process(tmp_path: Path, whole: Path) -> None:
     """Two workers of one thread each, here in this process; workers of more threads are refused."""
     from distributed import LocalCluster
 
-    sp.study(GRID, store=tmp_path / "whole.zarr")
     words: list[str] = []
     settings = {"processes": False, "dashboard_address": None, "silence_logs": 50}
     with LocalCluster(n_workers=2, threads_per_worker=1, **settings) as made:
         address = made.scheduler_address
         sp.study(GRID, store=tmp_path / "a.zarr", workers=address, progress=lambda what, *_: words.append(what))
-    assert tree(tmp_path / "a.zarr") == tree(tmp_path / "whole.zarr")
+    assert tree(tmp_path / "a.zarr") == tree(whole)
     assert any("2 workers on 1 machine" in line for line in words)
     with (
         LocalCluster(n_workers=1, threads_per_worker=2, **settings) as wide,
@@ -238,9 +246,8 @@ def test_a_cluster_leaves_the_bytes_of_one_process(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.usefixtures("small_regions")
-def test_a_cluster_whose_workers_are_killed_leaves_the_same_bytes(tmp_path: Path, cluster: Any) -> None:
+def test_a_cluster_whose_workers_are_killed_leaves_the_same_bytes(tmp_path: Path, whole: Path, cluster: Any) -> None:
     """Each of them once, while the study runs; another takes its place."""
-    sp.study(GRID, store=tmp_path / "whole.zarr")
     victims = iter(list(cluster.workers.values()))
 
     def kill(what: str, done: int, _total: int) -> None:
@@ -248,4 +255,4 @@ def test_a_cluster_whose_workers_are_killed_leaves_the_same_bytes(tmp_path: Path
             os.kill(victim.pid, signal.SIGKILL)
 
     sp.study(GRID, store=tmp_path / "killed.zarr", workers=cluster.scheduler_address, progress=kill)
-    assert tree(tmp_path / "killed.zarr") == tree(tmp_path / "whole.zarr")
+    assert tree(tmp_path / "killed.zarr") == tree(whole)
