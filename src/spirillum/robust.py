@@ -86,6 +86,15 @@ def theil_sen_line(time: Samples, values: Samples) -> Line:
     return Line(0.0, np.median(values - slope * time[:, None], axis=0), slope)
 
 
+def _medians_of_stretches(values: Samples) -> Samples:
+    """Medians of at most 60 stretches of a series, the first of them longer by one where they are not of one length."""
+    count = min(_MOST_PIECES, values.size)
+    length, longer = divmod(values.size, count)
+    edge = longer * (length + 1)
+    parts = values[:edge].reshape(longer, length + 1), values[edge:].reshape(count - longer, length)
+    return np.concatenate([np.median(part, axis=1) for part in parts if part.size])
+
+
 def repeated_median_line(time: Samples, values: Samples) -> Line:
     """Siegel's line (Biometrika 69:242, 1982, repeated medians): up to half of the points may be wrong.
 
@@ -95,9 +104,7 @@ def repeated_median_line(time: Samples, values: Samples) -> Line:
         time: (n,), increasing.
         values: (n,).
     """
-    pieces = np.array_split(np.arange(time.size), min(_MOST_PIECES, time.size))
-    t = np.array([np.median(time[piece]) for piece in pieces])
-    y = np.array([np.median(values[piece]) for piece in pieces])
+    t, y = _medians_of_stretches(time), _medians_of_stretches(values)
     apart = ~np.eye(t.size, dtype=bool)
     with np.errstate(invalid="ignore"):
         slopes = (y[:, None] - y) / (t[:, None] - t)

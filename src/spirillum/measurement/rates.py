@@ -359,36 +359,55 @@ def _noises(blocks: _Blocks, shares: Sequence[float], times: Samples, sizes: Seq
 
 
 class _Solved(NamedTuple):
-    """The generalised least squares estimate for one noise model."""
+    """The generalised least squares estimates for all noise models."""
 
-    likelihood: float
-    """Restricted log likelihood."""
+    likelihood: Samples
+    """Restricted log likelihoods, (k,)."""
     beta: Samples
-    """Coefficients."""
+    """Coefficients, (k, c)."""
     covariance: Samples
-    """Covariance of the coefficients."""
+    """Covariances of the coefficients, (k, c, c)."""
 
 
-def _solved(blocks: _Blocks, numbers: Sequence[int], noise: _Noise) -> list[_Solved]:
-    """Generalised least squares with one noise model, for several numbers of columns of the design matrix."""
+def _whitened(blocks: _Blocks, noise: _Noise, most: int) -> tuple[Samples, float] | None:
+    """Design matrix and values divided by the covariance of a noise model, and half the logarithm of its determinant.
+
+    None where it is singular by rounding, as the series is almost free of noise.
+    """
     from scipy.linalg.lapack import dpotrf, dpotrs
 
     covariance = noise.share * noise.correlation + noise.size * blocks.returning
     covariance.flat[:: blocks.s.size + 1] += (1.0 - noise.share) * blocks.white + 1e-7
     factor, failed = dpotrf(covariance, lower=1, overwrite_a=1)
-    if failed:  # rounding, where the series is almost free of noise
-        return [_Solved(-np.inf, np.zeros(columns), np.eye(columns)) for columns in numbers]
-    most = max(numbers)
+    if failed:
+        return None
     both, _ = dpotrs(factor, np.concatenate([blocks.design[:, :most], blocks.y[:, None]], axis=1), lower=1)
-    half_log, found = float(np.sum(np.log(np.diag(factor)))), []
+    return both, float(np.sum(np.log(np.diag(factor))))
+
+
+def _solved(blocks: _Blocks, numbers: Sequence[int], noises: Sequence[_Noise]) -> list[_Solved]:
+    """Generalised least squares with all noise models, for several numbers of columns of the design matrix."""
+    most = max(numbers)
+    whitened = [_whitened(blocks, noise, most) for noise in noises]
+    sound = np.array([one is not None for one in whitened])
+    both = np.array([one[0] for one in whitened if one is not None]).reshape(-1, blocks.s.size, most + 1)
+    half_log = np.array([one[1] for one in whitened if one is not None])
+    found = []
     for columns in numbers:
-        design, solved = blocks.design[:, :columns], both[:, :columns]
+        design, solved, values = blocks.design[:, :columns], both[:, :, :columns], both[:, :, most]
         inverse = np.linalg.inv(design.T @ solved)
-        beta = inverse @ (design.T @ both[:, most])
+        beta = np.einsum("kij,kj->ki", inverse, values @ design)
         free = blocks.s.size - columns
-        misfit = max(float((blocks.y - design @ beta) @ (both[:, most] - solved @ beta)), 1e-300)
-        likelihood = -half_log + 0.5 * float(np.linalg.slogdet(inverse)[1]) - 0.5 * free * np.log(misfit)
-        found.append(_Solved(likelihood, beta, inverse * (misfit / free)))
+        left = values - np.einsum("kmc,kc->km", solved, beta)
+        misfit = np.maximum(np.einsum("km,km->k", blocks.y - beta @ design.T, left), 1e-300)
+        one = _Solved(
+            np.full(sound.size, -np.inf),
+            np.zeros((sound.size, columns)),
+            np.tile(np.eye(columns), (sound.size, 1, 1)),
+        )
+        one.likelihood[sound] = -half_log + 0.5 * np.linalg.slogdet(inverse)[1] - 0.5 * free * np.log(misfit)
+        one.beta[sound], one.covariance[sound] = beta, inverse * (misfit / free)[:, None, None]
+        found.append(one)
     return found
 
 
@@ -396,15 +415,13 @@ def _fitted(blocks: _Blocks, numbers: Sequence[int]) -> list[_Fit]:
     """Polynomials with several numbers of coefficients, averaged over the noise models by their likelihood."""
     noises = _noises(blocks, _SHARES, np.geomspace(2.0 / blocks.s.size, 2.0, _TIMES), _SIZES)
     white = np.log(_WHITE * len(_SHARES) * _TIMES) * np.array([noise.share == 0.0 for noise in noises])
-    solved = zip(*(_solved(blocks, numbers, noise) for noise in noises), strict=True)
     found = []
-    for columns, items in zip(numbers, solved, strict=True):
-        likelihoods = np.array([item.likelihood for item in items]) + white
+    for columns, solved in zip(numbers, _solved(blocks, numbers, noises), strict=True):
+        likelihoods = solved.likelihood + white
         weights = np.exp(likelihoods - likelihoods.max())
         weights /= weights.sum()
-        betas, covariances = np.array([item.beta for item in items]), np.array([item.covariance for item in items])
         time = noises[int(np.argmax(weights))].time
-        found.append(_Fit(weights, betas, covariances, blocks.s.size - columns, time))
+        found.append(_Fit(weights, solved.beta, solved.covariance, blocks.s.size - columns, time))
     return found
 
 
