@@ -110,7 +110,11 @@ def closed_forms() -> Any:
     return runpy.run_path(str(BENCHMARKS / "tube_reference.py"))
 
 
-CYLINDERS = [(20.0, 2.0, 1e-4, 2e-4, 80.0), (15.0, 2.0, 1e-4, 2e-4, 80.0), (15.0, 0.5, 1e-2, 2e-3, 50.0)]
+CYLINDERS = [
+    (20.0, 2.0, 1e-4, 2e-4, 80.0),
+    pytest.param(15.0, 2.0, 1e-4, 2e-4, 80.0, marks=pytest.mark.slow),
+    (15.0, 0.5, 1e-2, 2e-3, 50.0),
+]
 """Radius and gap, tolerance, error allowed, length of the longer one."""
 
 

@@ -39,8 +39,8 @@ def film(flat_pictures, folder, roll, stated):
 @pytest.mark.parametrize(
     ("roll", "stated"),
     [
-        (25.0, "right"),
         (-100.0, "down"),
+        pytest.param(25.0, "right", marks=pytest.mark.slow),
         pytest.param(160.0, "left", marks=pytest.mark.slow),
         pytest.param(90.0, "up", marks=pytest.mark.slow),
     ],

@@ -45,7 +45,10 @@ def test_the_right_scale_is_not_doubted(film):
 
 @pytest.mark.parametrize(
     ("changes", "size"),
-    [({"markers_spacing": '"1.9 mm"'}, 0.95), ({"robot_axis_height": '"25 mm"'}, 175 / 185)],
+    [
+        ({"markers_spacing": '"1.9 mm"'}, 0.95),
+        pytest.param({"robot_axis_height": '"25 mm"'}, 175 / 185, marks=pytest.mark.slow),
+    ],
     ids=["spacing", "depth"],
 )
 def test_a_scale_off_by_a_twentieth_widens_the_interval_beyond_its_error(film, changes, size):
