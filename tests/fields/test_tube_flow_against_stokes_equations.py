@@ -23,7 +23,7 @@ FASTEST = 7.5 * 2.5e-3  # of the wire
 @pytest.fixture(scope="module")
 def placed(batch_of: Callable[..., Any]) -> Callable[..., Any]:
     def make(fields: dict[str, Any] | None = None, **placement: Any) -> Any:
-        options = {"tail.length": "25 mm", "model.tube.tolerance": 0.02, **(fields or {})}
+        options = {"tail.length": "25 mm", "model.tube.tolerance": 0.01, **(fields or {})}
         return batch_of(**options).placed(Placement.of(placement))
 
     return make
