@@ -156,6 +156,9 @@ def test_intervals_of_gap_and_pitch_hold_what_was_planted(tmp_path: Path) -> Non
     found = sp.calibrate(path, WIDE, model="tube", free="gap,pitch", method="least-squares")
     for name, truth in (("gap", 4e-4), ("pitch", 0.03)):
         assert found.values[name].low < truth < found.values[name].high
+    assert not any("taken to be level" in warning for warning in found.warnings)
+    level = sp.calibrate(path, WIDE, model="tube", free="gap", method="least-squares")
+    assert any("taken to be level" in warning for warning in level.warnings)
     assert any("trade off" in warning for warning in found.warnings)
     assert any("as many free numbers as the speed has means" in warning for warning in found.warnings)
 

@@ -90,7 +90,7 @@ def test_other_models_are_left_out_where_they_answer_another_question() -> None:
     assert sp.predict(WIDE, model="rft").other_models is None
     afloat = sp.predict(sp.load(WIDE, channel="none"), tail_rate="1.2 Hz").other_models
     assert afloat is not None
-    assert [item.model for item in afloat.answers] == ["sbt", "sbt", "rft", "rft"]
+    assert [item.model for item in afloat.answers] == ["sbt", "rft"]
 
 
 @pytest.mark.parametrize("model", ["sbt", "rft", "slender"])
@@ -140,3 +140,14 @@ def test_predictions_and_runs_agree_at_the_same_place() -> None:
 def test_unknown_names_are_refused_with_all_that_is_allowed() -> None:
     with pytest.raises(sp.InputError, match=r"did you mean auto\?.*allowed: auto, sbt, rft, slender, tube"):
         sp.predict(WIDE, model="atuo")
+
+
+def test_factors_of_another_geometry_say_nothing_of_this_robot() -> None:
+    own, other = (
+        sp.predict(sp.load(WIDE, **changed), model="slender", tail_rate="1.2 Hz").other_models
+        for changed in ({}, {"body.length": "34 mm"})
+    )
+    assert own is not None
+    assert other is not None
+    assert {item.model for item in own.answers if item.calibrated} == {"sbt", "rft"}
+    assert not any(item.calibrated for item in other.answers)

@@ -241,6 +241,11 @@ def common_warnings(problem: Problem, friction: Sequence[Estimate]) -> list[str]
     found = []
     if experiment.synthetic:
         found.append(synthetic_warning(experiment.source))
+    if "gap" in problem.free and "pitch" not in problem.free:
+        found.append(
+            "the robots are taken to be level, as the pitch is not free (--free gap,pitch): another pitch changes "
+            "speeds, and the fitted gap with them; `predict` with this fit has no band over either"
+        )
     negative = [n for n, item in enumerate(friction) if item.value < 0]
     if negative:
         found.append(

@@ -15,6 +15,7 @@ from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.robot import Robot
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.freedom import Motion
 from spirillum.swimming.steady import requirements, swim
 
@@ -40,7 +41,7 @@ class OtherModels:
     """What simpler models say to the same question."""
 
     answers: tuple[OtherModel, ...]
-    """One for each model, and one more for each that has calibration factors."""
+    """One for each model, and one more for each that has calibration factors of this geometry."""
     statement: str
     """All in one line, and why they differ."""
 
@@ -92,7 +93,8 @@ def other_models(
     for other in simpler:
         if (motion == "free" and other.axial_only) or broken(requirements(batch, other)):
             continue
-        for calibrated in (False, True) if other.name in robot.calibration else (False,):
+        of_this = other.name in robot.calibration and not calibration_warnings(robot, other.name)
+        for calibrated in (False, True) if of_this else (False,):
             result = swim(batch, other, tail_rate=rates, friction=friction, calibrated=calibrated, motion=motion)
             own = float(result.forward_velocity[0])
             if result.valid[0] and own / speed > 0:
