@@ -49,6 +49,12 @@ def test_a_tail_that_does_not_fit_takes_no_walls_from_the_others() -> None:
     assert nobody == "slender"
 
 
+def test_a_robot_without_a_channel_says_that_it_takes_the_walls_of_the_others() -> None:
+    found = sp.study({"robots": ["biorob2012-wide", "ecoli"], "friction": ["none"]})
+    assert found["model"].values.tolist() == ["slender"]
+    assert "one model answers for all robots, and ecoli has no channel" in found.attrs["warnings"]
+
+
 @pytest.mark.parametrize(("amplitudes", "code"), [('["2.5 mm", "25 mm"]', 0), ('["25 mm"]', 2)])
 def test_study_without_any_answer_ends_as_bad_input_does(
     amplitudes: str, code: int, tmp_path, capsys, monkeypatch: pytest.MonkeyPatch

@@ -153,6 +153,9 @@ def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:
             np.diff(truth["tail_phase"]), np.diff(np.interp(truth["time"], run["time"], run["tail_angle"]))
         )
     assert found.model.startswith("run")
+    for option in ({"motion": {"tail_rate": "3 Hz"}}, {"trial": {"gap": "3 mm"}}):
+        with pytest.raises(sp.InputError, match="with a run, which has its own"):
+            render(None, tmp_path / "b.mp4", run=run, **option)
     whole = motion_of_run(sp.load(ROBOT), run, TrialOptions(), CameraOptions())
     few = motion_of_run(sp.load(ROBOT), run.isel(time=[0, -1]), TrialOptions(), CameraOptions())
     assert not found.warnings

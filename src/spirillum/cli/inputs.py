@@ -14,10 +14,19 @@ __all__ = ["angle", "loaded_robot", "overrides_from", "pairs_of", "placement_fro
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
-    """Fields of the robot by `--set`."""
+    """Fields of the robot by `--set`.
+
+    Raises:
+        InputError: if one is no field with a value, or is set twice.
+    """
     from spirillum.robot.load import parse_setting
 
-    return dict(parse_setting(text) for text in settings or [])
+    found: dict[str, Any] = {}
+    for field, value in map(parse_setting, settings or []):
+        if field in found:
+            raise InputError(f"set = {field} is given twice; allowed: each field once")
+        found[field] = value
+    return found
 
 
 def loaded_robot(robot: str, settings: list[str] | None) -> Robot:

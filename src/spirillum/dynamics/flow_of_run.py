@@ -78,6 +78,9 @@ def flow_of_run(
         raise InputError(
             f"the run has no {missing[0]}; allowed: a free run in a tube, by `spirillum simulate --model tube`"
         )
+    words = [name for name in ("time", *_NEEDED) if dataset[name].dtype.kind not in "fiu"]
+    if words:
+        raise InputError(f"{words[0]} of the run holds no numbers; allowed: numbers, by `spirillum simulate`")
     times = np.asarray(dataset["time"].values, dtype=float)
     if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
         raise InputError("time of the run has no values, or does not increase; allowed: samples one after the other")

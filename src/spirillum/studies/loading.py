@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -334,6 +334,13 @@ def _with_models(
         for index in range(loaded.count)
     )
     choice = _for_all(choices)
+    afloat = [robot.name for robot in robots if robot.channel is None]
+    if choice.model != WALLED and not (choice.fitted or choice.caution) and len(afloat) < len(robots):
+        choice = replace(
+            choice,
+            caution="the channels' walls are left out, which makes robots faster than they are, and may change their "
+            f"order (model '{choice.model}'): one model answers for all robots, and {afloat[0]} has no channel",
+        )
     models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
     cautions = (choice.caution,) if choice.caution else ()
     return study.model_copy(update={"models": tuple(models)}), cautions

@@ -17,6 +17,7 @@ from spirillum.files import protected, whole_files, write_dataset
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
+from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
@@ -89,6 +90,20 @@ class VirtualTrial(Shown):
         return envelope("virtual-trial", content, self.warnings)
 
 
+def _check_not_of_run(*given: MotionOptions | TrialOptions) -> None:
+    """Refuse what a run says itself: all of a motion, and of a trial all but its length and where it starts.
+
+    Raises:
+        InputError: if it is given.
+    """
+    for options in given:
+        usual = type(options)()
+        for name in type(options).model_fields:
+            if name not in ("duration", "start") and getattr(options, name) not in (getattr(usual, name), AUTO):
+                value = str(getattr(options, name))[:60]
+                raise InputError(f"{name} = {value} with a run, which has its own; allowed: duration and start alone")
+
+
 def render(
     robot: str | Path | Mapping[str, Any] | Robot | None,
     path: str | Path,
@@ -145,6 +160,7 @@ def render(
         shown = motion_of(robot, motion, trial, camera)
     else:
         dataset = open_run(run) if isinstance(run, str | Path) else run
+        _check_not_of_run(motion, trial)
         robot = robot_of(dataset) if robot is None else load(robot)
         shown = motion_of_run(robot, dataset, trial, camera)
     tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))
