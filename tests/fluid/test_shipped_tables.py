@@ -87,7 +87,7 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
         assert table.key in keys
         for stated in (table.error, table.error_without_yaw):
             assert all(0 < stated[name] < most for name, most in LARGEST.items())
-        assert path.stat().st_size < 120_000
+        assert path.stat().st_size < 145_000
 
 
 @pytest.mark.parametrize("name", PRESETS)

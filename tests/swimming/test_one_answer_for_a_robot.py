@@ -119,7 +119,9 @@ def test_studies_take_one_model_for_all_robots() -> None:
         return loaded.study.models, loaded.cautions
 
     assert models(robots=[WIDE, NARROW]) == (("tube",), ())
-    assert models(robots=[WIDE, "ecoli"]) == (("slender",), ())
+    mixed, (said,) = models(robots=[WIDE, "ecoli"])
+    assert mixed == ("slender",)
+    assert said.endswith("one model answers for all robots, and ecoli has no channel")
     assert models(robots=[WIDE], models=["sbt", "auto", "tube"]) == (("sbt", "tube"), ())
     tails = {"wavelengths": ["25 mm", "24.3 mm"], "amplitudes": ["2.5 mm"], "channels": {"wide": WIDE}}
     found, cautions = models(grid=tails)
