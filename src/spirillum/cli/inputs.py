@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
     from spirillum.robot.robot import Robot
 
 __all__ = ["angle", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
+
+_V = TypeVar("_V")
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:
@@ -21,10 +24,19 @@ def overrides_from(settings: list[str] | None) -> dict[str, Any]:
     """
     from spirillum.robot.load import parse_setting
 
-    found: dict[str, Any] = {}
-    for field, value in map(parse_setting, settings or []):
+    return _each_once(map(parse_setting, settings or []), "--set")
+
+
+def _each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
+    """Values by field.
+
+    Raises:
+        InputError: if a field is named twice.
+    """
+    found: dict[str, _V] = {}
+    for field, value in pairs:
         if field in found:
-            raise InputError(f"set = {field} is given twice; allowed: each field once")
+            raise InputError(f"{option} names {field[:60]} twice; allowed: each field once")
         found[field] = value
     return found
 
@@ -68,15 +80,14 @@ def pairs_of(items: list[str], option: str) -> dict[str, str]:
     Raises:
         InputError: if one is none, or names a field twice.
     """
-    found: dict[str, str] = {}
-    for text in items:
+
+    def pair(text: str) -> tuple[str, str]:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
             raise InputError(f"{option} {text[:60]!r} is not FIELD=LOW:HIGH, for example tail.wavelength=5mm:40mm")
-        if name in found:
-            raise InputError(f"{option} names {name[:60]} twice; allowed: each field once")
-        found[name] = value
-    return found
+        return name, value
+
+    return _each_once(map(pair, items), option)
 
 
 def angle(text: str) -> float:

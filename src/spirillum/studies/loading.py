@@ -29,7 +29,7 @@ from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.studies.spec import LARGEST_STORED, Study
 from spirillum.swimming.band import left_open
-from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
+from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model, walls_left_out
 
 __all__ = ["LARGEST_STUDY", "LoadedStudy", "load_study"]
 
@@ -336,11 +336,8 @@ def _with_models(
     choice = _for_all(choices)
     afloat = [robot.name for robot in robots if robot.channel is None]
     if choice.model != WALLED and not (choice.fitted or choice.caution) and len(afloat) < len(robots):
-        choice = replace(
-            choice,
-            caution="the channels' walls are left out, which makes robots faster than they are, and may change their "
-            f"order (model '{choice.model}'): one model answers for all robots, and {afloat[0]} has no channel",
-        )
+        why = f"one model answers for all robots, and {afloat[0]} has no channel"
+        choice = replace(choice, caution=walls_left_out(why, among=True))
     models = dict.fromkeys(choice.model if model == AUTO else model for model in study.models)
     cautions = (choice.caution,) if choice.caution else ()
     return study.model_copy(update={"models": tuple(models)}), cautions

@@ -31,6 +31,7 @@ __all__ = [
     "fitted_models",
     "has_table",
     "posterior_alone",
+    "walls_left_out",
 ]
 
 AUTO = "auto"
@@ -119,9 +120,19 @@ def choose_model(
         why = f"{lacks} yet: `spirillum prepare` makes one in {TABLE_TAKES}, and {other_way}"
     else:  # a place that was asked for is refused by the model that knows places
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
-    makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
-    caution = f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
+    caution = walls_left_out(why, among=among)
     return ModelChoice(UNBOUNDED, why.partition(":")[0], caution, outside=bool(outside))
+
+
+def walls_left_out(why: str, *, among: bool) -> str:
+    """The caution where a robot in a channel is answered for without its walls.
+
+    Args:
+        why: the reason, a clause.
+        among: the robot is one of several that are compared.
+    """
+    makes = "robots faster than they are, and may change their order" if among else "a robot faster than it is"
+    return f"the channel's walls are left out, which makes {makes} (model '{UNBOUNDED}'): {why}"
 
 
 def has_table(batch: RobotBatch) -> bool:
