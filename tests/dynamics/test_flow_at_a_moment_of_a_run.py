@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -88,14 +89,42 @@ def test_the_sample_that_is_taken_is_told(run: xr.Dataset, monkeypatch: Any) -> 
 def test_damaged_runs_are_refused(run: xr.Dataset) -> None:
     time = run["time"].to_numpy().copy()
     time[3] = np.nan
-    for times in (run.isel(time=slice(0, 0)), run.isel(time=slice(None, None, -1)), run.assign_coords(time=time)):
+    for times in (run.isel(time=slice(0, 0)), run.isel(time=slice(None, None, -1))):
         with pytest.raises(sp.InputError, match="time of the run has no values, or does not increase"):
             sp.flow_of_run(times, 0.05)
+    with pytest.raises(sp.InputError, match="variable 'time' is not finite at sample 3"):
+        sp.flow_of_run(run.assign_coords(time=time), 0.05)
     for name in ("velocity", "tail_phase", "angular_velocity"):
-        with pytest.raises(sp.InputError, match=f"{name} of the run at time = .* is no finite number"):
+        with pytest.raises(sp.InputError, match=f"variable '{name}' is not finite at time = 0.05 s"):
             sp.flow_of_run(run.assign({name: run[name] * np.nan}), 0.05)
         with pytest.raises(sp.InputError, match=f"the run has no {name}"):
             sp.flow_of_run(run.drop_vars(name), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda run: run.assign(attitude=0.0 * run["attitude"]), "attitude at time = 0.05 s has the length 0"),
+        (lambda run: run.assign(attitude=run["attitude"][0]), "'attitude' has the dimensions (quaternion: 4)"),
+        (lambda run: run.assign(mean_flow=run["velocity"]), "'mean_flow' has the dimensions (time: 1, axis: 3)"),
+        (lambda run: run.assign(tail_phase=run["tail_phase"].astype(str)), "'tail_phase' holds no numbers"),
+        (lambda run: run.assign(motor_rotation_rate=run["time"] + 1e200), "holds 1e+200; allowed: at most 1e+09"),
+        (lambda run: run.assign(wall_gap=run["time"] - 1.0), "'wall_gap' is -9.5e+05 um; allowed: at least 0"),
+        (lambda run: run.assign(wall_pitch=run["time"] + 2.0), 'the run: wall_pitch = "2.05 rad" is out of range'),
+        (lambda run: run.assign(wall_gap=run["time"] + 1.0), "wall_gap = 1050 mm; allowed: at most"),
+        (lambda run: run.assign_attrs(friction="dry"), "the run: friction = 'dry'; allowed: none, rotor"),
+        (lambda run: run.assign_attrs(warnings=3), "the run's attribute 'warnings' = 3; allowed: text"),
+        (lambda run: run.assign_attrs(settings="{}"), "the run's settings: body is missing"),
+    ],
+)
+def test_runs_changed_by_hand_are_refused_unannounced(
+    run: xr.Dataset, monkeypatch: Any, spoil: Callable[[xr.Dataset], xr.Dataset], words: str
+) -> None:
+    monkeypatch.setattr("spirillum.dynamics.flow_of_run.tube_flow_field", lambda *_: pytest.fail("it was taken"))
+    announced: list[str] = []
+    with pytest.raises(sp.InputError, match=re.escape(words)):
+        sp.flow_of_run(spoil(run), 0.05, progress=lambda what, *_: announced.append(what))
+    assert not announced
 
 
 def test_another_run_is_refused(run: xr.Dataset) -> None:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
-from spirillum.dynamics.poses import rotation_matrix
-from spirillum.dynamics.run_file import open_run, robot_of
+from spirillum.dynamics.poses import attitudes_of, rotation_matrix
+from spirillum.dynamics.run_file import numbers_of, open_run, robot_of
 from spirillum.errors import InputError, did_you_mean
 from spirillum.fields.flow import Flow, Frame
 from spirillum.fields.in_tube import tube_flow_field
 from spirillum.fluid.tube.announced import OF_A_RUN
 from spirillum.fluid.tube.tube import Tube
-from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
 from spirillum.robot.load import with_resolution
@@ -23,7 +25,7 @@ from spirillum.robot.placement import Placement
 from spirillum.swimming.answer import STEADY, Swimming
 from spirillum.swimming.loading import checked_batch, least_gap
 from spirillum.swimming.prediction import Prediction
-from spirillum.swimming.steady import requirements
+from spirillum.swimming.steady import friction_reading, requirements
 from spirillum.units import KINDS, parse_option, show
 
 if TYPE_CHECKING:
@@ -33,11 +35,16 @@ if TYPE_CHECKING:
 
 __all__ = ["flow_of_run"]
 
-_NEEDED = (
-    *("time", "azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow", "attitude", "velocity", "angular_velocity"),
+_SCALARS = (
+    *("azimuth", "wall_pitch", "wall_yaw", "wall_gap", "mean_flow"),
     *("tail_phase", "motor_rotation_rate", "body_rotation_rate", "tail_rotation_rate"),
 )
+_VECTORS = ("velocity", "angular_velocity")
+_NEEDED = ("time", *_SCALARS, *_VECTORS, "attitude")
 """What a run in a tube has, and what its flow follows from."""
+
+_OWN_NAMES = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "flow": "mean_flow"}
+"""Variables of a run by the fields of a placement that they become."""
 
 _TOLERANCE = 0.03
 _THINNEST = 0.02
@@ -78,35 +85,47 @@ def flow_of_run(
         raise InputError(
             f"the run has no {missing[0]}; allowed: a free run in a tube, by `spirillum simulate --model tube`"
         )
-    words = [name for name in ("time", *_NEEDED) if dataset[name].dtype.kind not in "fiu"]
-    if words:
-        raise InputError(f"{words[0]} of the run holds no numbers; allowed: numbers, by `spirillum simulate`")
-    times = np.asarray(dataset["time"].values, dtype=float)
-    if times.ndim != 1 or not times.size or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
+    times = numbers_of(dataset, "time")
+    if not times.size or np.any(np.diff(times) <= 0.0):
         raise InputError("time of the run has no values, or does not increase; allowed: samples one after the other")
     if not times[0] <= moment <= times[-1]:
         raise InputError(
             f"time = {show(moment, 's')} is outside the run; allowed: {show(times[0], 's')} to {show(times[-1], 's')}"
         )
-    now = dataset.isel(time=int(np.argmin(np.abs(times - moment))))
-    unknown = [name for name in _NEEDED if not np.all(np.isfinite(np.asarray(now[name].values, dtype=float)))]
-    if unknown:
-        raise InputError(
-            f"{unknown[0]} of the run at time = {show(float(now['time']), 's')} is no finite number; allowed: a moment "
-            "at which all is known"
-        )
+    now = _sample(dataset, int(np.argmin(np.abs(times - moment))))
     nearest = float(now["time"])
     if abs(nearest - moment) > 1e-9:
         said = (
             f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
         )
-        now = now.assign_attrs(warnings="\n".join([said, str(now.attrs.get("warnings", ""))]))
+        now = now.assign_attrs(warnings="\n".join([said, now.attrs["warnings"]]))
+    prediction, phase, body, rotor = _motion(now, resolution)
     if progress is not None:
         progress(OF_A_RUN, 0, 1)
-    prediction, phase, body, rotor = _motion(now, resolution)
     field = tube_flow_field(prediction.batch, body, rotor, phase, float(now["mean_flow"]))
     around = Flow(prediction, field, phase, cast("Frame", frame))
     return around.with_held_force()
+
+
+def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
+    """A run at one of its samples, with what its flow follows from checked.
+
+    Raises:
+        InputError: for what `simulate` does not write.
+    """
+    one = dataset.isel(time=[index])
+    for name in _SCALARS:
+        numbers_of(one, name)
+    for name in _VECTORS:
+        numbers_of(one, name, ("axis",), (3,))
+    attitude = attitudes_of(one)[0]
+    if float(one["wall_gap"][0]) < 0.0:
+        said = show(float(one["wall_gap"][0]), "um")
+        raise InputError(f"the run's variable 'wall_gap' is {said}; allowed: at least 0 m, a body inside its tube")
+    warnings = one.attrs.get("warnings", "")
+    if not isinstance(warnings, str):
+        raise InputError(f"the run's attribute 'warnings' = {warnings!r}; allowed: text")
+    return one.isel(time=0).assign(attitude=("quaternion", attitude)).assign_attrs(warnings=warnings)
 
 
 def _motion(
@@ -127,17 +146,19 @@ def _motion(
     mean_flow = float(now["mean_flow"])
     drawn = max(gap, _THINNEST * robot.body.diameter)
     asked = {"gap": drawn, "pitch": pitch, "yaw": yaw, "flow": mean_flow}
-    batch = RobotBatch.of(robot, Placement.of(asked))
-    if broken(requirements(batch, Tube())):
-        drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
-    warnings = [line for line in str(now.attrs.get("warnings", "")).split("\n") if line]
+    with _said_of_the_run():
+        friction = friction_reading(str(now.attrs.get("friction", robot.friction.reading)))
+        batch = RobotBatch.of(robot, Placement.of(asked))
+        if broken(requirements(batch, Tube())):
+            drawn = float(np.fmax(least_gap(batch, Tube()), drawn))
+        batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": drawn}))
+    warnings = [line for line in now.attrs["warnings"].split("\n") if line]
     if gap < drawn:
         warnings.append(
             f"the film of {show(gap, 'um')} under the body is thinner than is resolved: the robot is drawn "
             f"{show(drawn - gap, 'um')} further off the wall, with the same velocities, and the pressure in the "
             "film is not that of the run"
         )
-    batch = checked_batch(robot, Tube(), Placement.of({**asked, "gap": drawn}))
     nothing = {item.name: np.array([np.nan]) for item in STEADY}
     known = {
         "forward_velocity": float(now["velocity"].values[0]),
@@ -148,7 +169,6 @@ def _motion(
     swimming = Swimming(
         **(nothing | {name: np.array([value]) for name, value in known.items()}), valid=np.array([True])
     )
-    friction = cast("FrictionReading", str(now.attrs.get("friction", robot.friction.reading)))
     found = Prediction(
         robot,
         Tube(),
@@ -161,3 +181,13 @@ def _motion(
         motion="free",
     )
     return found, phase, body, rotor
+
+
+@contextmanager
+def _said_of_the_run() -> Iterator[None]:
+    """What is refused inside is said of the run, with the names that the fields of a placement have there."""
+    try:
+        yield
+    except InputError as error:
+        own = re.sub(r"placement\.(\w+)", lambda found: _OWN_NAMES.get(found[1], found[0]), str(error))
+        raise InputError(f"the run: {own}") from error

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.run_file import numbers_of
 from spirillum.errors import InputError
+from spirillum.units import show
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Pose", "Poses", "poses_of", "rolled", "rotation_matrix"]
-
-_LARGEST = 1e9
-"""Largest number of a run that a film takes: m, s or rad."""
+__all__ = ["Pose", "Poses", "attitudes_of", "poses_of", "rolled", "rotation_matrix"]
 
 _REST = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -128,47 +127,40 @@ def poses_of(dataset: xr.Dataset, height: float = 0.0) -> Poses:
     Raises:
         InputError: if a variable is missing, has another shape, is not finite, or there are less than two samples.
     """
-    time = _numbers(dataset, "time", ())
+    time = numbers_of(dataset, "time", ())
     if time.size < 2 or not np.all(np.diff(time) > 0):
         raise InputError(f"the run has {time.size} samples of time; allowed: at least 2, increasing")
     if "attitude" in dataset:
-        position = _numbers(dataset, "position", ("axis",), (3,))
-        attitude = _continued(_numbers(dataset, "attitude", ("quaternion",), (4,)))
-        return Poses(time, position, attitude, _numbers(dataset, "tail_phase", ()), _roll_of(attitude))
-    along, tail, body = (_numbers(dataset, name, ()) for name in ("position", "tail_angle", "body_angle"))
+        position = numbers_of(dataset, "position", ("axis",), (3,))
+        attitude = attitudes_of(dataset)
+        return Poses(time, position, attitude, numbers_of(dataset, "tail_phase", ()), _roll_of(attitude))
+    along, tail, body = (numbers_of(dataset, name, ()) for name in ("position", "tail_angle", "body_angle"))
     position = np.stack([along, np.zeros_like(along), np.full_like(along, height)], axis=-1)
     attitude = np.stack([np.cos(0.5 * body), np.sin(0.5 * body), 0.0 * body, 0.0 * body], axis=-1)
     return Poses(time, position, _continued(attitude), tail - body, body)
 
 
-def _numbers(dataset: xr.Dataset, name: str, more: tuple[str, ...], shape: tuple[int, ...] = ()) -> Samples:
-    """Values of a variable over `time` and further dimensions, all finite."""
-    if name not in dataset.variables:
-        raise InputError(f"the run has no variable {name!r}; allowed: a run of `spirillum simulate`")
-    variable = dataset[name]
-    dims = ("time", *more)
-    if set(variable.dims) != set(dims) or variable.transpose(*dims).shape[1:] != shape:
-        said = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
-        wanted = ", ".join(["time", *(f"{dim}: {size}" for dim, size in zip(more, shape, strict=True))])
-        raise InputError(f"the run's variable {name!r} has the dimensions ({said}); allowed: ({wanted})")
-    if variable.dtype.kind not in "fiu":
-        raise InputError(f"the run's variable {name!r} holds no numbers ({variable.dtype}); allowed: numbers")
-    values = np.asarray(variable.transpose(*dims).values, dtype=float)
-    if not np.all(np.isfinite(values)):
-        bad = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
-        raise InputError(f"the run's variable {name!r} is not finite at sample {bad}; allowed: finite numbers")
-    if np.abs(values).max(initial=0.0) > _LARGEST:
-        raise InputError(f"the run's variable {name!r} holds {np.abs(values).max():.3g}; allowed: at most {_LARGEST:g}")
-    return values
+def attitudes_of(dataset: xr.Dataset) -> Samples:
+    """(n, 4) attitudes of a free run as unit quaternions, without jumps of sign.
+
+    Raises:
+        InputError: if they are missing, have another shape, are not finite, or are no rotations.
+    """
+    attitude = numbers_of(dataset, "attitude", ("quaternion",), (4,))
+    off = np.abs(np.linalg.norm(attitude, axis=1) - 1.0)
+    if np.any(off > 1e-2):
+        bad = int(np.argmax(off))
+        when = show(float(dataset["time"][bad]), "s")
+        raise InputError(
+            f"the run's attitude at time = {when} has the length {np.linalg.norm(attitude[bad]):.4g}; allowed: 1, "
+            "a rotation"
+        )
+    return _continued(attitude)
 
 
 def _continued(attitude: Samples) -> Samples:
     """Unit quaternions whose sign does not jump: q and -q are the same attitude."""
-    size = np.linalg.norm(attitude, axis=1)
-    if np.any(np.abs(size - 1.0) > 1e-2):
-        bad = int(np.argmax(np.abs(size - 1.0)))
-        raise InputError(f"the run's attitude at sample {bad} has the length {size[bad]:.4g}; allowed: 1, a rotation")
-    unit = attitude / size[:, None]
+    unit = attitude / np.linalg.norm(attitude, axis=1)[:, None]
     sign = np.where(np.sum(unit[1:] * unit[:-1], axis=1) < 0, -1.0, 1.0)
     return np.asarray(unit * np.concatenate([[1.0], np.cumprod(sign)])[:, None])
 

@@ -7,20 +7,25 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+import numpy as np
 from pydantic import BaseModel
 
+from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import loaded_netcdf
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
-from spirillum.units import Kind
+from spirillum.units import Kind, show
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["open_run", "robot_of", "robot_of_settings"]
+__all__ = ["numbers_of", "open_run", "robot_of", "robot_of_settings"]
 
 _WHAT = "a run written by `spirillum simulate`"
+
+_LARGEST = 1e9
+"""Largest number of a run that is taken: SI, such as m, s, rad or rad/s."""
 
 
 def open_run(path: str | Path) -> xr.Dataset:
@@ -33,6 +38,38 @@ def open_run(path: str | Path) -> xr.Dataset:
         InputError: if it is missing, no NetCDF file, too large, or damaged.
     """
     return loaded_netcdf(path, _WHAT)
+
+
+def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape: tuple[int, ...] = ()) -> Samples:
+    """(n, *shape) values of a run's variable over `time` and further dimensions, finite and not huge.
+
+    Args:
+        dataset: a run, or some of its samples.
+        name: the variable.
+        more: its dimensions after `time`.
+        shape: sizes of these.
+
+    Raises:
+        InputError: if it is missing, has other dimensions, or holds anything else.
+    """
+    if name not in dataset.variables:
+        raise InputError(f"the run has no variable {name!r}; allowed: a run of `spirillum simulate`")
+    variable = dataset[name]
+    dims = ("time", *more)
+    if set(variable.dims) != set(dims) or variable.transpose(*dims).shape[1:] != shape:
+        said = ", ".join(f"{dim}: {size}" for dim, size in variable.sizes.items())
+        wanted = ", ".join(["time", *(f"{dim}: {size}" for dim, size in zip(more, shape, strict=True))])
+        raise InputError(f"the run's variable {name!r} has the dimensions ({said}); allowed: ({wanted})")
+    if variable.dtype.kind not in "fiu":
+        raise InputError(f"the run's variable {name!r} holds no numbers ({variable.dtype}); allowed: numbers")
+    values = np.asarray(variable.transpose(*dims).values, dtype=float)
+    if not np.all(np.isfinite(values)):
+        bad = int(np.argmin(np.isfinite(values.reshape(len(values), -1)).all(axis=1)))
+        where = f"sample {bad}" if name == "time" else f"time = {show(float(dataset['time'][bad]), 's')}"
+        raise InputError(f"the run's variable {name!r} is not finite at {where}; allowed: finite numbers")
+    if np.abs(values).max(initial=0.0) > _LARGEST:
+        raise InputError(f"the run's variable {name!r} holds {np.abs(values).max():.3g}; allowed: at most {_LARGEST:g}")
+    return values
 
 
 def robot_of(dataset: xr.Dataset) -> Robot:
