@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from spirillum.units import among, in_unit
 
-__all__ = ["Row", "Shown", "counted", "html_of", "rows_of", "text_of"]
+__all__ = ["Row", "Shown", "counted", "fitted_words", "html_of", "rows_of", "text_of"]
 
 
 class Row(NamedTuple):
@@ -146,13 +146,25 @@ def _title(answer: Mapping[str, Any]) -> str:
     kind = str(answer["schema"]).removeprefix("spirillum.").partition("/")[0].replace("-", " ")
     words = [kind, *(f"{name} {answer[name]}" for name in ("model", "friction") if isinstance(answer.get(name), str))]
     if isinstance(answer.get("calibrated"), bool):
-        words.append("calibrated" if answer["calibrated"] else "not calibrated")
+        words.append(fitted_words(answer["calibrated"], answer.get("fitted_by", "")))
     title = ", ".join(words)
     return f"{answer['robot']}: {title}" if isinstance(answer.get("robot"), str) else title
 
 
+def fitted_words(calibrated: bool, fitted_by: str) -> str:  # noqa: FBT001 - as answers say it
+    """Whether numbers of an answer were fitted, for its title.
+
+    Args:
+        calibrated: calibration factors were applied.
+        fitted_by: file whose fitted values act on the answer; empty without one.
+    """
+    if fitted_by:
+        return f"fitted by {fitted_by}"
+    return "calibrated" if calibrated else "not calibrated"
+
+
 _LONGEST, _MOST, _OF_A_LIST = 100, 10, 5
-_IN_TITLE = ("schema", "robot", "model", "friction", "model_reason", "motion", "form")
+_IN_TITLE = ("schema", "robot", "model", "friction", "model_reason", "fitted_by", "motion", "form")
 
 
 def _words(answer: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -181,3 +181,20 @@ def test_limits_are_spoken_of_only_where_there_are_some(calibration: Path) -> No
     warnings = sp.study({**study, "robots": [WIDE]}, calibration=calibration, overrides=other).attrs["warnings"]
     assert "B_eff of 1 of 1 tails was not fitted" in warnings
     assert "intervals" not in warnings
+
+
+def test_an_answer_names_the_file_that_was_fitted(tmp_path: Path) -> None:
+    """A gap is no calibration factor, and yet it was fitted; a file that does not act on a model is not named."""
+    path = tmp_path / "gap.toml"
+    path.write_text('[[placement]]\nchannel_diameter = "40 mm"\n[placement.placement]\ngap = "0.4 mm"\n')
+    found = sp.predict(WIDE, model="tube", calibration=path, tail_rate="1 Hz", band=False)
+    assert str(found).splitlines()[0].endswith("friction rotor, fitted by gap.toml")
+    assert found.to_dict()["fitted_by"] == "gap.toml"
+    assert "nothing is fitted" not in found.known_error
+    other = sp.predict(WIDE, model="sbt", calibration=path, tail_rate="1 Hz")
+    assert str(other).splitlines()[0].endswith("friction rotor, calibrated")
+    assert "fitted_by" not in other.to_dict()
+    path.write_text('[contact]\nroughness = "1 um"\n')
+    run = sp.simulate(WIDE, model="tube", calibration=path, timing={"duration": "0.05 s"})
+    assert run.attrs["fitted_by"] == "gap.toml"
+    assert "nothing is fitted" not in run.attrs["known_error"]

@@ -23,6 +23,7 @@ def run_attributes(prediction: Prediction) -> dict[str, Any]:
         "friction": prediction.friction,
         "effective_friction": prediction.effective_friction,
         "calibrated": int(prediction.calibrated),
+        **({"fitted_by": prediction.fitted_by} if prediction.fitted_by else {}),
         "error_estimate": prediction.error_estimate,
         "known_error": prediction.known_error,
         **({} if prediction.model.error_against is None else {"error_against": prediction.model.error_against}),

@@ -122,10 +122,11 @@ def _sample(dataset: xr.Dataset, index: int) -> xr.Dataset:
     if float(one["wall_gap"][0]) < 0.0:
         said = show(float(one["wall_gap"][0]), "um")
         raise InputError(f"the run's variable 'wall_gap' is {said}; allowed: at least 0 m, a body inside its tube")
-    warnings = one.attrs.get("warnings", "")
-    if not isinstance(warnings, str):
-        raise InputError(f"the run's attribute 'warnings' = {warnings!r}; allowed: text")
-    return one.isel(time=0).assign(attitude=("quaternion", attitude)).assign_attrs(warnings=warnings)
+    texts = {name: one.attrs.get(name, "") for name in ("warnings", "fitted_by")}
+    for name, text in texts.items():
+        if not isinstance(text, str):
+            raise InputError(f"the run's attribute {name!r} = {text!r}; allowed: text")
+    return one.isel(time=0).assign(attitude=("quaternion", attitude)).assign_attrs(texts)
 
 
 def _motion(
@@ -179,6 +180,7 @@ def _motion(
         error_estimate=float("nan"),
         warnings=tuple(warnings),
         motion="free",
+        fitted_by=now.attrs["fitted_by"],
     )
     return found, phase, body, rotor
 

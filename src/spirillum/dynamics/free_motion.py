@@ -29,6 +29,7 @@ from spirillum.dynamics.turn_map import STEPS
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile
+from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -158,7 +159,9 @@ def free_motion(
     warnings = (*held.warnings, *(checked.said if lies else ()), *_said(run, links, weight=weight))
     known = lies and checked.known
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
-    found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", lying=run.lying)
+    source = fitted_of(calibration, posterior).source_of(ready, held.model)
+    found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
+    found = replace(found, lying=run.lying)
     return FreeMotion(found, run, links, gap, laid, checked)
 
 

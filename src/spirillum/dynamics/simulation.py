@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,6 +121,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     central = own if known is None else known.central(own)
     choice, motion, said = chosen_run(model, motion, central, placed, calibration, known)
     model = choice.model
+    posterior_name = "" if known is None else known.source
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
@@ -150,6 +152,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             band=False,
             progress=tell,
         )
+        steady = replace(steady, fitted_by=posterior_name or steady.fitted_by)
         if table is not None:
             return run_in_tube(steady, table, timing, there, touching, rough, about, weight, tell)
         return held_run(steady, timing) if held else _free_run(steady, timing, placed, height, about, weight, tell)

@@ -27,7 +27,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
 from spirillum.swimming.cautions import flow_limit
-from spirillum.swimming.prediction import FREE_IN_TUBE, Prediction
+from spirillum.swimming.prediction import Prediction, free_in_tube
 from spirillum.units import show
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def run_in_tube(
     return dataset.assign_attrs(
         warnings="\n".join([*said, *checked.said]),
         error_estimate=error if checked.known else np.nan,
-        known_error=FREE_IN_TUBE,
+        known_error=free_in_tube(steady.fitted_by),
         table=table.key,
         error_against=TabledTube.error_against,
     )

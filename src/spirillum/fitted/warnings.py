@@ -44,7 +44,7 @@ class Fitted:
     file: CalibrationFile | None = None
     """The calibration file; None without one."""
     name: str = ""
-    """Its name."""
+    """Name of the file, with the observations of a posterior."""
 
     friction_coefficient: float | None = None
     """Coefficient of dry friction under a robot that was fitted; None: none was."""
@@ -67,6 +67,16 @@ class Fitted:
         placed = model.placed and (placement_in(self.file, robot) is not None or self.file.contact != FittedContact())
         known = any(value is not None for value in values)
         return placed or known or friction_of_tails(robot, self.friction) != (None, ())
+
+    def source_of(self, robot: Robot, model: SwimmerModel) -> str:
+        """Name of the file whose values act on a robot's answer with a model; empty where none does.
+
+        Args:
+            robot: the robot.
+            model: the hydrodynamic model.
+        """
+        name = self.name if self.file is None else Path(self.name).name
+        return name if self.serves(robot, model) else ""
 
     def idle_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[str]:
         """Models to which nothing of a calibration file applies.
@@ -197,6 +207,7 @@ def fitted_of(
             source,
             posterior.model,
             drawn=True,
+            name=posterior.source,
             friction_coefficient=None if rubbing is None else float(rubbing[0]),
         )
     if calibration is None:

@@ -38,10 +38,9 @@ from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
 from spirillum.units import KINDS, parse_option
 
-__all__ = ["FREE_IN_TUBE", "Prediction", "interval_statement", "predict", "with_middles"]
+__all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
 
-FREE_IN_TUBE = "walls, weight and contact are computed, nothing is fitted; roughness and dry friction are assumed"
-"""What a free motion in the tube rests on."""
+_NOTHING_FITTED = "nothing is fitted"
 
 
 @dataclass(frozen=True)
@@ -81,6 +80,8 @@ class Prediction(Shown):
     """Why the model was taken; None where nobody asked."""
     tail_rate: float | None = None
     """Lab rate of the tail that was asked for, rad/s; None: the robot's drive."""
+    fitted_by: str = ""
+    """File of a calibration or a posterior whose values act on the answer; empty without one."""
 
     def __getattr__(self, name: str) -> float:
         """A quantity by name, as a float."""
@@ -97,10 +98,11 @@ class Prediction(Shown):
     def known_error(self) -> str:
         """What the model leaves out of this robot, and what that costs it."""
         if self.lying is not None:
-            return FREE_IN_TUBE
+            return free_in_tube(self.fitted_by)
         if self.model.placed and self.intervals is not None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
-        return self.model.own_error(self.batch)
+        own = self.model.own_error(self.batch)
+        return own.replace(_NOTHING_FITTED, _taken_from(self.fitted_by)) if self.fitted_by else own
 
     @cached_property
     def placement(self) -> dict[str, Any]:
@@ -110,10 +112,11 @@ class Prediction(Shown):
 
     @property
     def answered_by(self) -> dict[str, str]:
-        """Name of the model, `form` where it has more than one, and `model_reason` where nobody named one."""
+        """The model, its `form` of several, `model_reason` where nobody named one, `fitted_by` where a file was."""
         form = {} if self.model.form is None else {"form": self.model.form}
         reason = {"model_reason": self.choice.reason} if self.choice is not None and self.choice.reason else {}
-        return {"model": self.model.name, **form, **reason}
+        fitted = {"fitted_by": self.fitted_by} if self.fitted_by else {}
+        return {"model": self.model.name, **form, **reason, **fitted}
 
     @cached_property
     def other_models(self) -> OtherModels | None:
@@ -291,6 +294,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         interval_of=interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
+        fitted_by=fitted.source_of(ready, chosen),
     )
 
 
@@ -370,6 +374,22 @@ class _Case:
                 f"E_x = {limit:.4g} N m s/rad with friction reading 'paper', which would turn the tail backwards"
             )
         return f"model '{self.model.name}' finds no steady motion for this robot; allowed: a robot inside its domain"
+
+
+def free_in_tube(fitted_by: str) -> str:
+    """What a free motion in the tube rests on.
+
+    Args:
+        fitted_by: file of a calibration or a posterior whose values act on it; empty without one.
+    """
+    computed = "walls, weight and contact are computed"
+    if fitted_by:
+        return f"{computed}, {_taken_from(fitted_by)}; roughness and dry friction are assumed where it has none"
+    return f"{computed}, {_NOTHING_FITTED}; roughness and dry friction are assumed"
+
+
+def _taken_from(source: str) -> str:
+    return f"what {source} has fitted is taken from it"
 
 
 def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:

@@ -16,7 +16,7 @@ from spirillum.cli.tables.parts import (
     show_reason,
     show_unsteady,
 )
-from spirillum.shown import rows_of
+from spirillum.shown import fitted_words, rows_of
 from spirillum.swimming.answer import headline
 
 __all__ = ["table"]
@@ -25,8 +25,7 @@ __all__ = ["table"]
 def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
     """Table of `predict`: the five quantities that matter most, or all of them."""
     show_unsteady(answer, console)
-    calibrated = "calibrated" if answer["calibrated"] else "not calibrated"
-    calibrated = "fitted (posterior)" if "interval_of" in answer else calibrated
+    calibrated = fitted_words(answer["calibrated"], answer.get("fitted_by", ""))
     free = ", free motion" if answer["motion"] == "free" else ""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {calibrated}{free}"
     only = None if all_of_it else headline(answer)

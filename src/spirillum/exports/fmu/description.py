@@ -11,6 +11,7 @@ from spirillum.dynamics.held_equations import OUTPUTS
 from spirillum.dynamics.held_model import PARAMETERS, HeldModel
 from spirillum.exports.fmu.units import base_units
 from spirillum.quantities import QUANTITIES
+from spirillum.shown import fitted_words
 from spirillum.version import own_version
 
 __all__ = ["SOURCE", "build_text", "description_text", "header_text", "identifier_of", "token_of"]
@@ -76,7 +77,7 @@ def description_text(held: HeldModel, token: str) -> str:
         instantiationToken=token,
         description=(
             f"{held.robot.name}, held to the axis of its channel: model {prediction.model.name}, friction "
-            f"{prediction.friction}, {'calibrated' if prediction.calibrated else 'not calibrated'}"
+            f"{prediction.friction}, {fitted_words(prediction.calibrated, prediction.fitted_by)}"
         ),
         generationTool=f"spirillum {own_version()}",
         variableNamingConvention="structured",
