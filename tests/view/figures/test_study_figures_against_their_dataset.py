@@ -282,3 +282,24 @@ def test_cut_names_of_robots_still_differ() -> None:
     tails = [f"wavelength 20 mm, amplitude {size} mm" for size in (2, 2.5)]
     assert told_apart(tails, 28) == tails
     assert told_apart(["a" * 40, "b" * 40], 28) == ["a" * 27 + "…", "b" * 27 + "…"]
+
+
+def test_speeds_with_a_band_are_no_upper_bound_and_settled_ones_are_drawn(tmp_path: Path) -> None:
+    """A band over open places reaches above the value at one; a robot that is let go swims at neither."""
+    dataset = sp.study(
+        {"models": ["tube"], "robots": ["biorob2012-wide"], "friction": ["none"], "band": True, "settled": True}
+    )
+    high = float(dataset["forward_velocity_high"].max())
+    assert high > float(dataset["forward_velocity"].max())
+    picture = figures_of(dataset)["robots"]
+    figure = picture.figure()
+    assert not any("upper bound" in text for text in [*texts(figure), picture.caption, picture.alternative])
+    assert any("no contact friction" in axes.get_ylabel() for axes in figure.axes)
+    assert "let go, in steady motion" in legend_entries(figure)
+    (stars,) = [line for line in figure.axes[2].get_lines() if line.get_marker() == "*"]
+    np.testing.assert_allclose(stars.get_ydata(), dataset["forward_velocity_settled"] / MM)
+    save(figure, tmp_path / "robots.png")
+    assert not any(
+        "let go" in entry
+        for entry in legend_entries(figures_of(dataset.drop_vars("forward_velocity_settled"))["robots"].figure())
+    )

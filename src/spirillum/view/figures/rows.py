@@ -27,6 +27,7 @@ __all__ = [
     "grid_rows",
     "model_handles",
     "robot_rows",
+    "settled_handles",
 ]
 
 MOST_CURVES = 6
@@ -40,6 +41,16 @@ _OBSERVED = COLOURS["black"]
 _SHADE = 0.25  # opacity of a band
 _OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
 """Look of the rotor's own friction: no model is drawn so."""
+_SETTLED: Any = {
+    "linestyle": "none",
+    "marker": "*",
+    "markersize": 8.0,
+    "color": COLOURS["black"],
+    "markerfacecolor": "white",
+    "zorder": 6,
+}
+"""Look of robots that were let go: no model is drawn so."""
+_SETTLED_WORDS = "Stars: in steady motion, let go in the tube on asperities and with dry friction that are assumed."
 Draw = Callable[[Axes, StudyView, Values], None]
 
 
@@ -129,19 +140,17 @@ def _own_drive(axes: Axes, part: StudyView, x: Values, name: str, scale: Scale) 
 
 
 def _own_rate_row(shown: StudyView) -> Row:
-    what = "motor rate, upper bound" if shown.upper_bound else "motor rate, own drive"
     hertz = Scale(Hz, "Hz")
 
     def draw(axes: Axes, part: StudyView, x: Values) -> None:
         _own_drive(axes, part, x, "motor_rotation_rate", hertz)
 
-    tells = "Motor rates are upper bounds: no contact friction." if shown.upper_bound else ""
-    return Row(f"{what}\n$\\omega_m$ (Hz)", draw, tells=tells)
+    what = f"motor rate\n{shown.bound_words} " if shown.shaded else f"motor rate, {shown.bound_words}\n"
+    return Row(f"{what}$\\omega_m$ (Hz)", draw, tells=shown.bound_sentence("Motor rates"))
 
 
 def bound_row(shown: StudyView) -> Row:
-    """Forward velocity with what friction is known to be there: an upper bound for a motor's robot."""
-    what = "forward velocity\nupper bound" if shown.upper_bound else "forward velocity\nown drive"
+    """Forward velocity with what friction is known to be there, held, and in steady motion where robots were let go."""
     labels = {"friction": list(shown.own_drive_readings)}
     scale = shown.scale("m/s", "forward_velocity", **labels)
 
@@ -150,9 +159,11 @@ def bound_row(shown: StudyView) -> Row:
         if part.observed:
             seen, half = part.values("observed_forward_velocity"), part.values("observed_forward_velocity_ci95")
             draw_means(axes, x, scale(seen), scale(half))
+        if part.settled:
+            axes.plot(x, scale(part.values("forward_velocity_settled")), **_SETTLED)
 
-    tells = "Speeds are upper bounds: no contact friction." if shown.upper_bound else ""
-    return Row(f"{what} $U_x$ ({scale.unit})", draw, tells=tells)
+    tells = f"{shown.bound_sentence('Speeds')} {_SETTLED_WORDS if shown.settled else ''}".strip()
+    return Row(f"forward velocity\n{shown.bound_words} $U_x$ ({scale.unit})", draw, tells=tells)
 
 
 def drawn_amplitudes(shown: StudyView) -> list[int]:
@@ -285,6 +296,11 @@ def band_handles(shown: StudyView) -> list[Line2D]:
         Line2D([], [], color=look_of_model(name).colour, alpha=_SHADE, **PATCH, label=f"{label_of_model(name)}: band")
         for name in shown.banded
     ]
+
+
+def settled_handles(shown: StudyView) -> list[Line2D]:
+    """Legend entry of the robots that were let go; none without such."""
+    return [Line2D([], [], **_SETTLED, label="let go, in steady motion")] if shown.settled else []
 
 
 def _model_entries(shown: StudyView) -> Iterator[Line2D]:

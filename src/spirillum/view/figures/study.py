@@ -14,7 +14,15 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from spirillum.view.figures.picture import Picture
-from spirillum.view.figures.rows import Row, amplitude_handles, bound_row, grid_rows, model_handles, robot_rows
+from spirillum.view.figures.rows import (
+    Row,
+    amplitude_handles,
+    bound_row,
+    grid_rows,
+    model_handles,
+    robot_rows,
+    settled_handles,
+)
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import PaperFigure, StudyView, spread
 from spirillum.view.figures.style import Scale, plain, told_apart
@@ -206,7 +214,8 @@ def _bound_picture(shown: StudyView) -> Picture:
     channels = spread(shown.whole.sizes["channel"], MOST_CHANNELS)
     wavelengths = spread(shown.whole.sizes["wavelength"], MOST_COLUMNS)
     bound = shown.upper_bound
-    title = "Forward velocity without contact friction: an upper bound" if bound else "Forward velocity, own drive"
+    whole_bound = ": an upper bound" if bound and not shown.shaded else ""
+    title = f"Forward velocity without contact friction{whole_bound}" if bound else "Forward velocity, own drive"
     notes = []
     if bound:
         notes.append(
@@ -220,12 +229,17 @@ def _bound_picture(shown: StudyView) -> Picture:
     part = shown.part(channel=channels, wavelength=wavelengths)
     notes += [
         note
-        for note in (shown.place_words, part.unanswered(), _left_out(shown, len(wavelengths), len(channels)))
+        for note in (
+            bound_row(shown).tells if shown.settled else "",
+            shown.place_words,
+            part.unanswered(),
+            _left_out(shown, len(wavelengths), len(channels)),
+        )
         if note
     ]
     alternative = (
         f"{len(channels) * len(wavelengths)} panels, a row for each channel and a column for each wavelength: forward "
-        f"velocity against wave amplitude{' as an upper bound' if bound else ''}. {shown.source_line}"
+        f"velocity against wave amplitude{' as an upper bound' if whole_bound else ''}. {shown.source_line}"
     )
     draw = partial(_draw_bound, shown, channels, wavelengths, title)
     return Picture.of(title, " ".join([shown.source_line, *notes]), alternative, draw)
@@ -242,7 +256,11 @@ def _frictions(shown: StudyView) -> list[str]:
 
 def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], title: str) -> Figure:
     speed_scale = shown.scale("m/s", "forward_velocity", friction=list(shown.own_drive_readings))
-    legend = [*model_handles(shown, own_drive=True), *_paper_entry(shown, channels, speed_scale)]
+    legend = [
+        *model_handles(shown, own_drive=True),
+        *settled_handles(shown),
+        *_paper_entry(shown, channels, speed_scale),
+    ]
     sheet = Sheet(
         title,
         shown.source_line,
@@ -258,7 +276,6 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
     scale = Scale.of(values, "m")
     x = scale(values[amplitudes])
     row = bound_row(shown)
-    what = "upper bound" if shown.upper_bound else "own drive"
     for number, channel in enumerate(channels):
         name = plain(str(shown.whole["channel"].values[channel]), 22)
         for axes, wavelength in zip(sheet.panels[number], wavelengths, strict=True):
@@ -273,7 +290,7 @@ def _draw_bound(shown: StudyView, channels: list[int], wavelengths: list[int], t
             speed = shown.paper_speed(channel)
             if speed is not None:
                 axes.axhline(speed[1] / speed_scale.factor, color="black", linestyle=_DASHED, linewidth=1.0)
-        _finish_row(sheet.panels[number], Row(f"{name}\n{what} $U_x$ ({speed_scale.unit})", row.draw))
+        _finish_row(sheet.panels[number], Row(f"{name}\n{shown.bound_words} $U_x$ ({speed_scale.unit})", row.draw))
     ends = [sheet.panels[number][0].get_ylim() for number in range(len(channels))]
     for number in range(len(channels)):  # one scale for all rows, which are there to be compared
         sheet.panels[number][0].set_ylim(min(low for low, _ in ends), max(high for _, high in ends))
@@ -317,7 +334,10 @@ def _draw_robots(shown: StudyView, places: list[int], title: str, rows: Sequence
     upright = _TICK_LETTER * longest * len(names) < width
     if not upright and 0.3 * len(names) < width:  # room for two lines
         names = [name.replace(", ", ",\n", 1) for name in names]
-    legend = model_handles(shown, own_drive=not shown.observed)
+    legend = [
+        *model_handles(shown, own_drive=not shown.observed),
+        *([] if shown.observed else settled_handles(shown)),
+    ]
     sheet = Sheet(
         title,
         shown.source_line,

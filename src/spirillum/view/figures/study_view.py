@@ -108,6 +108,37 @@ class StudyView:
         """Whether rates and speeds under the robots' own drive are upper bounds: a motor without contact friction."""
         return self.motor_driven and self.friction_unset
 
+    @property
+    def shaded(self) -> bool:
+        """Whether values have a band or an interval, which reaches to either side of them."""
+        return bool(self.banded or self.with_intervals)
+
+    @property
+    def bound_words(self) -> str:
+        """What a value under the robots' own drive is, for a label."""
+        if not self.upper_bound:
+            return "own drive"
+        return "no contact friction" if self.shaded else "upper bound"
+
+    def bound_sentence(self, what: str) -> str:
+        """What values under the robots' own drive bound, for a note; empty where they bound nothing.
+
+        Args:
+            what: the quantity in the plural, with a capital.
+        """
+        if not self.upper_bound:
+            return ""
+        if not self.shaded:
+            return f"{what} are upper bounds: no contact friction."
+        return f"{what} are without contact friction, which slows a robot down; shades may reach above their marks."
+
+    @property
+    def settled(self) -> bool:
+        """Whether robots that were let go came to a steady motion."""
+        return "forward_velocity_settled" in self.whole and bool(
+            np.isfinite(self.whole["forward_velocity_settled"]).any()
+        )
+
     @cached_property
     def friction_unset(self) -> bool:
         """Whether reading `rotor` holds the rotor's own B_m alone."""
@@ -121,9 +152,11 @@ class StudyView:
     def reading_label(self, reading: str) -> str:
         """Words for a reading of the friction in a legend."""
         if reading == "none":
-            return "no contact friction (upper bound)" if self.motor_driven else "no friction"
+            return (
+                f"no contact friction{'' if self.shaded else ' (upper bound)'}" if self.motor_driven else "no friction"
+            )
         if reading == "rotor" and self.upper_bound:
-            return "rotor friction $B_m$ only (upper bound)"
+            return f"rotor friction $B_m$ only{'' if self.shaded else ' (upper bound)'}"
         return f"friction reading '{reading}'"
 
     @property
