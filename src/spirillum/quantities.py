@@ -40,7 +40,13 @@ _STEADY = (
     Quantity("body_rotation_rate", r"\Omega_x", "rad/s", "rotation rate Omega_x of the body", "eqs (2), (15)"),
     Quantity("motor_rotation_rate", r"\omega_m", "rad/s", "motor rate omega_m = omega - Omega_x", "Table II"),
     Quantity("tail_torque", "T_h", "N m", "hydrodynamic torque T_h on the rotor, magnitude", "eqs (12), (18)"),
-    Quantity("drive_torque", "T_d", "N m", "torque that turns the rotor against the fluid", "eq. (18)"),
+    Quantity(
+        "drive_torque",
+        "T_d",
+        "N m",
+        "torque that turns the rotor against the fluid, after friction in the joint",
+        "eq. (18)",
+    ),
     Quantity("motor_current", "I", "A", "motor current I", "eq. (17)"),
     Quantity("battery_voltage", "V", "V", "battery voltage V(I) at the terminals", "Table II"),
     Quantity(
@@ -54,7 +60,7 @@ _STEADY = (
         "motor_residual_torque", "", "N m", "motor torque that the friction reading leaves unexplained", "eq. (18)"
     ),
     Quantity("electrical_power", "P_e", "W", "electrical power at the battery's terminals", "Table II"),
-    Quantity("shaft_power", "P_s", "W", "drive torque times motor rate", "eq. (18)"),
+    Quantity("shaft_power", "P_s", "W", "drive_torque times motor rate", "eq. (18)"),
     Quantity("friction_power", "P_f", "W", "power lost to friction", "eqs (18), (19)"),
     Quantity(
         "dissipated_power",
@@ -142,10 +148,17 @@ _RUNS = (
     Quantity("yaw", "", "rad", "angle of the motor axis to the left, towards +y", "definition"),
     Quantity("wall_gap", "", "m", "smallest distance of body and tail to the channel's wall", "geometry"),
     Quantity("duty", "", "1", "duty of the drive; 0 while the remote is off", "definition"),
-    Quantity("drive_power", "", "W", "power of the drive's torque, before friction", "(18)"),
+    Quantity(
+        "drive_power",
+        "",
+        "W",
+        "torque of the drive before friction (of a motor: motor_torque, not drive_torque) times motor rate; of a robot "
+        "in one piece times body rate, and torque of the field times rotation rate",
+        "(18)",
+    ),
     Quantity("motor_torque", "T_m", "N m", "motor torque K_m I, before friction", "(18)"),
     Quantity("motor_resistance", "R", "ohm", "equivalent resistance R(I)", "Table II"),
-    Quantity("drive_energy", "", "J", "work of the drive's torque, before friction", _LINKS),
+    Quantity("drive_energy", "", "J", "integral of drive_power", _LINKS),
     Quantity("friction_energy", "", "J", "energy lost to friction", _LINKS),
     Quantity("dissipated_energy", "", "J", "energy dissipated in the fluid", _LINKS),
     Quantity("electrical_energy", "", "J", "energy from the battery's terminals", _LINKS),

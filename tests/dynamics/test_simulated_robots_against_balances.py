@@ -35,6 +35,9 @@ def test_energy_is_balanced_along_the_trajectory(reading: str) -> None:
     spent = run["friction_energy"] + run["dissipated_energy"] + lifted
     scale = float(run["drive_energy"][-1])
     np.testing.assert_allclose(run["drive_energy"] / scale, spent / scale, atol=1e-7)
+    for name, torque in (("drive_power", "motor_torque"), ("shaft_power", "drive_torque")):
+        np.testing.assert_allclose(run[name], run[torque] * run["motor_rotation_rate"], rtol=1e-9, atol=1e-15)
+        assert torque in run[name].attrs["long_name"]
 
 
 def test_lying_robot_swims_between_held_and_free() -> None:
