@@ -25,6 +25,7 @@ from spirillum.swimming.lying import Lying, State
 def test_statement_says_whether_and_why(state: State, rate: float, words: str) -> None:
     lying = Lying(state, 0.0, 1e-3, (1e-3, 1e-3), 0.0, 0.0, rate, 0.0, 10.0, np.nan, "the battery")
     assert re.match(words, lying.statement)
+    assert lying.to_dict()["gap"]["over"] == ("a circuit" if state == "goes around" else "a turn of the tail")
 
 
 def test_means_are_over_the_last_circuit() -> None:

@@ -51,10 +51,14 @@ def held_against_check(
     near = np.flatnonzero(gap < least)
     if near.size and not beyond.size:
         said.append(
-            f"{_from(time, near[0])}its gap falls to {_length(float(gap[near].min()))}, and its table was checked at "
-            f"gaps from {_length(least)} on: the error estimate is that of such places"
+            f"{_falls(time, near[0])} {_length(float(gap[near].min()))}, and its table was checked at gaps from "
+            f"{_length(least)} on: the error estimate is that of such places"
         )
     return Checked(not beyond.size, bool(near.size), said)
+
+
+def _falls(time: Samples | None, first: int) -> str:
+    return "its least gap within a turn is" if time is None else f"{_from(time, first)}its gap falls to"
 
 
 def _from(time: Samples | None, first: int) -> str:

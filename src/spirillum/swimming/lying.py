@@ -64,11 +64,12 @@ class Lying:
     def to_dict(self) -> dict[str, Any]:
         """The object `lying` of an answer."""
         low, high = self.gap_range
+        over = "a circuit" if self.state == "goes around" else "a turn of the tail"
         return {
             "state": self.state,
             "statement": self.statement,
             "azimuth": quantity(self.azimuth, "rad"),
-            "gap": quantity(self.gap, "m", low=low, high=high, kind="range", over="a turn of the tail"),
+            "gap": quantity(self.gap, "m", low=low, high=high, kind="range", over=over),
             "wall_pitch": quantity(self.pitch, "rad"),
             "wall_yaw": quantity(self.yaw, "rad"),
             "orbit_rate": quantity(self.orbit_rate, "rad/s"),

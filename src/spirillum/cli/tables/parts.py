@@ -83,7 +83,7 @@ def show_lying(lying: Answer, console: Console) -> None:
     for name, item in lying.items():
         if isinstance(item, Mapping) and item["value"] not in (None, 0.0):
             words = _TIMES.get(name, name.replace("_", " "))
-            said.append(f"{words} {' '.join(friendly(item['value'], item['unit']))}".rstrip())
+            said.append(f"{words} {' '.join(friendly(item['value'], item['unit']))}{_range_words(item)}".rstrip())
     console.print(f"laid down there and followed: {', '.join(said)}", highlight=False, soft_wrap=True)
 
 
@@ -97,6 +97,13 @@ _STATES = {
     "goes around": "goes around the tube",
     "changing": "still changing",
 }
+
+
+def _range_words(item: Mapping[str, Any]) -> str:
+    """Over what a value of a steady motion is a mean, and its least value there."""
+    if item.get("kind") != "range" or item["low"] is None:
+        return ""
+    return f" (mean over {item['over']}, at least {' '.join(friendly(item['low'], item['unit']))})"
 
 
 def _band_words(item: Mapping[str, Any]) -> str:

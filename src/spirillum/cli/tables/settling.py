@@ -35,7 +35,7 @@ def table(answer: Answer, console: Console) -> None:
     drainage = answer["drainage_time"]
     if drainage["value"] is not None:
         gap = in_unit(drainage["until"]["value"], "m", "mm")
-        passing = grid(f"as the gap first falls to {gap} mm", "quantity", "value", "unit", "SI")
+        passing = grid(f"on the way, as the gap first falls to {gap} mm", "quantity", "value", "unit", "SI")
         add_quantities(passing, answer["passing"])
         console.print(passing)
     if answer["film"]["gap"]["value"]:
