@@ -108,7 +108,9 @@ def _statement(found: list[OtherModel], model: SwimmerModel) -> str:
         return f"closed forms say {bare}: they leave out the flow between body and tail"
     fitted = [item for item in found if item.calibrated]
     more = f"; with calibration factors, which stand for the walls, {_times(fitted)}" if fitted else ""
-    apart = " (sbt and rft leave out the flow between body and tail, too)"
+    names = [name for name in dict.fromkeys(item.model for item in found) if SWIMMER_MODELS[name].closed_form]
+    leave = f"{' and '.join(names)} {'leaves' if len(names) == 1 else 'leave'}"
+    apart = f" ({leave} out the flow between body and tail, too)" if names else ""
     return f"models without walls say {bare}{apart}{more}"
 
 
