@@ -18,6 +18,7 @@ WIDE = "biorob2012-wide"
         (["predict"], "Missing argument"),
         (["swim"], "No such command"),
         (["predict", WIDE, "--modle", "sbt"], "No such option"),
+        (["simulate", WIDE, "--tail-rate", "1Hz", "-o", "x.nc"], "--set drive.kind=rate --set drive.rate=1.2Hz"),
         (["predict", "biorob2012-wild"], "did you mean biorob2012-wide?"),
         (["predict", "missing.toml"], "missing.toml does not exist"),
         (["predict", "."], "is a folder"),

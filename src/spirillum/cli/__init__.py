@@ -21,6 +21,11 @@ __all__ = ["main"]
 
 _NAMING = ("measure", "setup", "virtual-experiment")
 """Commands whose arguments name files and folders."""
+_INSTEAD = {
+    ("simulate", "--tail-rate"): "--tail-rate is no option of simulate, in which the drive turns the tail; allowed: a "
+    "drive that prescribes the rate, --set drive.kind=rate --set drive.rate=1.2Hz",
+}
+"""What is said of options that only other commands have, by command and option."""
 _PLACES = (errno.ENAMETOOLONG, errno.ELOOP, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.EISDIR)
 """What is wrong with a name or place, not with the program."""
 _AGAIN = 0.02
@@ -160,7 +165,9 @@ def _of_usage(error: Any) -> str:
     names = getattr(getattr(error, "param", None), "opts", None)
     if isinstance(error.__cause__, ValidationError) and names:
         return refused_value(error.__cause__, names[0])
-    return str(error.format_message())
+    command = getattr(getattr(error, "ctx", None), "info_name", "")
+    instead = _INSTEAD.get((command, getattr(error, "option_name", "")))
+    return instead or str(error.format_message())
 
 
 def _of_place(error: OSError) -> str:

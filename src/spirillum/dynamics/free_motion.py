@@ -135,8 +135,8 @@ def free_motion(
     ready, _, batch = prepared(own, "tube", calibration=calibration, placement=placed)
     if batch.drive == "magnetic":
         raise InputError(
-            "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: `simulate`, or motion "
-            "'held'"
+            "drive.kind = 'magnetic': the field tells one time of a turn from another; allowed: drive.kind = "
+            "'dc-motor', 'rate' or 'torque', `simulate`, or motion 'held'"
         )
     rough, touching = with_contact(contact, height, asked)
     check_in_tube(ready, placed, touching, rough)
