@@ -16,9 +16,9 @@ import numpy as np
 from spirillum.robust import mad_scale
 from spirillum.vision.track.track import Track
 
-__all__ = ["without_lead"]
+__all__ = ["LEADING", "without_lead"]
 
-_LEADING = 6
+LEADING = 6
 """First frames that are left out; with three, ahead frames were left in, and nine cost more than they gave."""
 _FEWEST = 40
 """Fewest frames of a track from which they are left out."""
@@ -38,7 +38,7 @@ def without_lead(track: Track) -> Track:
     """
     if track.time.size < _FEWEST or not _leads(track):
         return track
-    first = np.arange(track.time.size) < _LEADING
+    first = np.arange(track.time.size) < LEADING
     return replace(
         track,
         position=np.where(first[:, None], np.nan, track.position),
@@ -49,7 +49,7 @@ def without_lead(track: Track) -> Track:
 
 def _leads(track: Track) -> bool:
     """Whether place and angles on the first frame are ahead of a line through the next ones."""
-    near, ahead = slice(_LEADING, _LEADING + _BESIDE), []
+    near, ahead = slice(LEADING, LEADING + _BESIDE), []
     time = track.time - track.time[0]
     for series in (track.position[:, 0], track.body_angle, track.tail_phase):
         known = np.isfinite(series[near])
