@@ -76,6 +76,27 @@ def test_feasibility_says_yes_and_no(run: Run, setup_file: str) -> None:
     assert [check["name"] for check in answer["checks"] if not check["passed"]] == ["tail-rate"]
 
 
+def test_feasibility_takes_one_film(run: Run, setup_file: str) -> None:
+    outcome = run("measure", "a.mp4", "b.mp4", "--feasibility", "--setup", setup_file)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "--feasibility with 2 videos" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--view-width", "160mm"], "view-width = 160mm with the video none.mp4"),
+        (["--width", "640"], "width = 640 with the video none.mp4"),
+    ],
+)
+def test_feasibility_takes_no_size_that_its_film_shows(
+    run: Run, setup_file: str, options: list[str], words: str
+) -> None:
+    outcome = run("measure", "none.mp4", "--feasibility", "--setup", setup_file, *options)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert words in outcome.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -92,8 +113,13 @@ def test_feasibility_says_yes_and_no(run: Run, setup_file: str) -> None:
         (["a.mp4", "--setup", "SETUP", "--start", "2"], 'start = "2" has no unit'),
         (["a.mp4", "--setup", "SETUP", "--marks", "none.csv"], "none.csv does not exist"),
         (["nowhere.mp4", "--setup", "SETUP"], "nowhere.mp4 does not exist"),
-        (["a.mp4", "b.mp4", "--feasibility", "--setup", "SETUP"], "--feasibility with 2 videos"),
-        (["--feasibility", "--setup", "SETUP", "--start", "1s"], "--start = 1s with --feasibility"),
+        (["a.mp4", "--feasibility", "--setup", "SETUP"], "--output with --feasibility"),
+        (["--feasibility", "--setup", "SETUP", "--start", "1s"], "--output, --start with --feasibility"),
+        (
+            ["--feasibility", "--setup", "SETUP", "--marks", "none.csv", "--track", "none.csv", "--no-tracking"],
+            "--output, --marks, --no-tracking, --track with --feasibility",
+        ),
+        (["a.mp4", "--setup", "SETUP", "--width", "640"], "--width without --feasibility"),
     ],
 )
 def test_bad_usage_is_one_sentence_and_leaves_nothing(

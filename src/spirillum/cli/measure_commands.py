@@ -18,7 +18,15 @@ _BY_HAND = "Instead of the tracker"
 _Rate = typer.Option(metavar="RATE", help="Expected rate, such as 1.2Hz; else predicted.", rich_help_panel=_FEASIBILITY)
 
 
+_APART = {
+    False: ("output", "marks", "no_tracking", "track", "no_annotated", "no_figures", "start", "end"),
+    True: ("expect_tail_rate", "expect_body_rate", "expect_speed", "duration", "fps", "view_width", "width"),
+}
+"""Options of one way alone: of measuring, and of `--feasibility`."""
+
+
 def measure(
+    context: typer.Context,
     videos: Annotated[
         list[Path] | None, typer.Argument(metavar="VIDEO...", help="Films or folders of images, one a trial.")
     ] = None,
@@ -76,7 +84,9 @@ def measure(
         str | None,
         typer.Option(metavar="LENGTH", help="Width of the view at the robot's axis.", rich_help_panel=_FEASIBILITY),
     ] = None,
-    width: Annotated[int, typer.Option(help="Width of the picture, pixels.", rich_help_panel=_FEASIBILITY)] = 640,
+    width: Annotated[
+        int | None, typer.Option(help="Width of the picture, pixels; else 640.", rich_help_panel=_FEASIBILITY)
+    ] = None,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -90,14 +100,12 @@ def measure(
     if setup is None:
         raise InputError("--setup is missing; allowed: a setup file, see `spirillum setup new`")
     overrides = overrides_from(settings)
+    _check_apart(context, feasibility=feasibility)
     if feasibility:
         from spirillum.measurement.feasibility import feasibility as verdict
 
         if videos and len(videos) > 1:
             raise InputError(f"--feasibility with {len(videos)} videos; allowed: none, or one that shows the ruler")
-        for name, value in (("start", start), ("end", end)):
-            if value is not None:
-                raise InputError(f"--{name} = {value[:40]} with --feasibility; allowed: to measure a part of a video")
         found = verdict(
             setup,
             tail_rate=expect_tail_rate,
@@ -114,7 +122,6 @@ def measure(
         if not found.feasible:
             raise typer.Exit(1)
         return
-    _check_no_expectations(expect_tail_rate, expect_body_rate, expect_speed, duration, fps, view_width)
     from spirillum.measurement.trials import RATE_NAMES
     from spirillum.results.measurement import measure as answer
 
@@ -145,11 +152,20 @@ def measure(
         raise InputError(f"{trial.video}: no rate could be given: {trial.quantities['forward_velocity'].reason}")
 
 
-def _check_no_expectations(*given: object) -> None:
+def _check_apart(context: typer.Context, *, feasibility: bool) -> None:
+    """Refuse options of the other way.
+
+    Raises:
+        InputError: naming all of them.
+    """
     from spirillum.errors import InputError
 
-    if any(item is not None for item in given):
-        raise InputError("--expect-..., --duration, --fps and --view-width without --feasibility; allowed: with it")
+    sources = {name: context.get_parameter_source(name) for name in _APART[not feasibility]}
+    given = [f"--{name.replace('_', '-')}" for name, source in sources.items() if source and source.name != "DEFAULT"]
+    if given and feasibility:
+        raise InputError(f"{', '.join(given)} with --feasibility, which measures nothing; allowed: without it")
+    if given:
+        raise InputError(f"{', '.join(given)} without --feasibility; allowed: with it")
 
 
 def _time(name: str, value: str | None) -> float | None:

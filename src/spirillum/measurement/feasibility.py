@@ -142,7 +142,7 @@ def feasibility(
     duration: str | float | None = None,
     frames_per_second: float | None = None,
     view_width: str | float | None = None,
-    picture_width: int = _WIDTH,
+    picture_width: int | None = None,
     video: str | Path | None = None,
     overrides: Mapping[str, Any] | None = None,
 ) -> Feasibility:
@@ -157,13 +157,14 @@ def feasibility(
         duration: length of a trial; unset: 20 s.
         frames_per_second: of the camera; unset: the setup's, else 30.
         view_width: width of the field of view at the height of the axis; replaces the scale of the setup.
-        picture_width: width of the picture, pixels.
-        video: a film or folder of images from whose ruler the scale is fitted.
+        picture_width: width of the picture, pixels; unset: 640, or the video's.
+        video: a film or folder of images from whose ruler the scale is fitted, in place of `view_width`.
         overrides: dotted fields of the robot, as for `spirillum.load`.
 
     Raises:
         InputError: if a field is wrong, or the robot's motion cannot be predicted and is not given.
     """
+    _check_video(video, view_width, picture_width)
     chosen, robot = load_setup(setup)
     if overrides:
         beside = Path(setup).parent / chosen.robot.file
@@ -179,9 +180,10 @@ def feasibility(
     span = _DURATION if duration is None else parse_option("duration", duration, KINDS["time"])
     if not 0.0 < span <= _LONGEST:
         raise InputError(f"duration = {span:g} s; allowed: more than 0 s, at most {_LONGEST:g} s (a day)")
-    if not 32 <= picture_width <= 100_000:
-        raise InputError(f"width = {picture_width}; allowed: 32 to 100000 pixels")
-    pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, picture_width, video)
+    width = _WIDTH if picture_width is None else picture_width
+    if not 32 <= width <= 100_000:
+        raise InputError(f"width = {width}; allowed: 32 to 100000 pixels")
+    pixel, source, width = _pixel(chosen, Path(setup).parent, view_width, width, video)
     expected |= {
         "duration": (span, "assumed" if duration is None else "given"),
         "frames_per_second": (rate, source_of_rate),
@@ -201,6 +203,17 @@ def feasibility(
     intervals = _intervals(expected, robot, pixel, len(stripes), shares, rate, measured) if seen else {}
     warnings = (*_warnings(checks, expected, pixel, shares), *caution)
     return Feasibility(robot, str(setup), expected, tuple(checks), intervals, measured, shares, warnings)
+
+
+def _check_video(video: str | Path | None, view_width: str | float | None, picture_width: int | None) -> None:
+    """Refuse what a film states itself.
+
+    Raises:
+        InputError: naming the film and the option.
+    """
+    for name, value in (("view-width", view_width), ("width", picture_width)):
+        if video is not None and value is not None:
+            raise InputError(f"{name} = {value} with the video {video}, which shows its own; allowed: one of the two")
 
 
 def _warnings(
