@@ -80,6 +80,38 @@ def test_a_few_tails_name_no_winner(ranking: Any, count: int) -> None:
     assert "too few to tell sbt and rft apart" in short.verdict()
 
 
+@pytest.mark.parametrize(("count", "said"), [(1, "1 robot"), (2, "2 robots"), (3, "3 robots")])
+def test_a_few_tails_have_no_standard_error(
+    ranking: Any, count: int, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Over one tail it would be 0, over two the half of how far they are apart."""
+    from dataclasses import replace
+    from types import SimpleNamespace
+
+    from rich.console import Console
+
+    from spirillum.calibration.ranking import _cautions
+    from spirillum.cli.tables.model_ranking import table
+
+    few = tuple(
+        replace(item, pointwise=item.pointwise[:count], difference=-30.0 * place, difference_error=0.0)
+        for place, item in enumerate(ranking.ranked)
+    )
+    answer = replace(ranking, ranked=few).to_dict()
+    for item in answer["models"]:
+        assert item["difference"]["standard_error"] is None
+        assert item["expected_log_density"]["standard_error"] is None
+    table(answer, Console(width=300))
+    printed = capsys.readouterr().out
+    assert "-30.0 (error: -)" in printed
+    assert "+-" not in printed
+    fit = SimpleNamespace(experiment=SimpleNamespace(size=count, synthetic=False), warnings=())
+    words = _cautions([replace(ranking.best, fit=fit, pareto=np.zeros(count))])
+    assert words == [
+        f"only {said}: standard errors of the log density are withheld, for over fewer than 4 they are chance"
+    ]
+
+
 def test_failures_say_on_which_scale_they_are(ranking: Any, capsys: pytest.CaptureFixture[str]) -> None:
     from rich.console import Console
 

@@ -28,7 +28,7 @@ from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
 from spirillum.robot.load import PAPER_ROBOTS
-from spirillum.shown import Shown
+from spirillum.shown import Shown, counted
 
 __all__ = ["Ranked", "Ranking", "rank_models", "ranked_fits"]
 
@@ -38,6 +38,8 @@ _PARETO = 0.7
 """Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
 _FEWEST_ROBOTS = 4
 """Below that number a standard error over the robots is chance, and no model is named the better."""
+_MANY_ROBOTS = 10
+"""Below that number the standard error itself is hardly known."""
 _WORST = 3
 _MODELS = ("sbt", "rft")
 _FREE = "body_drag,body_rotation"
@@ -88,11 +90,15 @@ class Ranking(Shown):
         return self.ranked[0]
 
     @property
+    def enough(self) -> bool:
+        """Whether there are robots enough for a standard error over them."""
+        return self.best.pointwise.size >= _FEWEST_ROBOTS
+
+    @property
     def clear(self) -> bool:
         """Whether the best is better than the second beyond doubt."""
         second = self.ranked[1] if len(self.ranked) > 1 else None
-        enough = self.best.pointwise.size >= _FEWEST_ROBOTS
-        return enough and second is not None and -second.difference > _CLEAR * second.difference_error
+        return self.enough and second is not None and -second.difference > _CLEAR * second.difference_error
 
     def verdict(self) -> str:
         """The ranking in a sentence."""
@@ -100,8 +106,8 @@ class Ranking(Shown):
         if len(names) == 1:
             return f"only {names[0]} was fitted"
         second = self.ranked[1]
-        count = self.best.pointwise.size
-        if count < _FEWEST_ROBOTS:
+        if not self.enough:
+            count = self.best.pointwise.size
             few = "1 tail is" if count == 1 else f"{count} tails are"
             return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {_FEWEST_ROBOTS} are needed"
         how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
@@ -129,14 +135,18 @@ class Ranking(Shown):
             ]
         return sorted(found, key=_size)[:_WORST]
 
+    def _known(self, standard_error: float) -> float | None:
+        """A standard error over the robots; None where there are too few of them."""
+        return standard_error if self.enough else None
+
     def to_dict(self) -> dict[str, Any]:
         """The answer of `spirillum rank-models --json`."""
         experiment = self.best.fit.experiment
         models = [
             {
                 "model": item.model,
-                "expected_log_density": quantity(item.elpd, "1", standard_error=item.standard_error),
-                "difference": quantity(item.difference, "1", standard_error=item.difference_error),
+                "expected_log_density": quantity(item.elpd, "1", standard_error=self._known(item.standard_error)),
+                "difference": quantity(item.difference, "1", standard_error=self._known(item.difference_error)),
                 "largest_pareto_k": quantity(float(item.pareto.max()), "1"),
                 "discrepancy": {name: quantity(v.value, "1") for name, v in item.fit.discrepancy.items()},
                 "parameters": {c.label: _fitted(item.fit, c) for c in item.fit.problem.coordinates},
@@ -262,10 +272,14 @@ def _cautions(ranked: Sequence[Ranked]) -> list[str]:
                 f"trusted (Pareto k above {_PARETO:g}): {'it decides' if bad == 1 else 'each of them decides'} the fit"
             )
         said += [f"{item.model}: {sentence}" for sentence in item.fit.warnings if "may not be used" in sentence]
-    if ranked[0].fit.experiment.size < 10:
-        count = ranked[0].fit.experiment.size
-        robots = "1 robot" if count == 1 else f"{count} robots"
-        said.append(f"only {robots}: differences of the log density are hardly known")
+    count = ranked[0].fit.experiment.size
+    if count < _FEWEST_ROBOTS:
+        said.append(
+            f"only {counted(count, 'robot')}: standard errors of the log density are withheld, for over fewer than "
+            f"{_FEWEST_ROBOTS} they are chance"
+        )
+    elif count < _MANY_ROBOTS:
+        said.append(f"only {count} robots: differences of the log density are hardly known")
     if ranked[0].fit.experiment.synthetic:
         said.append(synthetic_warning(ranked[0].fit.experiment.source))
     return said

@@ -23,8 +23,7 @@ def table(answer: Answer, console: Console) -> None:
     compared = [name for name in CALLED if any(name in item["discrepancy"] for item in answer["models"])]
     rows = grid("", "model", "log density", "difference", *(f"misses {CALLED[name]} by" for name in compared))
     for item in answer["models"]:
-        difference = item["difference"]
-        apart = "-" if difference["value"] == 0 else f"{difference['value']:.1f} +- {difference['standard_error']:.1f}"
+        apart = _apart(item["difference"])
         misses = [item["discrepancy"].get(name) for name in compared]
         shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
         rows.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
@@ -52,3 +51,11 @@ def _failures(item: Answer) -> str:
     if largest < _STANDS_OUT:
         return f"{words}: no tail stands out from what it misses everywhere"
     return words
+
+
+def _apart(difference: Answer) -> str:
+    """A difference with its standard error; a dash for that of the best model, and for an error that is withheld."""
+    if difference["value"] == 0:
+        return "-"
+    error = difference["standard_error"]
+    return f"{difference['value']:.1f} (error: -)" if error is None else f"{difference['value']:.1f} +- {error:.1f}"
