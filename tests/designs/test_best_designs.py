@@ -1,14 +1,17 @@
 """Designs against closed forms, other optimisers, and what they say of themselves."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import direct, minimize_scalar
 
 import spirillum as sp
+from spirillum.designs.answer import Learned
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
+from spirillum.designs.leads import lead_warnings
 from spirillum.designs.reading import condition_of, quantity_of
 from spirillum.designs.search import Archive, best_design
 from spirillum.designs.space import space_of
@@ -166,6 +169,25 @@ def test_what_a_design_says_of_itself_holds(unsure: sp.Design) -> None:
     assert today.objective < unsure.objective
     assert today.beaten_low < today.beaten < today.beaten_high
     assert sp.predict(unsure.robot, model="sbt").forward_velocity > 0
+
+
+def test_a_lead_within_the_models_error_is_no_lead(unsure: sp.Design) -> None:
+    """The best design is two per cent ahead of today's, by a model whose speeds are some 15 % off."""
+    lead = 1.0 - unsure.alternatives[0].objective / unsure.objective
+    assert 0 < lead < 0.15
+    (sentence,) = (sentence for sentence in unsure.warnings if "than the error of 15 %" in sentence)
+    assert f"leads today's design by {100 * lead:.2g} %" in sentence
+
+
+def test_a_lead_within_the_error_of_a_learned_model_is_no_lead(unsure: sp.Design) -> None:
+    """Today's design is solved for, and the best one known to 0.1 %; others are interpolated, to 2 %."""
+    close = {"objective": 0.99 * unsure.objective, "keeps": True}
+    one_per_cent = tuple(replace(item, **close) for item in unsure.alternatives)
+    learned = replace(unsure, model="tube", learned=Learned(20, 1e-3, 2e-2), alternatives=one_per_cent)
+    (sentence,) = lead_warnings(learned)
+    assert "differ by a tenth of a range or more by 1 %, less than the error of 2 % with which the learned" in sentence
+    breaking = tuple(replace(item, keeps=False) for item in one_per_cent)
+    assert lead_warnings(replace(learned, alternatives=breaking)) == ()
 
 
 def test_whole_turns_and_windings() -> None:

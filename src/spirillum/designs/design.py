@@ -13,6 +13,7 @@ from spirillum.arrays import Flags, Samples
 from spirillum.designs.answer import Alternative, Design, Uncertainty
 from spirillum.designs.bench import Bench
 from spirillum.designs.evaluation import Evaluation, Objective
+from spirillum.designs.leads import lead_warnings
 from spirillum.designs.learned import chosen_model, is_learned
 from spirillum.designs.learning import learned_best
 from spirillum.designs.options import Judged
@@ -129,7 +130,8 @@ def design(
     drawn = unknowns.draws(_MORE_DRAWS * options.draws, options.seed + _STATED_SEED, _SETS)
     stated = replace(searched, drawn=drawn)
     answer = _answer(given, unknowns, searched, stated, best.shares, archive, front)
-    return replace(answer, learned=learned, model_reason=choice.reason)
+    answer = replace(answer, learned=learned, model_reason=choice.reason)
+    return replace(answer, warnings=(*answer.warnings, *lead_warnings(answer)))
 
 
 def _objectives(maximise: str | Sequence[str], minimise: str | Sequence[str], options: Judged) -> tuple[Objective, ...]:

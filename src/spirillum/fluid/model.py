@@ -98,6 +98,9 @@ class ResistanceModel(ABC):
 class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
+    speed_error: ClassVar[float | None] = None
+    """Relative error of the speed of the paper's robot that `known_error` says in words; None where it says none."""
+
     def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
         """This model at another resolution: the relative difference of the forward velocities is the error estimate.
 

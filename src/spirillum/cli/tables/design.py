@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import Answer, add_bands, add_quantities, friendly, grid, show_reason
+from spirillum.designs.leads import ALTERNATIVES
 from spirillum.units import display_unit, in_unit
 
 __all__ = ["table"]
@@ -84,10 +85,9 @@ def _quantities(answer: Answer, console: Console) -> None:
 def _compared(answer: Answer) -> list[str]:
     found = []
     for other in answer["alternatives"]:
-        name = {"today": "today's design", "runner_up": "the best design elsewhere"}[other["name"]]
         fields = ", ".join(f"{path} {_text(item)}" for path, item in other["design"].items())
         value = _text(other["objective"])
-        words = f"{name} ({fields}): {value}"
+        words = f"{ALTERNATIVES[other['name']]} ({fields}): {value}"
         if not other["keeps_conditions"]:
             words += ", does not keep all conditions"
         if "uncertainty" in answer:

@@ -1,0 +1,54 @@
+"""Whether the best design leads others by more than the error of what it was found with."""
+
+from __future__ import annotations
+
+import math
+
+from spirillum.designs.answer import Alternative, Design
+from spirillum.fluid.registry import find_swimmer_model
+
+__all__ = ["ALTERNATIVES", "lead_warnings"]
+
+ALTERNATIVES = {
+    "today": "today's design",
+    "runner_up": "the best of the designs that differ by a tenth of a range or more",
+}
+"""What the designs are called that the best one is compared with."""
+
+
+def lead_warnings(answer: Design) -> tuple[str, ...]:
+    """A sentence for each design that the best one leads by less than the error that is stated of its objective.
+
+    Args:
+        answer: the best design, with how well a learned model is known.
+    """
+    found = []
+    best, sign = answer.objective, answer.objectives[0].sign
+    for other in answer.alternatives:
+        error, of = _error(answer, other)
+        if not (other.keeps and math.isfinite(other.objective) and best):
+            continue
+        lead = sign * (best - other.objective) / abs(best)
+        if lead < error:
+            found.append(
+                f"the best design leads {ALTERNATIVES[other.name]} by {100 * lead:.2g} %, less than the error of "
+                f"{100 * error:.2g} % {of}: it is surely the better one only as far as both share that error"
+            )
+    return tuple(found)
+
+
+def _error(answer: Design, other: Alternative) -> tuple[float, str]:
+    """The largest relative error that is stated of the objective, and of what it is; 0 where none is stated."""
+    objective = answer.objectives[0]
+    errors = {}
+    stated = find_swimmer_model(answer.model).speed_error
+    if stated is not None and objective.target is None and objective.quantity.name == "forward_velocity":
+        errors[f"that model '{answer.model}' states of a speed"] = stated
+    if answer.learned is not None:
+        known = answer.learned
+        errors["with which the learned model knows the best design"] = known.last
+        if other.name != "today":  # today's is solved for
+            errors["with which the learned model knows a design that it was not solved for"] = known.left_out
+    finite = {of: error for of, error in errors.items() if math.isfinite(error)}
+    of = max(finite, key=lambda name: finite[name], default="")
+    return finite.get(of, 0.0), of
