@@ -61,10 +61,16 @@ def test_wrong_numbers_of_processes_are_refused(workers: int) -> None:
 def test_table_that_nobody_asked_for_is_announced(capsys: pytest.CaptureFixture[str], quiet: bool) -> None:
     """A line on standard error, also where no progress bar is shown."""
     with progress_bar(quiet=quiet) as progress:
-        progress(announcement(60, 2), 0, 60)
+        progress(announcement(60, 2, kept=0), 0, 60)
         progress("table of the tube", 1, 60)
     shown = capsys.readouterr()
     assert shown.out == ""
     assert " ".join(shown.err.split()).startswith(
         "no table of this tube yet: it is made now, once, from 60 places, in about 5 min with 2 processes"
     )
+
+
+def test_what_an_interrupted_preparation_has_kept_is_announced() -> None:
+    """The time is that of the rest."""
+    said = announcement(60, 2, kept=48)
+    assert "from 60 places, 48 of them kept from before, 12 still to solve for, in about 1 min" in said

@@ -24,6 +24,7 @@ from spirillum.fluid.tube.rest import (
     HARMONICS,
     PHASES,
     Solution,
+    all_kept,
     even_phases,
     factor_of,
     fourier,
@@ -411,6 +412,22 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
         (alone,) = solutions([place], "alone", workers=1)
         scale = np.sqrt(np.outer(np.diag(alone[0][0]), np.diag(alone[0][0])))
         np.testing.assert_allclose(found[0][0] / scale, alone[0][0] / scale, atol=1e-5)
+
+
+def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
+    geometry: RobotGeometry, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
+    coarse = Fineness("standard", 0.05, order=4)
+    tail = geometry._replace(tail_length=0.02, wavelength=0.02)
+    one, more = (Solution(((tail, phases),), Seat(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
+    assert not all_kept([one])
+    tube._answer.cache_clear()
+    solutions([one], "a place", workers=1)
+    assert all_kept([one])
+    assert not all_kept([one, more])
+    monkeypatch.setenv("SPIRILLUM_CACHE", "off")
+    assert not all_kept([one])
 
 
 _UNGUARDED = """

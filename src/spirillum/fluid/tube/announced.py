@@ -15,15 +15,18 @@ _SECONDS = 10.0
 """Time that a place takes one process, s: for the paper's robots; near the glass it is three times as long."""
 
 
-def announcement(places: int, workers: int) -> str:
-    """That tables are made, and about how long it takes.
+def announcement(places: int, workers: int, kept: int) -> str:
+    """That tables are made, from how many places, and about how long it takes.
 
     Args:
-        places: number of places that are solved for.
+        places: number of places from which they are made.
         workers: number of processes.
+        kept: number of these places that were solved for before, such as by a preparation that was interrupted.
     """
-    minutes = max(round(places * _SECONDS / max(workers, 1) / 60.0), 1)
+    remaining = places - kept
+    minutes = max(round(remaining * _SECONDS / max(workers, 1) / 60.0), 1)
+    before = f", {kept} of them kept from before, {remaining} still to solve for" if kept else ""
     return (
-        f"{ANNOUNCED}: it is made now, once, from {places} places, in about {minutes} min with "
-        f"{'1 process' if workers == 1 else f'{workers} processes'}, less where some are kept"
+        f"{ANNOUNCED}: it is made now, once, from {places} places{before}, in about {minutes} min with "
+        f"{'1 process' if workers == 1 else f'{workers} processes'}"
     )

@@ -23,6 +23,7 @@ from spirillum.fluid.tube.rest import (
     PHASES,
     Progress,
     Solution,
+    all_kept,
     even_phases,
     mirrored,
     rest_at,
@@ -66,10 +67,12 @@ def built_tables(
     start = time.perf_counter()
     every = [Places(geometry, radius) for geometry, radius in robots]
     nodes = [_nodes(places) for places in every]
+    wanted = [place for some in nodes for place in some]
     if progress is not None:
-        count = len(solved_as_one([place for some in nodes for place in some]))
-        progress(announcement(count, workers), 0, count)
-    found = iter(solutions([place for some in nodes for place in some], "table of the tube", progress, workers))
+        shared = solved_as_one(wanted)
+        kept = sum(all_kept([wanted[number] for number in numbers]) for numbers in shared)
+        progress(announcement(len(shared), workers, kept), 0, len(shared))
+    found = iter(solutions(wanted, "table of the tube", progress, workers))
     packed = [_packed(places, [next(found) for _ in some]) for places, some in zip(every, nodes, strict=True)]
     held = [(_held_out(places), _held_out(places, yawed=False)) for places in every]
     asked = [place for both in held for some in both for place in some]

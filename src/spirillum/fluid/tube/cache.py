@@ -25,7 +25,7 @@ from spirillum.errors import InputError
 from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = ["cache_folder", "digest_of", "imported_sources", "kept_or_computed", "sealed", "unsealed"]
+__all__ = ["cache_folder", "digest_of", "imported_sources", "is_kept", "kept_or_computed", "sealed", "unsealed"]
 
 _PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ("numpy", "scipy", "numba")
@@ -64,12 +64,9 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         question: numbers and words that decide the answer; its text is part of the key, numbers to the last digit.
         compute: answers it; the sources that its module imports are the other part.
     """
-    folder = cache_folder()
-    code = None if folder is None else digest_of(compute.__module__)
-    if folder is None or code is None:
+    path = _path(question, compute)
+    if path is None:
         return compute(question)
-    key = hashlib.sha256(f"{code} {question!r}".encode()).hexdigest()
-    path = folder / f"{key[:40]}.f64"
     found = _kept(path)
     if found is None:
         found = compute(question)
@@ -80,6 +77,27 @@ def kept_or_computed(question: _Q, compute: Callable[[_Q], Samples]) -> Samples:
         except (InputError, OSError):  # a full or read-only disk costs time only
             pass
     return found
+
+
+def is_kept(question: _Q, compute: Callable[[_Q], Samples]) -> bool:
+    """Whether the answer to a question is in the folder, so that `kept_or_computed` computes nothing.
+
+    Args:
+        question: see `kept_or_computed`.
+        compute: see there.
+    """
+    path = _path(question, compute)
+    return path is not None and _kept(path) is not None
+
+
+def _path(question: _Q, compute: Callable[[_Q], Samples]) -> Path | None:
+    """Where the answer to a question is kept; None for nowhere."""
+    folder = cache_folder()
+    code = None if folder is None else digest_of(compute.__module__)
+    if folder is None or code is None:
+        return None
+    key = hashlib.sha256(f"{code} {question!r}".encode()).hexdigest()
+    return folder / f"{key[:40]}.f64"
 
 
 def _kept(path: Path) -> Samples | None:

@@ -14,7 +14,7 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.tube.solids import MOTIONS, Fineness
-from spirillum.fluid.tube.tube import solved_together
+from spirillum.fluid.tube.tube import is_solved, solved_together
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.tube_table import MIRROR, cut_of_film
 from spirillum.kernels.tube_table import MOTIONS as RATES
@@ -26,6 +26,7 @@ __all__ = [
     "HARMONICS",
     "PHASES",
     "Solution",
+    "all_kept",
     "even_phases",
     "factor_of",
     "fourier",
@@ -108,6 +109,13 @@ def solved_as_one(places: Sequence[Solution]) -> list[list[int]]:
         bodies = {g.without_tail for g, _ in place.tails}
         shared.setdefault((bodies.pop(), place.seat, place.fineness), []).append(number)
     return list(shared.values())
+
+
+def all_kept(places: Sequence[Solution]) -> bool:
+    """Whether nothing is left to solve for at some places: all phases of all their tails are kept from before."""
+    return all(
+        is_solved(g, place.seat, place.fineness, p) for place in places for g, phases in place.tails for p in phases
+    )
 
 
 def _solutions(places: Sequence[Solution], what: str, progress: Progress | None, workers: int) -> list[list[Samples]]:

@@ -26,7 +26,7 @@ from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.stated import CHECKED, said_of_tail
-from spirillum.fluid.tube.cache import kept_or_computed
+from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
 from spirillum.fluid.tube.solids import MOTIONS, Fineness, Solids
@@ -146,6 +146,18 @@ def solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float
         phase: of the tail, rad.
     """
     return _answer(_Question(geometry, "robot", seat, fineness, phase))
+
+
+def is_solved(geometry: RobotGeometry, seat: Seat, fineness: Fineness, phase: float) -> bool:
+    """Whether the answer of `solved` is kept from before.
+
+    Args:
+        geometry: of the robot.
+        seat: where it is.
+        fineness: how finely the flow is resolved.
+        phase: of the tail, rad.
+    """
+    return is_kept(_Question(geometry, "robot", seat, fineness, phase), _computed)
 
 
 def solved_together(
