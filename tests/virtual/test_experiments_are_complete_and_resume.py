@@ -73,6 +73,17 @@ def test_the_table_is_an_observations_file_and_every_rate_has_the_same_factor(tm
     assert rows[0].tail_rate != rows[1].tail_rate
 
 
+def test_the_table_can_be_joined_with_what_is_measured(tmp_path: Path) -> None:
+    """The robot's name is that of the robot file beside the films, the trial's that of its film."""
+    study = {"robots": ["biorob2012-wide"], "vary": {"tail.wavelength": ["20 mm", "25 mm"]}, "models": ["rft"]}
+    found = virtual_experiment(study, tmp_path / "e", **SMALL)
+    rows = {(row.robot, row.trial) for row in read_observations(found.observations)}
+    films = sorted((tmp_path / "e").glob("*/*.mp4"))
+    assert rows == {(load_setup(film.parent / "setup.toml")[1].name, film.stem) for film in films}
+    assert len(rows) == len(films) == 4
+    assert found.robots != tuple(dict.fromkeys(robot for robot, _ in sorted(rows)))
+
+
 def test_a_grid_gives_each_tail_a_folder_and_the_spread_its_size(tmp_path: Path) -> None:
     grid = {"channels": {"w": "biorob2012-wide"}, "wavelengths": ["20 mm", "25 mm"], "amplitudes": ["2 mm"]}
     found = virtual_experiment({"grid": grid, "models": ["rft"]}, tmp_path / "e", **SMALL)

@@ -77,9 +77,14 @@ class Planned:
     seed: int
 
     @property
+    def name(self) -> str:
+        """Name of its files, by which `measure` calls it too."""
+        return f"trial-{self.number}"
+
+    @property
     def label(self) -> str:
         """Path of the trial in the experiment's folder."""
-        return f"{self.folder}/trial-{self.number}"
+        return f"{self.folder}/{self.name}"
 
 
 @dataclass(frozen=True)
@@ -342,7 +347,7 @@ def _render_all(
 
 
 def _table(planned: list[Planned]) -> str:
-    """The truth as an observations file."""
+    """The truth as an observations file; robots and trials have the names that `measure` gives them."""
     about = f"# {SYNTHETIC.replace('synthetic', 'SYNTHETIC', 1)}; true rates, with planted differences between trials"
     lines = [about, f"# {MARK}", ",".join(_COLUMNS + _RATES)]
     for item in planned:
@@ -351,5 +356,5 @@ def _table(planned: list[Planned]) -> str:
         tail, body = rates["tail_rotation_rate"] / Hz, rates["body_rotation_rate"] / Hz
         numbers = (1e3 * rates["forward_velocity"], tail, body, tail - body)
         shape = f"{channel},{1e3 * robot.tail.wavelength:.9g},{1e3 * robot.tail.amplitude:.9g}"
-        lines.append(f"{text_cell(item.folder)},{shape},{item.number},{','.join(f'{value:.9g}' for value in numbers)}")
+        lines.append(f"{text_cell(robot.name)},{shape},{item.name},{','.join(f'{value:.9g}' for value in numbers)}")
     return "\n".join(lines) + "\n"
