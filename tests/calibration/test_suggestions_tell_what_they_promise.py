@@ -92,6 +92,44 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
         assert found.narrowing[name] == pytest.approx(np.sqrt(after[place, place]) / spread[place], rel=0.02)
 
 
+def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
+    fitted: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The stated error is how much the difference varies between independent sets of draws."""
+    from rich.console import Console
+
+    from spirillum.cli.tables.suggestion import table
+    from spirillum.fitted import posterior_file
+
+    path = candidates(fitted, "40,20,2.5", "40,20.01,2.5", "40,12,1.5")
+    known, one = posterior_file.read_posterior(fitted / "posterior.nc"), np.ones(400)
+    behind, errors = [], []
+    for seed in range(40):
+        drawn = np.array([2.5, 0.8]) * np.exp(np.array([0.1, 0.1]) * np.random.default_rng(seed).normal(size=(400, 2)))
+        drawn_anew = replace(
+            known,
+            draws={"body_drag": drawn[:, :1], "body_rotation": drawn[:, 1:]},
+            discrepancy={"advance": 0.01 * one, "turning": 0.01 * one},
+            error={"advance": 0.02 * one, "turning": 0.02 * one},
+        )
+        monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda _path, new=drawn_anew: new)
+        found = sp.suggest("any", WIDE, candidates=path)
+        last = next(item for item in found.candidates if item.wavelength < 0.015)
+        sign = 1.0 if found.candidates[0].wavelength > 0.015 else -1.0
+        behind.append(sign * (found.candidates[0].gain - last.gain))
+        errors.append(last.behind_error)
+        assert found.candidates[0].tied
+    assert np.mean(errors) == pytest.approx(np.std(behind), rel=0.35)
+    close = replace(
+        found, candidates=tuple(replace(item, behind=0.002, behind_error=0.004) for item in found.candidates)
+    )
+    table(close.to_dict(), Console(width=300))
+    printed = capsys.readouterr().out
+    assert "0.002 +- 0.004" in printed
+    assert "a tie: 2 others are within two standard errors of the first" in printed
+    assert [item["tied_with_the_best"] for item in close.to_dict()["candidates"]] == [True] * 3
+
+
 def test_a_grid_is_ranked_and_what_cannot_be_built_is_said(fitted: Path) -> None:
     found = sp.suggest(fitted / "posterior.nc", [WIDE, NARROW])
     gains = [item.gain for item in found.candidates]

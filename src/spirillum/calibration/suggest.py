@@ -9,12 +9,16 @@ close to normal, as they are once some robots have been observed, it is
 with the covariance C of the predicted means over the draws and N of discrepancy and errors (a linear-Gaussian design;
 Chaloner and Verdinelli, Stat. Sci. 10:273, 1995). It is given in bits: one bit halves the volume of what is uncertain.
 A discrepancy caps it: a model that misses every tail by 10 % learns little from one more.
+
+Draws are finite. How far a candidate is behind the best one is known to a standard error, from leaving out one block of
+consecutive draws after another (a jackknife, whose blocks are longer than the draws remember; Kuensch, Ann. Stat.
+17:1217, 1989). Both candidates have the same draws, so that most of the error of each cancels.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -48,6 +52,10 @@ _COLUMNS = ("channel_diameter_mm", "wavelength_mm", "amplitude_mm")
 _DEFAULT_WAVELENGTHS = (10.0, 15.0, 20.0, 25.0, 30.0)
 _DEFAULT_AMPLITUDES = (1.5, 2.0, 2.5, 3.0, 3.5)
 _MOST = 2000
+_BLOCKS = 20
+"""Blocks of draws, each of which is left out once."""
+_TIED = 2.0
+"""Standard errors within which a candidate is not told apart from the best one."""
 _SAID = 5
 """Candidates that are left out by name."""
 
@@ -63,6 +71,15 @@ class Candidate:
     """Expected information about the fitted numbers, bits."""
     narrowing: Mapping[str, float]
     """Expected standard deviation of each number after the measurement over that before."""
+    behind: float = 0.0
+    """Information of the best candidate less that of this one, bits; 0 for the best."""
+    behind_error: float = 0.0
+    """Standard error of that difference, from the finite number of draws, bits."""
+
+    @property
+    def tied(self) -> bool:
+        """Whether the draws do not tell it apart from the best candidate; true of the best itself."""
+        return self.behind <= _TIED * self.behind_error
 
 
 @dataclass(frozen=True)
@@ -82,6 +99,8 @@ class Suggestion(Shown):
                 "wavelength": quantity(item.wavelength, "m"),
                 "amplitude": quantity(item.amplitude, "m"),
                 "expected_information": quantity(item.gain, "bit"),
+                "behind_the_best": quantity(item.behind, "bit", standard_error=item.behind_error),
+                "tied_with_the_best": item.tied,
                 "narrowing": {name: quantity(value, "1") for name, value in item.narrowing.items()},
             }
             for item in self.candidates
@@ -124,7 +143,8 @@ def suggest(
         _check_channel(robot)
     loaded = [known.central(robot) for robot in given]
     listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
-    found, left_out = [], []
+    found: list[tuple[Candidate, Samples]] = []
+    left_out = []
     numbers, names = _numbers(known)
     for robot in listed:
         outside = _outside(known, robot)
@@ -139,7 +159,7 @@ def suggest(
     return Suggestion(
         known,
         trials,
-        tuple(sorted(found, key=lambda item: -item.gain)),
+        _ranked(found),
         (*_cautions(known, loaded), *left_out),
     )
 
@@ -201,7 +221,42 @@ def _numbers(known: PosteriorFile) -> tuple[Samples, list[str]]:
     return np.stack(columns, axis=1), names
 
 
-def _candidate(known: PosteriorFile, robot: Robot, trials: int, numbers: Samples, names: list[str]) -> Candidate:
+def _ranked(found: Sequence[tuple[Candidate, Samples]]) -> tuple[Candidate, ...]:
+    """Candidates from the most to the least telling, each with how far it is behind the first.
+
+    Args:
+        found: each with its information where one block of draws after another is left out.
+    """
+    ordered = sorted(found, key=lambda pair: -pair[0].gain)
+    best, of_best = ordered[0]
+    return tuple(
+        replace(item, behind=best.gain - item.gain, behind_error=_jackknife(of_best - left_out))
+        for item, left_out in ordered
+    )
+
+
+def _jackknife(left_out: Samples) -> float:
+    """Standard error of a number from its values where one block after another is left out."""
+    return float(np.sqrt((left_out.size - 1.0) * np.var(left_out)))
+
+
+def _information(seen: Samples, noise: Samples) -> tuple[float, Samples, Samples]:
+    """Expected information, bits, with the covariances of the predicted means and of what is seen of them.
+
+    Args:
+        seen: predicted means, relative, (quantities, draws).
+        noise: variance of discrepancy and errors, (quantities, draws).
+    """
+    spread = np.cov(seen).reshape(len(seen), len(seen))
+    errors = np.diag(noise.mean(axis=1))
+    gain = 0.5 * (np.linalg.slogdet(spread + errors)[1] - np.linalg.slogdet(errors)[1]) / np.log(2.0)
+    return float(gain), spread, errors
+
+
+def _candidate(
+    known: PosteriorFile, robot: Robot, trials: int, numbers: Samples, names: list[str]
+) -> tuple[Candidate, Samples]:
+    """A candidate, and its information where one block of draws after another is left out."""
     predicted = drawn_kinematics(robot, find_swimmer_model(known.model), known)
     rows, noise = [], []
     for quantity_name, values in predicted.items():
@@ -211,22 +266,25 @@ def _candidate(known: PosteriorFile, robot: Robot, trials: int, numbers: Samples
             continue
         middle = float(np.median(values))
         rows.append(values / middle - 1.0)
-        noise.append(float(np.mean(tau**2) + np.mean(sigma**2) / trials))
-    seen, errors = np.stack(rows), np.diag(noise)
-    spread = np.cov(seen).reshape(len(rows), len(rows))
-    gain = 0.5 * (np.linalg.slogdet(spread + errors)[1] - np.linalg.slogdet(errors)[1]) / np.log(2.0)
+        noise.append(np.broadcast_to(tau**2 + sigma**2 / trials, values.shape))
+    seen, variances = np.stack(rows), np.stack(noise)
+    gain, spread, errors = _information(seen, variances)
+    blocks = np.array_split(np.arange(seen.shape[1]), min(_BLOCKS, seen.shape[1] // 2))
+    rest = [(np.delete(seen, block, axis=1), np.delete(variances, block, axis=1)) for block in blocks]
+    left_out = np.array([_information(*some)[0] for some in rest])
     deviations = numbers - numbers.mean(axis=0)
     shared = deviations.T @ (seen - seen.mean(axis=1, keepdims=True)).T / (numbers.shape[0] - 1.0)
     variance = deviations.var(axis=0, ddof=1)
     told = np.einsum("ij,jk,ik->i", shared, np.linalg.inv(spread + errors), shared)
     narrowing = np.sqrt(np.clip(1.0 - told / np.maximum(variance, 1e-300), 0.0, 1.0))
-    return Candidate(
+    candidate = Candidate(
         channel_of(robot),
         robot.tail.wavelength,
         robot.tail.amplitude,
-        float(gain),
+        gain,
         {name: float(value) for name, value in zip(names, narrowing, strict=True)},
     )
+    return candidate, left_out
 
 
 def _default(robots: Sequence[Robot]) -> list[Robot]:
