@@ -56,6 +56,21 @@ def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
     assert len(figure.axes) == 6
 
 
+def test_a_model_is_seen_through_the_mark_of_what_was_observed(found: Any) -> None:
+    from spirillum.view.figures.calibration import observed_figure
+
+    axes = observed_figure(found, 0).axes[0]
+    model, seen = axes.lines[0], axes.containers[0].lines[0]
+    assert seen.get_markerfacecolor() == "none"
+    assert seen.get_markersize() > model.get_markersize()
+
+
+def test_residuals_name_the_channel(found: Any) -> None:
+    from spirillum.view.figures.calibration import residual_figure
+
+    assert "channel of 40 mm" in _texts(residual_figure(found))
+
+
 def test_residuals_are_observed_over_predicted(found: Any) -> None:
     from spirillum.view.figures.calibration import residual_figure
 

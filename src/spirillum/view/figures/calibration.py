@@ -13,7 +13,7 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from spirillum.arrays import Samples
 from spirillum.units import Hz
 from spirillum.view.figures.posterior import posterior_figure, profile_figure
-from spirillum.view.figures.rows import draw_band, draw_means
+from spirillum.view.figures.rows import HOLLOW, draw_band, draw_means
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.study_view import spread
 from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, label_of_model, look_of_model, plain, styled
@@ -94,7 +94,7 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
         label = "synthetic" if experiment.synthetic else "observed"
         handles = [
             Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, label=label_of_model(model)),
-            Line2D([], [], color=_OBSERVED, linestyle="none", marker="D", label=f"{label}, 95 % interval of the mean"),
+            Line2D([], [], color=_OBSERVED, **HOLLOW, label=f"{label}, 95 % interval of the mean"),
         ]
         notes = [_fit_words(found, channel)]
         if any(np.any(np.isfinite(row["low"])) for row in rows):
@@ -203,7 +203,7 @@ def _draw(axes: Axes, found: Calibrated, row: dict[str, Any], here: np.ndarray) 
     draw_band(axes, x, low, high, look, joined=True)
     axes.plot(x, values, color=look.colour, linestyle=look.line, marker=look.marker)
     if np.any(np.isfinite(seen)):
-        draw_means(axes, x, seen, half)
+        draw_means(axes, x, seen, half, hollow=True)
 
 
 def residual_figure(found: Calibrated) -> Figure:
@@ -247,7 +247,7 @@ def residual_figure(found: Calibrated) -> Figure:
             last.text(
                 (0.5 * (start + stop) - 0.5),
                 0.02,
-                f"{diameter:g} mm",
+                f"channel of {diameter:g} mm",
                 transform=last.get_xaxis_transform(),
                 ha="center",
                 size=8,

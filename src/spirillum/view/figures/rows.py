@@ -17,6 +17,7 @@ from spirillum.view.figures.study_view import StudyView, spread
 from spirillum.view.figures.style import COLOURS, PATCH, Look, Scale, label_of_model, look_of_model
 
 __all__ = [
+    "HOLLOW",
     "Row",
     "amplitude_handles",
     "band_handles",
@@ -38,6 +39,8 @@ MOST_LARGE_MARKS = 60
 """Robots of a list whose marks have full size."""
 _AMPLITUDE_MARKERS = ("o", "s", "^", "D", "v", "P")
 _OBSERVED = COLOURS["black"]
+HOLLOW: Any = {"linestyle": "none", "marker": "D", "markersize": 7.5, "markerfacecolor": "none"}
+"""Look of an observed mean through which a model's marker is seen."""
 _SHADE = 0.25  # opacity of a band
 _OWN: Any = {"color": "#999999", "linewidth": 1.1, "linestyle": "-"}
 """Look of the rotor's own friction: no model is drawn so."""
@@ -213,8 +216,16 @@ def _assumed_friction_row(shown: StudyView) -> Row:
     return Row("effective friction\n$B_{eff}$ (N m s/rad)", draw, "rates", logarithmic=True, tells=tells)
 
 
-def draw_means(axes: Axes, x: Values, y: Values, half: Values) -> None:
-    """Observed means with their 95 % intervals; a mean without an interval stands alone."""
+def draw_means(axes: Axes, x: Values, y: Values, half: Values, *, hollow: bool = False) -> None:
+    """Observed means with their 95 % intervals; a mean without an interval stands alone.
+
+    Args:
+        axes: where.
+        x: places along the axis.
+        y: means.
+        half: half widths of their intervals.
+        hollow: whether what lies below the marker is seen through it.
+    """
     seen = np.isfinite(y)
     axes.errorbar(
         x[seen],
@@ -222,7 +233,8 @@ def draw_means(axes: Axes, x: Values, y: Values, half: Values) -> None:
         yerr=np.nan_to_num(half[seen], nan=0.0),
         fmt="D",
         color=_OBSERVED,
-        markersize=4.2,
+        markersize=HOLLOW["markersize"] if hollow else 4.2,
+        markerfacecolor="none" if hollow else _OBSERVED,
         capsize=2.5,
         elinewidth=1.0,
         zorder=5,
