@@ -17,31 +17,35 @@ ALTERNATIVES = {
 
 
 def lead_warnings(answer: Design) -> tuple[str, ...]:
-    """A sentence for each design that the best one leads by less than the error that is stated of its objective.
+    """A sentence on the designs that the best one leads by less than the error that is stated of its objective.
 
     Args:
         answer: the best design, with how well a learned model is known.
+
+    Returns:
+        One sentence for each such error; none where every lead is larger.
     """
-    found = []
+    leads: dict[tuple[float, str], list[str]] = {}
     best, sign = answer.objective, answer.objectives[0].sign
     for other in answer.alternatives:
-        error, of = _error(answer, other)
+        error = _error(answer, other)
         if not (other.keeps and math.isfinite(other.objective) and best):
             continue
         lead = sign * (best - other.objective) / abs(best)
-        if lead < error:
-            found.append(
-                f"the best design leads {ALTERNATIVES[other.name]} by {100 * lead:.2g} %, less than the error of "
-                f"{100 * error:.2g} % {of}: it is surely the better one only as far as both share that error"
-            )
-    return tuple(found)
+        if lead < error[0]:
+            leads.setdefault(error, []).append(f"{ALTERNATIVES[other.name]} by {100 * lead:.2g} %")
+    return tuple(
+        f"the best design leads {' and '.join(led)}, less than the error of {100 * error:.2g} % {of}: it is surely the "
+        "better one only as far as they share that error"
+        for (error, of), led in leads.items()
+    )
 
 
 def _error(answer: Design, other: Alternative) -> tuple[float, str]:
     """The largest relative error that is stated of the objective, and of what it is; 0 where none is stated."""
     objective = answer.objectives[0]
     errors = {}
-    stated = find_swimmer_model(answer.model).speed_error
+    stated = find_swimmer_model(answer.model).known_speed_error
     if stated is not None and objective.target is None and objective.quantity.name == "forward_velocity":
         errors[f"that model '{answer.model}' states of a speed"] = stated
     if answer.learned is not None:

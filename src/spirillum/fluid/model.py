@@ -98,7 +98,7 @@ class ResistanceModel(ABC):
 class SwimmerModel(ResistanceModel):
     """A model of body and rotor together, from which the motion follows."""
 
-    speed_error: ClassVar[float | None] = None
+    known_speed_error: ClassVar[float | None] = None
     """Relative error of the speed of the paper's robot that `known_error` says in words; None where it says none."""
 
     def checked_by(self, options: ModelOptions) -> SwimmerModel | None:
@@ -109,7 +109,7 @@ class SwimmerModel(ResistanceModel):
         return None
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
-        """Relative error of the forward velocity that is known beforehand; NaN where none is."""
+        """Relative error of the forward velocity at these places, known from a check; NaN without one."""
         return float("nan")
 
     @abstractmethod

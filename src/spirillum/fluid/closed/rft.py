@@ -173,7 +173,7 @@ class Rft(SwimmerModel):
         "-31 % axial torque of the tail, Gray and Hancock's own logarithm +8, +6 and -50 %, Lighthill's coefficients "
         "+89, +97 and -12 %; body and tail do not interact, which alone adds some 15 % to the speed"
     )
-    speed_error = 0.15
+    known_speed_error = 0.15
     parts = ("body", "tail", "rotor", "robot")
 
     def stated_error(self, options: ModelOptions) -> str:

@@ -94,7 +94,7 @@ class Sbt(SwimmerModel):
         "effects as eps^2; body and tail do not interact, which alone overestimates the speed by about 15 %; "
         "the wire's own spin, some 8 % of the axial torque, is an option"
     )
-    speed_error = 0.15
+    known_speed_error = 0.15
     parts = ("body", "tail", "rotor", "robot")
     axial_only = True
 

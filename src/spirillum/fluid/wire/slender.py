@@ -107,7 +107,7 @@ class Slender(SwimmerModel):
     title = "resolved"
     references = ("cortez2001", "cortez2012", "pozrikidis1992", "biorob2012")
     known_error = _STATED["standard"]
-    speed_error = 0.005
+    known_speed_error = 0.005
     parts = ("body", "coupling", "tail", "rotor", "robot")
     closed_form = False
 
