@@ -54,10 +54,12 @@ def _row(name: str, item: Mapping[str, Any], known: Mapping[str, Mapping[str, An
     value, low, high = ("" if item.get(key) is None else in_unit(item[key], unit, shown) for key in _ENDS)
     plain = "" if shown == "1" else shown
     si = "" if plain in ("", unit) else f"{item['value']:.6g} {unit}"
-    return Row(name.replace("_", " "), value, low, high, plain, si)
+    return Row(_LABELS.get(name, name.replace("_", " ")), value, low, high, plain, si)
 
 
 _ENDS = ("value", "low", "high")
+_LABELS = {"advance_per_radian": "advance"}
+"""Words for quantities whose names do not fit the unit that people read: mm for a turn."""
 
 
 def counted(number: int, word: str) -> str:

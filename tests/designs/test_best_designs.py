@@ -171,6 +171,14 @@ def test_what_a_design_says_of_itself_holds(unsure: sp.Design) -> None:
     assert sp.predict(unsure.robot, model="sbt").forward_velocity > 0
 
 
+def test_calibration_factors_are_named(unsure: sp.Design) -> None:
+    """The preset has those of Table III for `sbt`, which stand for the walls."""
+    assert unsure.calibrated
+    assert unsure.to_dict()["calibrated"]
+    assert any("calibration factors, the same for every design, stand for the" in item for item in unsure.warnings)
+    assert not any("walls are left out" in item for item in unsure.warnings)
+
+
 def test_a_lead_within_the_models_error_is_no_lead(unsure: sp.Design) -> None:
     """The best design is two per cent ahead of today's, by a model whose speeds are some 15 % off."""
     lead = 1.0 - unsure.alternatives[0].objective / unsure.objective

@@ -84,6 +84,16 @@ def test_the_table_can_be_joined_with_what_is_measured(tmp_path: Path) -> None:
     assert found.robots != tuple(dict.fromkeys(robot for robot, _ in sorted(rows)))
 
 
+def test_robots_move_and_are_drawn_where_the_study_lays_them(tmp_path: Path) -> None:
+    place = {"gap": "0.2 mm", "pitch": "0 deg"}
+    study = {"robots": ["biorob2012-wide"], "models": ["tube"], "placement": place}
+    found = virtual_experiment(study, tmp_path / "e", **SMALL)
+    there = sp.predict("biorob2012-wide", model="tube", tail_rate="1.2 Hz", placement=place)
+    assert found.rates["biorob2012-wide"]["forward_velocity"] == pytest.approx(there.forward_velocity, rel=1e-9)
+    setup, robot = load_setup(tmp_path / "e" / "biorob2012-wide" / "setup.toml")
+    assert setup.robot.axis_height == pytest.approx(0.002 + 0.5 * robot.body.diameter + 0.0002)
+
+
 def test_a_grid_gives_each_tail_a_folder_and_the_spread_its_size(tmp_path: Path) -> None:
     grid = {"channels": {"w": "biorob2012-wide"}, "wavelengths": ["20 mm", "25 mm"], "amplitudes": ["2 mm"]}
     found = virtual_experiment({"grid": grid, "models": ["rft"]}, tmp_path / "e", **SMALL)

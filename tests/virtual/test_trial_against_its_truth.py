@@ -224,6 +224,19 @@ def test_a_robot_aside_keeps_its_gap(tmp_path: Path, view: str, direction: str) 
     assert aside == pytest.approx(0.003)
 
 
+def test_a_gap_is_that_of_the_motion_too(tmp_path: Path) -> None:
+    """A model with walls answers at the gap that the picture shows; for a calibration that gap is the truth."""
+    options = small(trial={"duration": "0.1 s"}) | {"motion": {"model": "tube"}}
+    usual = render(ROBOT, tmp_path / "usual.mp4", **options)
+    options["trial"]["gap"] = "0.2 mm"
+    thin = render(ROBOT, tmp_path / "thin.mp4", **options)
+    for found, gap in ((thin, "0.2 mm"), (usual, "0.5 mm")):
+        there = sp.predict(ROBOT, model="tube", placement={"gap": gap, "pitch": 0.0})
+        assert found.rates["forward_velocity"] == pytest.approx(there.forward_velocity, rel=1e-9)
+        assert found.rates["body_rotation_rate"] == pytest.approx(there.body_rotation_rate, rel=1e-9)
+    assert abs(thin.rates["body_rotation_rate"]) < 0.8 * abs(usual.rates["body_rotation_rate"])
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_a_robot_file_holds_every_field(name: str, tmp_path: Path) -> None:
     robot = load(name)

@@ -259,7 +259,7 @@ def resistance(
     from spirillum.cli import renderer
     from spirillum.fluid.resistance import resistance as answer
 
-    with renderer.patience(model, quiet=json, yawed=yaw is not None):
+    with renderer.patience(model, quiet=json, tilted=yaw is not None):
         result = answer(
             loaded_robot(robot, settings),
             part=part,

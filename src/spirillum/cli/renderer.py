@@ -62,16 +62,16 @@ def with_files(answer: Answer, **files: Any) -> dict[str, Any]:
     return {**content, **files, "warnings": answer["warnings"]}
 
 
-def patience(model: str, *, quiet: bool, yawed: bool = False) -> AbstractContextManager[object]:
+def patience(model: str, *, quiet: bool, tilted: bool = False) -> AbstractContextManager[object]:
     """A sign of life while a model solves; its first run on a machine compiles for some seconds.
 
-    That a yawed place is solved for, which takes minutes, is a line on standard error in any case.
+    That a pitched or yawed place is solved for, which takes minutes, is a line on standard error in any case.
     """
     from spirillum.fluid.registry import MODELS
-    from spirillum.fluid.tube.announced import YAWED
+    from spirillum.fluid.tube.announced import TILTED
 
-    if yawed and model in MODELS and MODELS[model].placed:
-        Console(stderr=True, soft_wrap=True).print(YAWED, highlight=False)
+    if tilted and model in MODELS and MODELS[model].placed:
+        Console(stderr=True, soft_wrap=True).print(TILTED, highlight=False)
     quick = model not in MODELS or MODELS[model].closed_form
     return at_work("solving for the flow (the first time, compiling takes some seconds)", quiet=quiet or quick)
 
@@ -86,13 +86,13 @@ def at_work(what: str, *, quiet: bool) -> AbstractContextManager[object]:
 def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A progress bar on standard error with the time left; silent for `--json` and where nobody watches.
 
-    That a table is made or a yawed place solved for, which takes minutes, and what a large study will take, are lines
-    of their own on standard error in any case.
+    That a table is made or a pitched or yawed place solved for, which takes minutes, and what a large study will take,
+    are lines of their own on standard error in any case.
     """
     from spirillum.crews import ESTIMATE
-    from spirillum.fluid.tube.announced import ANNOUNCED, OF_A_RUN, YAWED
+    from spirillum.fluid.tube.announced import ANNOUNCED, OF_A_RUN, TILTED
 
-    lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, YAWED)
+    lines = (ANNOUNCED, ESTIMATE, OF_A_RUN, TILTED)
     console = Console(stderr=True, soft_wrap=True)
     if quiet:
 

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from spirillum.cli.inputs import loaded_robot
-from spirillum.cli.options import Friction, Json, Model, Settings, TailRate, complete_robots, starting
+from spirillum.cli.options import (
+    MODEL_PANEL,
+    Friction,
+    Json,
+    Settings,
+    TailRate,
+    complete_auto_models,
+    complete_robots,
+    starting,
+)
 from spirillum.errors import InputError
 
 if TYPE_CHECKING:
@@ -78,6 +87,15 @@ _Crf = Annotated[
     int | None,
     typer.Option(help="Compression (H.264): 0, none lost, to 51; clean 18, degraded 33.", rich_help_panel=_DISTURBED),
 ]
+_Model = Annotated[
+    str,
+    typer.Option(
+        autocompletion=complete_auto_models,
+        help="Hydrodynamic model: sbt, rft, slender, tube; or auto: tube where the robot has a table of its tube (see "
+        "`prepare`), else slender.",
+        rich_help_panel=MODEL_PANEL,
+    ),
+]
 _Dropped = Annotated[
     float | None, typer.Option(help="Share of frames that are lost, such as 0.05.", rich_help_panel=_DISTURBED)
 ]
@@ -123,7 +141,7 @@ def render(
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="FILE", help="The video (.mp4), or a new folder of PNG files.")
     ],
-    model: Model = "auto",
+    model: _Model = "auto",
     tail_rate: TailRate = None,
     friction: Friction = None,
     forward_velocity: Annotated[
@@ -170,8 +188,13 @@ def render(
         str, typer.Option(metavar="ANGLE", help="Of the tail at the first frame.", rich_help_panel=_MOTION)
     ] = "0deg",
     gap: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Between body and tube.", rich_help_panel=_MOTION)
-    ] = "0.5mm",
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Between body and tube, of picture and motion; else that of the reference place of tube.",
+            rich_help_panel=_MOTION,
+        ),
+    ] = None,
     view: _View = "top",
     direction: _Direction = "right",
     fps: _Fps = 30.0,

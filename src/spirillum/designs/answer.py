@@ -124,6 +124,11 @@ class Design(Shown):
     """Why the model was taken, in half a sentence; empty where it was asked for."""
 
     @property
+    def calibrated(self) -> bool:
+        """Whether calibration factors of the robot for this model apply to every design."""
+        return self.model in self.robot.calibration
+
+    @property
     def winding(self) -> dict[str, float]:
         """How to wind the tail: mandrel, pitch, turns and length of wire, m."""
         tail = self.robot.tail
@@ -156,6 +161,7 @@ class Design(Shown):
         content: dict[str, Any] = {
             "robot": self.today.name,
             "model": self.model,
+            "calibrated": self.calibrated,
             **({"model_reason": self.model_reason} if self.model_reason else {}),
             "objective": {"words": first.words, **quantity(self.objective, unit)},
             "conditions": list(self.conditions),

@@ -343,10 +343,15 @@ def _warnings(
             "gives the band over gap and pitch"
         )
     elif given.channel is not None:
+        name = stated.model.name
+        walls = (
+            f"calibration factors, the same for every design, stand for the channel's walls (model '{name}')"
+            if name in given.calibration
+            else f"the channel's walls are left out, which makes a robot faster than it is (model '{name}')"
+        )
         found.append(
-            f"the channel's walls are left out, which makes a robot faster than it is (model '{stated.model.name}'): "
-            "let `spirillum predict` with model tube answer for the best design and others near it, whose order walls "
-            "may change"
+            f"{walls}: let `spirillum predict` with model tube answer for the best design and others near it, whose "
+            "order walls may change"
         )
     if not {"friction.effective", "friction", "shared_friction"} & set(unknown):
         reading = friction_reading(given.friction.reading)

@@ -99,18 +99,20 @@ def other_models(
             own = float(result.forward_velocity[0])
             if result.valid[0] and own / speed > 0:
                 found.append(OtherModel(other.name, calibrated, own, own / speed))
-    return OtherModels(tuple(found), _statement(found, model)) if found else None
+    coupled = robot.coupling.length > 0.0
+    return OtherModels(tuple(found), _statement(found, model, coupled=coupled)) if found else None
 
 
-def _statement(found: list[OtherModel], model: SwimmerModel) -> str:
+def _statement(found: list[OtherModel], model: SwimmerModel, *, coupled: bool) -> str:
     bare = _times([item for item in found if not item.calibrated])
+    lacking = f"{'the coupling and ' if coupled else ''}the flow between body and tail"
     if not model.placed:
-        return f"closed forms say {bare}: they leave out the flow between body and tail"
+        return f"closed forms say {bare}: they leave out {lacking}"
     fitted = [item for item in found if item.calibrated]
     more = f"; with calibration factors, which stand for the walls, {_times(fitted)}" if fitted else ""
     names = [name for name in dict.fromkeys(item.model for item in found) if SWIMMER_MODELS[name].closed_form]
     leave = f"{' and '.join(names)} {'leaves' if len(names) == 1 else 'leave'}"
-    apart = f" ({leave} out the flow between body and tail, too)" if names else ""
+    apart = f" ({leave} out {lacking}, too)" if names else ""
     return f"models without walls say {bare}{apart}{more}"
 
 

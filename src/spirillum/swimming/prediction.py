@@ -15,7 +15,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.tube.announced import YAWED
+from spirillum.fluid.tube.announced import TILTED
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
@@ -261,8 +261,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         )
     tell = progress or (lambda _what, _done, _total: None)
     if not chosen.closed_form:
-        slow = chosen.form == "direct" and batch.placement.yaw != 0.0
-        tell(YAWED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
+        slow = chosen.form == "direct" and bool(batch.placement.pitch or batch.placement.yaw)
+        tell(TILTED if slow else f"{chosen.name} (the first time, compiling takes some seconds)", 0, 1)
     check = case.checked()  # the finer resolution last: a flow around the robot then finds its factors at hand
     result = case.swim(batch)
     if not result.valid[0]:

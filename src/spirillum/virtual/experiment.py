@@ -32,7 +32,9 @@ from spirillum.files import (
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
 from spirillum.robot.load import PAPER_ROBOTS, load
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
 from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO
 from spirillum.units import Hz
@@ -165,12 +167,12 @@ def virtual_experiment(
     if plan.duration is not None and plan.duration * camera.fps < 1.0:
         frame = 1.0 / camera.fps
         raise InputError(f"duration = {plan.duration:g} s; allowed: at least the {frame:.4g} s of a frame")
-    robots, default_model = _robots(study)
+    robots, default_model, placement = _robots(study)
     if len(robots) * plan.trials > _MOST:
         raise InputError(f"{len(robots)} robots with {plan.trials} trials each; allowed: at most {_MOST} videos")
     steady, warnings = {}, []
     for name, robot in robots.items():
-        steady[name], _, said = steady_rates(robot, motion, default_model)
+        steady[name], _, said = steady_rates(robot, motion, default_model, placement)
         warnings += [f"{name}: {sentence}" for sentence in said]
     question = {
         "robots": {name: robot.model_dump(mode="json") for name, robot in robots.items()},
@@ -190,7 +192,7 @@ def virtual_experiment(
     planned = [
         item
         for place, name in enumerate(robots)
-        for item in _planned(name, robots[name], steady[name], plan, camera, place)
+        for item in _planned(name, robots[name], steady[name], plan, camera, place, _gap(robots[name], placement))
     ]
     claim = {"mark": _MARK, "content": mark, "what": "virtual experiment"}
     inputs = study if isinstance(study, (str, Path)) else None
@@ -214,10 +216,10 @@ def virtual_experiment(
     )
 
 
-def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Robot], str]:
-    """Robots by the names of their folders, and the study's first model."""
+def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Robot], str, Placement | None]:
+    """Robots by the names of their folders, the study's first model, and where it says that robots lie."""
     if study is None:
-        return {name: load(name) for name in PAPER_ROBOTS}, AUTO
+        return {name: load(name) for name in PAPER_ROBOTS}, AUTO, None
     from spirillum.studies.loading import load_study
 
     loaded = load_study(study)
@@ -232,11 +234,24 @@ def _robots(study: str | Path | Mapping[str, Any] | None) -> tuple[dict[str, Rob
             name = f"{name}-{1e3 * tail.wavelength:g}-{1e3 * tail.amplitude:g}"
             robot = robot.model_copy(update={"name": name})
         found[file_name(name, {*found, _MARK, _TABLE})] = robot
-    return found, loaded.study.models[0]
+    return found, loaded.study.models[0], loaded.study.placement if loaded.study.placement.is_given else None
+
+
+def _gap(robot: Robot, placement: Placement | None) -> float | None:
+    """Gap at which a robot is drawn, m; None for that of the reference place."""
+    if placement is None or robot.channel is None:
+        return None
+    return gap_of(placement, robot.body.diameter, 0.5 * robot.channel.diameter)
 
 
 def _planned(
-    name: str, robot: Robot, steady: Mapping[str, float], plan: _Plan, camera: CameraOptions, place: int
+    name: str,
+    robot: Robot,
+    steady: Mapping[str, float],
+    plan: _Plan,
+    camera: CameraOptions,
+    place: int,
+    gap: float | None = None,
 ) -> list[Planned]:
     """The trials of the robot at a place in the study."""
     planned = []
@@ -257,6 +272,7 @@ def _planned(
                 "start": start,
                 "body_angle": float(rng.uniform(0.0, 2.0 * np.pi)),
                 "tail_phase": float(rng.uniform(0.0, 2.0 * np.pi)),
+                "gap": gap,
             }
         )
         planned.append(Planned(name, robot, number, rates, trial, int(rng.integers(2**31))))

@@ -11,7 +11,9 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
 from spirillum.swimming.model_choice import AUTO, WALLED, ModelChoice, choose_model
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.tank import tube_height
@@ -41,7 +43,7 @@ class Motion:
 
 
 def steady_rates(
-    robot: Robot, motion: MotionOptions, default_model: str = AUTO
+    robot: Robot, motion: MotionOptions, default_model: str = AUTO, placement: Placement | None = None
 ) -> tuple[dict[str, float], str, tuple[str, ...]]:
     """Forward velocity and rates, SI; a model's where they are not prescribed.
 
@@ -49,6 +51,7 @@ def steady_rates(
         robot: a checked robot.
         motion: the model and the prescribed rates.
         default_model: where `motion` names none; `auto` is what `predict` answers with, where it is ready at once.
+        placement: where the robot lies, for a model with walls; None: at the reference place.
 
     Returns:
         The rates by name, what they are from, and warnings.
@@ -66,8 +69,17 @@ def steady_rates(
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 
-    choice = choose_model(motion.model or default_model, robot, tables_only=True, other_way=_WITHOUT_A_TABLE)
-    steady = predict(robot, model=choice.model, tail_rate=motion.tail_rate, friction=motion.friction, band=False)
+    choice = choose_model(
+        motion.model or default_model, robot, placement=placement, tables_only=True, other_way=_WITHOUT_A_TABLE
+    )
+    steady = predict(
+        robot,
+        model=choice.model,
+        tail_rate=motion.tail_rate,
+        friction=motion.friction,
+        placement=placement if find_swimmer_model(choice.model).placed else None,
+        band=False,
+    )
     found = {name: float(getattr(steady, name)) for name in given} | fixed
     prescribed = [name for name in fixed if name != "tail_rotation_rate"]
     source = f"{choice.model}, prescribed: {', '.join(prescribed)}" if prescribed else choice.model
@@ -97,12 +109,13 @@ def motion_of(robot: Robot, motion: MotionOptions, trial: TrialOptions, camera: 
     Raises:
         InputError: if the rates cannot be computed, or the robot does not fit into its channel in this pose.
     """
-    rates, source, warnings = steady_rates(robot, motion)
     room = _clearance(robot)
     if trial.wobble > room:
         most = f"0 to {1e3 * room:.4g} mm, the room in the channel"
         raise InputError(f"wobble = {1e3 * trial.wobble:.4g} mm; allowed: {most}")
     position = lab_to_camera(camera.view, leftwards=camera.leftwards) @ _resting_place(robot, trial.gap, trial.lateral)
+    placement = None if trial.gap is None else Placement.of({"gap": trial.gap, "pitch": 0.0})
+    rates, source, warnings = steady_rates(robot, motion, placement=placement)
     trajectory = steady_trajectory(
         _USUAL if trial.duration is None else trial.duration,
         **rates,
@@ -132,7 +145,7 @@ def motion_of_run(robot: Robot, run: xr.Dataset, trial: TrialOptions, camera: Ca
     own = robot_of(run)
     if own != robot:
         raise InputError(f"the run's robot {own.name!r} is not {robot.name!r}; allowed: the robot of the run")
-    level = float(_resting_place(robot, TrialOptions().gap, 0.0)[2])  # for a run without a gap of its own
+    level = float(_resting_place(robot, None, 0.0)[2])  # for a run without a gap of its own
     axis = tube_height(robot, camera.view)
     trajectory = run_trajectory(run, camera.view, leftwards=camera.leftwards, axis=axis, level=level)
     model = str(run.attrs.get("model", ""))[:60]
@@ -157,8 +170,13 @@ def _clearance(robot: Robot) -> float:
     return math.inf if robot.channel is None else 0.5 * (robot.channel.diameter - robot.body.diameter)
 
 
-def _resting_place(robot: Robot, gap: float, lateral: float) -> Samples:
+def _resting_place(robot: Robot, asked: float | None, lateral: float) -> Samples:
     """(3,) middle of the body in the channel's axes, low in the tube at a gap and a horizontal offset, m.
+
+    Args:
+        robot: a checked robot.
+        asked: the gap; None: that of the reference place of models with walls.
+        lateral: the offset.
 
     Raises:
         InputError: if gap or offset are wider than the channel leaves.
@@ -166,6 +184,7 @@ def _resting_place(robot: Robot, gap: float, lateral: float) -> Samples:
     if robot.channel is None:
         return np.array([0.0, lateral, 0.0])
     room = _clearance(robot)
+    gap = gap_of(Placement(), robot.body.diameter, 0.5 * robot.channel.diameter) if asked is None else asked
     if gap > room:
         raise InputError(f"gap = {1e3 * gap:.4g} mm; allowed: 0 to {1e3 * room:.4g} mm, where the body is on the axis")
     if abs(lateral) > room - gap:

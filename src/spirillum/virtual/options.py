@@ -77,8 +77,9 @@ class TrialOptions(Options):
     """Of the body at the first frame."""
     tail_phase: Angle = 0.0
     """Of the tail at the first frame."""
-    gap: LengthOrZero = 0.5e-3
-    """Between body and tube; a run has its own."""
+    gap: LengthOrZero | None = None
+    """Between body and tube, in the picture and for a model with walls; None: that of the reference place of `tube`
+    (0.5 mm for the paper's body). A run has its own."""
 
 
 class CameraOptions(Options):

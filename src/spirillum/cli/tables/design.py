@@ -29,7 +29,8 @@ def table(answer: Answer, console: Console) -> None:
     """Tables of `design`."""
     objective = answer["objective"]
     best = _text(objective)
-    title = f"{answer['robot']}, model {answer['model']}: {objective['words']} {best}"
+    model = f"model {answer['model']}{', calibrated' if answer['calibrated'] else ''}"
+    title = f"{answer['robot']}, {model}: {objective['words']} {best}"
     console.print(f"[bold]{escape(title)}[/bold]", highlight=False, soft_wrap=True)
     show_reason(answer, console)
     fields = grid("", "field", "best", "within 1 %", "unit", "today")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-__all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "YAWED", "announcement"]
+__all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "TILTED", "announcement"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
 TABLE_TAKES = "10 to 15 minutes of one core"
 """What it takes to make the table of one robot; estimated from what four tails at once took."""
-YAWED = "a yawed place without a table: the flow is solved for in minutes of one core"
+TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 OF_A_RUN = "the flow at a moment of a run: solved for in about a minute of one core"
 """Progress messages that are to be read, too."""
 _SECONDS = 10.0

@@ -69,7 +69,10 @@ def _in_words(text: str) -> str:
 
 
 def _subtitle(design: Design) -> str:
-    words = [f"model {design.model}", *(_in_words(item) for item in design.conditions)]
+    words = [
+        f"model {design.model}{', calibrated' if design.calibrated else ''}",
+        *(_in_words(item) for item in design.conditions),
+    ]
     if design.uncertainty is not None:
         words.append(f"{design.searched.drawn.number} draws of what is not known")
     return " · ".join([*words, "computed, nothing is measured"])
