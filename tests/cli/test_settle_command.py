@@ -44,7 +44,7 @@ def test_prediction_says_where_it_lies(run: Callable[..., Any]) -> None:
     assert 0 < answer["forward_velocity"]["value"] < 4e-4
     assert answer["placement"]["gap"]["value"] == pytest.approx(5e-4)
     said = answer["other_models"]["statement"]
-    assert "rft leaves out the flow between body and tail" in said
+    assert "rft leaves out the coupling and the flow between body and tail" in said
     assert "sbt" not in said  # it knows no free motion
 
 
