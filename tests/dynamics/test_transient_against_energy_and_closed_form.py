@@ -68,6 +68,16 @@ def test_average_over_the_last_two_of_three_turns_is_the_steady_state(model: str
     assert 2.9 < turns < 3.0
 
 
+def test_walls_hold_it_where_it_is_placed() -> None:
+    """After some time constants a held run is what `predict` says at the same place."""
+    there = {"gap": "0.2 mm", "pitch": "0 deg"}
+    run = held("biorob2012-wide", model="tube", placement=there, timing={"duration": "1 s"})
+    steady = sp.predict("biorob2012-wide", model="tube", placement=there)
+    assert float(run["forward_velocity"][-1]) == pytest.approx(steady.forward_velocity, rel=1e-6)
+    with pytest.raises(sp.InputError, match="a placement is given with motion = 'held'; .* or model 'tube'"):
+        held("biorob2012-wide", model="rft", placement=there)
+
+
 def test_left_handed_robot_is_the_mirror_image() -> None:
     right = held("biorob2012-wide", timing={"duration": "0.1 s"})
     left = held(sp.load("biorob2012-wide", **{"tail.handedness": "left"}), timing={"duration": "0.1 s"})

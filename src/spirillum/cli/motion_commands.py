@@ -80,20 +80,21 @@ def simulate(
         str | None,
         typer.Option(
             metavar="LENGTH",
-            help="Free: smallest distance of body and wall at the start; else 1/18 of the body's radius.",
+            help="Smallest distance of body and wall, free at the start, or where tube holds it; else 1/18 of its "
+            "radius.",
             rich_help_panel=_START,
         ),
     ] = None,
     eccentricity: Annotated[
         float | None,
-        typer.Option(
-            help="Free, instead of --gap: the body's offset towards the floor over R - a.", rich_help_panel=_START
-        ),
+        typer.Option(help="Instead of --gap: the body's offset towards the floor over R - a.", rich_help_panel=_START),
     ] = None,
     pitch: Annotated[
         str | None,
         typer.Option(
-            metavar="ANGLE", help="Free: angle by which the nose is raised at the start.", rich_help_panel=_START
+            metavar="ANGLE",
+            help="Angle by which the nose is raised, free at the start, or where tube holds it.",
+            rich_help_panel=_START,
         ),
     ] = None,
     no_weight: Annotated[

@@ -91,7 +91,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
             turns, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.
         placement: where the free robot starts: `gap` or `eccentricity`, and `pitch`; a heavy robot whose gap is open
-            starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot).
+            starts low, at a gap of 1/18 of its radius (0.5 mm for the paper's robot). With `tube`, motion `held`: where
+            it is held.
         weight: let weight and buoyancy act on the free robot, if its masses are known.
         roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
         in_tube: with a free robot and `tube`: `azimuth`, `wait`, `friction_coefficient` and `flow` over time, see
@@ -125,11 +126,12 @@ def simulate(  # noqa: PLR0913 - the options of the command
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
-    walled = model == "tube" and not held
+    walled, fixed = model == "tube" and not held, None
     contact = calibrated_contact(calibration) if known is None else known.contact()
     if held:
         source = calibration if known is None else known.source
-        _check_held(placed, roughness, contact, str(source), weight=weight)
+        fixed = placed if find_swimmer_model(model).placed else None
+        _check_held(Placement() if fixed else placed, roughness, contact, str(source), weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled)
@@ -148,7 +150,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
             calibrated=calibrated,
             calibration=calibration,
             resolution=resolution,
-            placement=there if walled or drawn is not None else None,
+            placement=there if walled or drawn is not None else fixed,
             band=False,
             progress=tell,
         )
@@ -271,7 +273,8 @@ def _check_held(
         *([] if weight else ["weight = False"]),
     ]
     if given:
-        raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'")
+        or_walls = ", or model 'tube'" if placement.is_given else ""
+        raise InputError(f"{given[0]} with motion = 'held'; allowed: only with motion 'free'{or_walls}")
 
 
 def _left_out(steady: Prediction, links: TwoLinks, *, weight: bool) -> list[str]:
