@@ -31,6 +31,7 @@ __all__ = [
     "parse_option",
     "parse_quantity",
     "show",
+    "show_apart",
     "shown_in",
 ]
 
@@ -309,6 +310,16 @@ def show(value: float, unit: str) -> str:
     """Text of an SI `value` in a display `unit`, four significant digits."""
     number = f"{shown_in(value, unit):.4g}"
     return number if unit == "1" else f"{number} {unit}"
+
+
+def show_apart(one: float, other: float, unit: str) -> tuple[str, str]:
+    """Texts of two SI values in a display `unit`, with as many digits as tell them apart, at least four."""
+    for digits in range(4, 17):
+        texts = tuple(f"{shown_in(value, unit):.{digits}g}" for value in (one, other))
+        if texts[0] != texts[1] or one == other:
+            break
+    first, second = (text if unit == "1" else f"{text} {unit}" for text in texts)
+    return first, second
 
 
 _FOR_PEOPLE = {

@@ -74,7 +74,7 @@ def test_walls_hold_it_where_it_is_placed() -> None:
     run = held("biorob2012-wide", model="tube", placement=there, timing={"duration": "1 s"})
     steady = sp.predict("biorob2012-wide", model="tube", placement=there)
     assert float(run["forward_velocity"][-1]) == pytest.approx(steady.forward_velocity, rel=1e-6)
-    with pytest.raises(sp.InputError, match="a placement is given with motion = 'held'; .* or model 'tube'"):
+    with pytest.raises(sp.InputError, match=r"a placement is given with motion = 'held'; .* or model 'tube'"):
         held("biorob2012-wide", model="rft", placement=there)
 
 

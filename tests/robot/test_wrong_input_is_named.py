@@ -4,11 +4,13 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spirillum.errors import InputError
+from spirillum.robot.limits import Limit
 from spirillum.robot.load import load, raw_table
 
 LENGTHS = 'for example "18 mm"'
@@ -310,3 +312,8 @@ def test_any_table_is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> No
         sentences = ()
     for sentence in sentences:
         assert len(sentence.splitlines()) == 1, sentence
+
+
+def test_a_bound_that_is_missed_by_little_is_told_from_the_value() -> None:
+    limit = Limit.of("Reynolds number", np.array([0.1, 0.100004]), "at most", 0.1, "1", "inertia is left out", "re")
+    assert limit.sentence(1) == "Reynolds number = 0.100004; allowed: at most 0.1, because inertia is left out"

@@ -13,7 +13,7 @@ from spirillum.arrays import Samples
 from spirillum.controllers.control import Control
 from spirillum.units import show
 from spirillum.view.figures.sheet import Sheet, add_letters
-from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
+from spirillum.view.figures.style import COLOURS, PAGE, PATCH, Scale, plain, styled
 
 __all__ = ["control_figure"]
 
@@ -72,8 +72,15 @@ def _legend(control: Control) -> list[Line2D]:
     ]
     if _path_of(control).estimated is not None:
         found.append(Line2D([], [], color=COLOURS["vermillion"], linestyle="--", label="estimated"))
+    if _has_interval(control):
+        found.append(Line2D([], [], color=COLOURS["vermillion"], alpha=0.25, **PATCH, label="its 95 % interval"))
     found.append(Line2D([], [], color=COLOURS["green"], linestyle=(0, (4, 2)), label="aim and tolerance"))
     return found
+
+
+def _has_interval(control: Control) -> bool:
+    """Whether the place that is estimated has a standard error, which is drawn."""
+    return _path_of(control).estimated is not None and "estimated_position_error" in control.dataset
 
 
 class _Path(NamedTuple):
@@ -119,7 +126,7 @@ def _residuals(axes: Axes, control: Control, target: Samples, around: float) -> 
         when = data["decision_time"].values
         middle = path.estimated - np.interp(when, time, target)
         axes.plot(when, scale(middle), "--", color=COLOURS["vermillion"], linewidth=1.0)
-        if "estimated_position_error" in data:
+        if _has_interval(control):
             half = 1.96 * data["estimated_position_error"].values
             axes.fill_between(
                 when, scale(middle - half), scale(middle + half), color=COLOURS["vermillion"], alpha=0.25, linewidth=0

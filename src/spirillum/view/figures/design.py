@@ -73,6 +73,8 @@ def _subtitle(design: Design) -> str:
         f"model {design.model}{', calibrated' if design.calibrated else ''}",
         *(_in_words(item) for item in design.conditions),
     ]
+    if len(design.profiles) > 1:
+        words.append("along each field the others at their best values")
     if design.uncertainty is not None:
         words.append(f"{design.searched.drawn.number} draws of what is not known")
     return " · ".join([*words, "computed, nothing is measured"])
@@ -81,11 +83,12 @@ def _subtitle(design: Design) -> str:
 def _legend(design: Design) -> list[Line2D]:
     """What is drawn, in its colours; nothing that is not."""
     found = [Line2D([], [], **_BEST, label="best")]
-    if design.landscape is not None:
-        if _today(design) is not None:
-            found.append(Line2D([], [], **_TODAY, label="today"))
-        if not np.all(np.isfinite(design.landscape[2])):
-            found.append(Line2D([], [], color=_REFUSED, **PATCH, label="refused, or breaks a condition"))
+    if design.landscape is not None and _today(design) is not None:
+        found.append(Line2D([], [], **_TODAY, label="today"))
+    drawn = [profile.objective for profile in design.profiles]
+    drawn += [] if design.landscape is None else [design.landscape[2]]
+    if not all(np.all(np.isfinite(values)) for values in drawn):
+        found.append(Line2D([], [], color=_REFUSED, **PATCH, label="refused, or breaks a condition"))
     if any(profile.high > profile.low for profile in design.profiles):
         found.append(Line2D([], [], color=COLOURS["blue"], alpha=_SHADE, **PATCH, label="within 1 % of the best"))
     if design.front is not None:
@@ -121,8 +124,12 @@ def _profile(axes: Axes, design: Design, profile: Profile) -> None:
     whole = profile.unit == "1" and len(values) < 30
     if best[2] > best[1]:
         axes.axvspan(best[1], best[2], color=COLOURS["blue"], alpha=_SHADE, linewidth=0)
-    axes.plot(values, objective, color=COLOURS["blue"], marker="o" if whole else None, markersize=4)
     known = np.isfinite(objective)
+    middles = 0.5 * (values[1:] + values[:-1])
+    ends = np.array([values[0], *middles, values[-1]])
+    for n in np.flatnonzero(~known):
+        axes.axvspan(ends[n], ends[n + 1], color=_REFUSED, linewidth=0, zorder=0)
+    axes.plot(values, objective, color=COLOURS["blue"], marker="o" if whole else None, markersize=4)
     axes.plot(best[0], np.interp(best[0], values[known], objective[known]), **_BEST)
     room = 0.3 if whole else 0.0
     axes.set_xlim(values[0] - room, values[-1] + room)

@@ -102,7 +102,7 @@ _IN_TUBE = (
     _Panel("contact", (("contact_force", "normal"), ("contact_friction", "friction")), changing=True, mean=True),
     _Panel("velocity $U_x$", (("forward_velocity", ""),), mean=True),
     _Panel("body rate", (("body_rotation_rate", ""),), mean=True),
-    _Panel("tail rate", (("tail_rotation_rate", "tail"), ("motor_rotation_rate", "motor"))),
+    _Panel("rotation rate", (("tail_rotation_rate", "tail"), ("motor_rotation_rate", "motor"))),
     _Panel("mean flow", (("mean_flow", ""),), changing=True),
 )
 _COLOUR_OF = {
