@@ -51,6 +51,8 @@ def table(answer: Answer, console: Console) -> None:
         shown = {
             name: " ".join(friendly(place[name]["value"], place[name]["unit"])) for name in place if name != "ends"
         }
+        if place["wait"]["value"]:
+            shown["gap"] += " after the wait, where the run begins"
         said = [f"{name.replace('_', ' ')} {words.strip()}" for name, words in shown.items()]
         console.print(f"in the tube: ends {place['ends']}, {', '.join(said)}", highlight=False, soft_wrap=True)
     for words in _events(answer["events"]):
