@@ -18,6 +18,7 @@ from starlette.requests import Request
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.files.limits import LARGEST_TEXT
 from spirillum.pages import server
@@ -145,6 +146,12 @@ def test_guard_beyond_the_loopback_takes_addresses_but_no_foreign_names() -> Non
     assert guard.own_host("192.0.2.7:8000")
     assert not guard.own_host("evil.example:8000")
     assert not Guard("127.0.0.1", 8000).own_host("192.0.2.7:8000")
+
+
+@pytest.mark.parametrize("host", ["", " ", "0", "0x0", "010.0.0.1", "<broadcast>", "a b", "-a", "a..b", "[::1]", "\0"])
+def test_what_is_no_host_is_refused(host: str) -> None:
+    with pytest.raises(InputError, match=r"host = .*; allowed: the name of a host, or an address such as 127\.0\.0\.1"):
+        sp.page(host=host, browser=False)
 
 
 def test_rate_lets_a_burst_through_and_then_no_more() -> None:

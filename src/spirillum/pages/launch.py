@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ipaddress
+import re
 import socket
 import webbrowser
 from collections.abc import Callable, Mapping
@@ -10,7 +12,8 @@ from pathlib import Path
 from threading import Timer
 from typing import TYPE_CHECKING, Any
 
-from spirillum.errors import InputError
+from spirillum.argument_kinds import checked
+from spirillum.errors import InputError, clipped
 from spirillum.extras import required
 from spirillum.robot.robot import Robot
 
@@ -20,8 +23,11 @@ if TYPE_CHECKING:
 __all__ = ["page"]
 
 _LARGEST_PORT = 65_535
+_LABEL = "[a-z0-9_]([a-z0-9_-]{0,61}[a-z0-9_])?"
+_HOST_NAME = re.compile(rf"(?=.{{1,253}}$)({_LABEL}\.)*{_LABEL}\.?", re.IGNORECASE)
 
 
+@checked
 def page(
     robot: str | Path | Mapping[str, Any] | Robot = "biorob2012-wide",
     *,
@@ -45,8 +51,11 @@ def page(
         tell: what is told the page's address; it holds the key.
 
     Raises:
-        InputError: for a robot or run that cannot be shown, a port that is taken, or a missing extra.
+        InputError: for a robot or run that cannot be shown, a host that is none, a port that is taken, or a missing
+            extra.
     """
+    if not _is_host(host):
+        raise InputError(f"host = {clipped(host)}; allowed: the name of a host, or an address such as 127.0.0.1")
     for name in ("starlette", "uvicorn", "websockets"):
         required(name, "the page", "page")
     if not 0 <= port <= _LARGEST_PORT:
@@ -88,6 +97,21 @@ def page(
                 access_log=False,
             )
             uvicorn.Server(config).run(sockets=[listening])
+
+
+def _is_host(host: str) -> bool:
+    """Whether it is an address as it is usually written, or can be the name of a host.
+
+    What the system alone reads as an address is neither: an empty text, ``0`` and ``<broadcast>`` would let the whole
+    network in.
+    """
+    with suppress(ValueError):
+        ipaddress.ip_address(host)
+        return True
+    with suppress(OSError, ValueError):
+        socket.inet_aton(host)
+        return False
+    return _HOST_NAME.fullmatch(host) is not None
 
 
 def _listening(host: str, port: int) -> socket.socket:
