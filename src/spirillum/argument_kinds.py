@@ -64,7 +64,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     """A function that looks at the kinds of its arguments first.
 
     Args:
-        function: a function, or the `__init__` of a class, whose annotations are text
+        function: a function, or a method of a class, whose annotations are text
             (`from __future__ import annotations`).
 
     Returns:
@@ -73,7 +73,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     signature = inspect.signature(function)
     names = [name for name, item in signature.parameters.items() if item.kind is not item.VAR_KEYWORD]
     open_ended = len(names) < len(signature.parameters)
-    own = names[1:] if names[:1] == ["self"] else names
+    own = names[1:] if names[:1] in (["self"], ["cls"]) else names
     called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
 
     @cache

@@ -170,6 +170,49 @@ def test_rates_have_to_match_the_batch(wide: Any, name: str) -> None:
         swim(batch, **{name: np.ones(3)})
 
 
+@pytest.mark.parametrize("name", ["tail_rate", "motor_rate"])
+@pytest.mark.parametrize("wrong", [np.array(["a"]), "1", True, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str)
+def test_rates_have_to_be_numbers(wide: Any, name: str, wrong: Any) -> None:
+    with pytest.raises(InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
+        swim(wide, **{name: wrong})
+
+
+@pytest.mark.parametrize("wrong", [np.nan, [np.nan, np.nan], None, True, "1", [1.0, None], 10**400, [[1], [2, 3]]], ids=str)
+def test_values_of_a_batch_have_to_be_numbers(wide: Any, wrong: Any) -> None:
+    with pytest.raises(InputError, match=r"fluid\.viscosity = .*; allowed: numbers in SI units"):
+        wide.with_values({"fluid.viscosity": wrong})
+
+
+def test_what_is_no_robot_is_not_stacked() -> None:
+    robot = load("biorob2012-wide")
+    for wrong, words in (
+        (["biorob2012-wide"], r"robots\[0\] = 'biorob2012-wide'; allowed: a RobotTables"),
+        ([robot, None], r"robots\[1\] = None; allowed: a RobotTables"),
+        (None, "robots = None; allowed: a RobotTables or a list"),
+        ([], r"robots = \[\]; allowed: one robot, or several"),
+    ):
+        with pytest.raises(InputError, match=words):
+            RobotBatch.of(wrong)
+    with pytest.raises(InputError, match="placement = 'low'; allowed: a Placement or None"):
+        RobotBatch.of(robot, "low")  # type: ignore[arg-type]
+
+
+def test_parts_of_a_batch_are_asked_for_by_numbers(wide: Any) -> None:
+    batch = wide.with_values({"tail.wavelength": WAVELENGTHS})
+    for wrong in ("foo", np.nan, None, 10**400, 0, [[1], [2]], [0.7], [True], [4], [-1]):
+        with pytest.raises(InputError, match=r"rows.*; allowed: whole numbers from 0 to 3, one after the other"):
+            batch.taken(wrong)
+    for wrong in (0, -1, 1.5, "2", None, True):
+        with pytest.raises(InputError, match=r"size = .*; allowed: a whole number"):
+            batch.blocks(wrong)
+    for wrong in (None, [[1], [2]], "tail.wavelength"):
+        with pytest.raises(InputError, match=r"values = .*; allowed: a mapping"):
+            batch.with_values(wrong)
+    with pytest.raises(InputError, match="placement = 'foo'; allowed: a Placement"):
+        batch.placed("foo")
+    assert batch.taken([3, 0, 3]).wavelength.tolist() == WAVELENGTHS[[3, 0, 3]].tolist()
+
+
 def test_unknown_model_and_missing_drive(wide: Any, batch_of: Callable[..., Any]) -> None:
     with pytest.raises(InputError, match=r"model = 'stb' \(did you mean sbt\?\); allowed: .*sbt"):
         swim(wide, "stb")

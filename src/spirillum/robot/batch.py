@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_
 
 import numpy as np
 
-from spirillum.arrays import Flags, PerRobot, Values
-from spirillum.errors import InputError
+from spirillum.argument_kinds import checked
+from spirillum.arrays import Flags, PerRobot, Values, number_array, whole_array
+from spirillum.errors import InputError, clipped
 from spirillum.robot import geometry
 from spirillum.robot.actuation import DriveKind, FrictionReading
 from spirillum.robot.options import ModelOptions
@@ -146,6 +147,7 @@ class RobotBatch:
     placement: Placement
 
     @classmethod
+    @checked
     def of(cls, robots: RobotTables | Sequence[RobotTables], placement: Placement | None = None) -> RobotBatch:
         """Stack robots that differ in numbers only.
 
@@ -154,9 +156,11 @@ class RobotBatch:
             placement: where in their channels they lie, all in the same way; None: nothing is known.
 
         Raises:
-            InputError: if they differ in anything that a batch shares; use `batches` for mixed lists.
+            InputError: for what is no robot, or if they differ in anything that a batch shares; use `batches` for mixed lists.
         """
-        items = [robots] if not isinstance(robots, Sequence) else list(robots)
+        items = [robots] if isinstance(robots, RobotTables) else list(robots)
+        if not items:
+            raise InputError("robots = []; allowed: one robot, or several")
         if len({_shared(robot) for robot in items}) != 1:
             raise InputError(
                 "robots of one batch have to share body shape, model options, drive and friction reading; "
@@ -185,22 +189,40 @@ class RobotBatch:
         return tuple(source.path for source in _columns("RobotBatch").values())
 
     def taken(self, rows: Sequence[int] | np.ndarray) -> RobotBatch:
-        """Robots by their numbers, in that order, each as often as it is named."""
-        chosen = np.asarray(rows, dtype=np.intp)
+        """Robots by their numbers, in that order, each as often as it is named.
+
+        Args:
+            rows: numbers of robots, from 0.
+
+        Raises:
+            InputError: for what is no list of such numbers.
+        """
+        allowed = f"whole numbers from 0 to {self.size - 1}, one after the other"
+        chosen = whole_array("rows", rows, allowed)
+        if chosen.ndim != 1:
+            raise InputError(f"rows has shape {chosen.shape}; allowed: {allowed}")
+        outside = (chosen < 0) | (chosen >= self.size)
+        if np.any(outside):
+            place = int(np.argmax(outside))
+            raise InputError(f"rows[{place}] = {chosen[place]}; allowed: {allowed}")
         return _cut(self, chosen) if self.size > 1 else self
 
+    @checked
     def placed(self, placement: Placement) -> RobotBatch:
         """Return the same robots placed otherwise."""
         return replace(self, placement=placement)
 
+    @checked
     def with_values(self, values: Mapping[str, np.ndarray | Sequence[float] | float]) -> RobotBatch:
         """Return the batch with columns replaced, SI.
 
         Args:
-            values: dotted robot-file field (``tail.wavelength``) to one value, or one for each robot.
+            values: dotted robot-file field (``tail.wavelength``) to one value, or one for each robot; NaN: not known.
+                A robot without a number that it needs gets no answer.
 
         Raises:
-            InputError: for a field that is not a number of the batch, or lengths that do not match.
+            InputError: for a field that is not a number of the batch, values that it cannot have, one that no robot
+                has and each needs, or lengths that do not match.
         """
         known = {source.path: (name, source) for name, source in _columns("RobotBatch").items()}
         unknown = [path for path in values if path not in known]
@@ -211,8 +233,18 @@ class RobotBatch:
         batch.size  # noqa: B018 - raises where lengths do not match
         return batch
 
+    @checked
     def blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
-        """Cut the batch into blocks of at most `size` robots; each comes with its place in the batch."""
+        """Cut the batch into blocks of at most `size` robots; each comes with its place in the batch.
+
+        Raises:
+            InputError: for a size below 1.
+        """
+        if size < 1:
+            raise InputError(f"size = {clipped(size)}; allowed: a whole number from 1")
+        return self._blocks(size)
+
+    def _blocks(self, size: int) -> Iterator[tuple[slice, RobotBatch]]:
         if self.size <= size:
             yield slice(0, self.size), self
             return
@@ -285,10 +317,7 @@ def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float)
         InputError: if it is not one axis of numbers that the field may have.
     """
     path = source.path
-    try:
-        values = np.atleast_1d(np.asarray(value, dtype=float))
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{path} = {str(value)[:60]}; allowed: numbers in SI units") from error
+    values = np.atleast_1d(number_array(path, value, "numbers in SI units"))
     if values.ndim != 1 or values.size == 0:
         raise InputError(f"{path} has shape {values.shape}; allowed: one value, or one for each robot")
     finite = np.isfinite(values) & (np.abs(values) < 1e30)
@@ -299,6 +328,8 @@ def _checked_column(source: Column, value: np.ndarray | Sequence[float] | float)
         wrong = int(np.argmin(allowed))
         least = "0 or more" if source.zero else "any sign" if source.signed else "above 0"
         raise InputError(f"{path} of robot {wrong} = {values[wrong]:.6g}; allowed: finite SI numbers, {least}")
+    if not source.optional and np.all(np.isnan(values)):
+        raise InputError(f"{path} = nan for all robots; allowed: numbers in SI units, NaN only where one is not known")
     return values
 
 

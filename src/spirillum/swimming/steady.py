@@ -8,7 +8,7 @@ from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
-from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
+from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples, number_array
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
@@ -164,7 +164,7 @@ def friction_reading(name: str) -> FrictionReading:
 
 def _per_robot(rate: PerRobot | None, batch: RobotBatch, name: str) -> PerRobot:
     """One rate for each robot; NaN where there is none."""
-    array = np.atleast_1d(np.asarray(np.nan if rate is None else rate, dtype=float))
+    array = np.atleast_1d(number_array(name, np.nan if rate is None else rate, "numbers in rad/s"))
     if array.ndim != 1 or array.size not in (1, batch.size):
         raise InputError(f"{name} has shape {array.shape}; allowed: one value, or {batch.size}, one for each robot")
     return np.broadcast_to(array, (batch.size,))
