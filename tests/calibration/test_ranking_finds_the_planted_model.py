@@ -133,6 +133,14 @@ def test_a_single_model_is_no_ranking(made: Callable[..., Path]) -> None:
         sp.rank_models(made(), models=["sbt"])
 
 
+def test_names_of_all_models_are_looked_at_before_the_first_is_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    from spirillum.calibration import ranking as module
+
+    monkeypatch.setattr(module, "fit_model", lambda *_, **__: pytest.fail("a model was fitted"))
+    with pytest.raises(InputError, match=r"model = 'foo'.*; allowed: "):
+        sp.rank_models("observations.csv", models=["sbt", "foo"])
+
+
 def test_fitted_numbers_have_their_units(made: Callable[..., Path]) -> None:
     from spirillum.calibration.ranking import Ranked, Ranking
 

@@ -8,8 +8,9 @@ from typer.testing import CliRunner
 
 import spirillum as sp
 from spirillum.cli.app import app
-from spirillum.dynamics import simulation
+from spirillum.dynamics import free_motion, simulation
 from spirillum.errors import InputError
+from spirillum.swimming import preparation
 
 ODD = {"channel.diameter": "39.5 mm"}  # of which no table is there
 
@@ -45,6 +46,24 @@ def no_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_wrong_input_costs_no_table(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         sp.simulate(sp.load("biorob2012-wide", **ODD), model="tube", **wrong)
+
+
+def test_gap_above_the_start_is_refused_before_a_table_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(free_motion, "table_for", simulation.table_for)
+    robot = sp.load("biorob2012-wide", **ODD)
+    with pytest.raises(InputError, match="until = 5 mm; allowed: less than 1 mm, the gap at the start"):
+        sp.settle(robot, until="5 mm", placement={"gap": "1 mm"})
+
+
+def test_table_that_could_not_be_kept_is_not_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(preparation, "prepared_tables", simulation.table_for)
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path / "file"))
+    with pytest.raises(InputError, match=r"SPIRILLUM_CACHE = .*file' cannot be written to; allowed: a folder"):
+        sp.prepare(sp.load("biorob2012-wide", **ODD))
+    monkeypatch.setenv("SPIRILLUM_CACHE", "off")
+    with pytest.raises(AssertionError, match="a table would be made"):
+        sp.prepare(sp.load("biorob2012-wide", **ODD))
 
 
 def test_thin_gap_is_no_reason_against_a_table() -> None:

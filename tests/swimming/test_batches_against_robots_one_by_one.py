@@ -177,7 +177,9 @@ def test_rates_have_to_be_numbers(wide: Any, name: str, wrong: Any) -> None:
         swim(wide, **{name: wrong})
 
 
-@pytest.mark.parametrize("wrong", [np.nan, [np.nan, np.nan], None, True, "1", [1.0, None], 10**400, [[1], [2, 3]]], ids=str)
+@pytest.mark.parametrize(
+    "wrong", [np.nan, [np.nan, np.nan], None, True, "1", [1.0, None], 10**400, [[1], [2, 3]]], ids=str
+)
 def test_values_of_a_batch_have_to_be_numbers(wide: Any, wrong: Any) -> None:
     with pytest.raises(InputError, match=r"fluid\.viscosity = .*; allowed: numbers in SI units"):
         wide.with_values({"fluid.viscosity": wrong})

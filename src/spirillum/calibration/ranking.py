@@ -22,11 +22,12 @@ from spirillum.calibration.calibrated import Calibrated
 from spirillum.calibration.estimate import LEVEL
 from spirillum.calibration.fit import RobotSource, fit_model
 from spirillum.calibration.fit_warnings import synthetic_warning
-from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate
+from spirillum.calibration.parameters import DEFAULT_FREE, PARAMETERS, Coordinate, free_names
 from spirillum.calibration.posterior import Sampling
 from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
+from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.shown import Shown, counted
 
@@ -195,13 +196,16 @@ def rank_models(
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
     if free:
         _check_common(names, free)
+    wanted = {name: free or (_FREE_IN_TUBE if name == "tube" else _FREE) for name in names}
+    for name in names:  # all of them, before the first is fitted
+        free_names(wanted[name], find_swimmer_model(name).name)
     fits = {}
     for name in names:
         fits[name] = fit_model(
             observations,
             robots,
             model=name,
-            free=free or (_FREE_IN_TUBE if name == "tube" else _FREE),
+            free=wanted[name],
             method="posterior",
             sampling=sampling,
             prepare=prepare,

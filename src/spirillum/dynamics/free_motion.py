@@ -36,6 +36,7 @@ from spirillum.kernels import tube_motion as kernel
 from spirillum.robot.load import load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
 from spirillum.swimming.answer import Swimming
 from spirillum.swimming.drives import current_at
 from spirillum.swimming.loading import prepared
@@ -140,6 +141,8 @@ def free_motion(
         )
     rough, touching = with_contact(contact, height, asked)
     check_in_tube(ready, placed, touching, rough)
+    if ready.channel is not None:
+        _check_until(until, gap_of(placed, ready.body.diameter, 0.5 * ready.channel.diameter))
     table = table_for(batch, progress=progress)
     laid = Laid(table, placed, asked, height, contact, tail_rate, friction, weight)
     held, links, start = let_go(ready, laid)
@@ -147,8 +150,7 @@ def free_motion(
     check_roughness(links.roughness, float(links.gaps(state).min()))
     check_in_table(links, state, observed_at(links, state)[kernel.OUTSIDE])
     gap = float(observed_at(links, state)[rigid_links.FILM])
-    if until is not None and not until < gap:
-        raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
+    _check_until(until, gap)
     load_size = abs(float(links.weight[: rigid_links.MOMENT_BODY].sum())) * links.length
     heavy = load_size > _LIGHT * links.torque
     tell = progress or (lambda _what, _done, _total: None)
@@ -191,6 +193,20 @@ def _check(asked: InTube) -> None:
             raise InputError(
                 f"in_tube.{name} = {str(getattr(asked, name))[:80]} has no steady motion; allowed: with `simulate`"
             )
+
+
+def _check_until(until: float | None, gap: float) -> None:
+    """Refuse a gap to be reached that is none below the start.
+
+    Args:
+        until: the gap, m; None: no such gap.
+        gap: at the start, m.
+
+    Raises:
+        InputError: if it is not smaller.
+    """
+    if until is not None and not until < gap:
+        raise InputError(f"until = {show(until, 'mm')}; allowed: less than {show(gap, 'mm')}, the gap at the start")
 
 
 def _driven(links: TubeRobot, held: Prediction) -> TubeRobot:

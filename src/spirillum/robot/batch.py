@@ -156,7 +156,8 @@ class RobotBatch:
             placement: where in their channels they lie, all in the same way; None: nothing is known.
 
         Raises:
-            InputError: for what is no robot, or if they differ in anything that a batch shares; use `batches` for mixed lists.
+            InputError: for what is no robot, or if they differ in anything that a batch shares; use `batches` for mixed
+                lists.
         """
         items = [robots] if isinstance(robots, RobotTables) else list(robots)
         if not items:

@@ -11,6 +11,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
+from spirillum.fluid.tube.cache import check_cache_folder
 from spirillum.fluid.tube.domain import tube_radius
 from spirillum.fluid.tube.library import find_table, prepared_tables, tables_are_kept
 from spirillum.fluid.tube.places import Places
@@ -132,13 +133,16 @@ def prepare_all(
         progress: told what is being solved, how many places are done, and of how many.
 
     Raises:
-        InputError: for wrong input, or a robot that the model `tube` does not know or that has no table.
+        InputError: for wrong input, a robot that the model `tube` does not know or that has no table, or a folder
+            that SPIRILLUM_CACHE names in which a new table cannot be kept.
     """
     if isinstance(workers, bool) or not 1 <= workers <= _MOST_WORKERS:
         raise InputError(f"workers = {workers}; allowed: 1 to {_MOST_WORKERS}")
     loaded = [load(robot) for robot in robots]
     asked = [_checked(robot, several=len(loaded) > 1) for robot in loaded]
     new = {key_of(*robot) for robot in asked if find_table(*robot) is None}
+    if new:
+        check_cache_folder()
     tables = prepared_tables(asked, workers=workers, progress=progress)
     return tuple(
         Prepared(robot, table, kept=tables_are_kept() or table.key not in new)

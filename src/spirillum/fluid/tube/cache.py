@@ -21,11 +21,20 @@ from typing import TypeVar
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.solids import MOTIONS
 
-__all__ = ["cache_folder", "digest_of", "imported_sources", "is_kept", "kept_or_computed", "sealed", "unsealed"]
+__all__ = [
+    "cache_folder",
+    "check_cache_folder",
+    "digest_of",
+    "imported_sources",
+    "is_kept",
+    "kept_or_computed",
+    "sealed",
+    "unsealed",
+]
 
 _PACKAGE = Path(__file__).parents[2]
 _LIBRARIES = ("numpy", "scipy", "numba")
@@ -39,6 +48,21 @@ _Q = TypeVar("_Q", bound=tuple[object, ...])
 def cache_folder() -> Path | None:
     """Where answers are kept; None for nowhere."""
     return _folder(os.environ.get("SPIRILLUM_CACHE", ""))
+
+
+def check_cache_folder() -> None:
+    """Refuse a folder that SPIRILLUM_CACHE names and in which nothing can be kept.
+
+    Raises:
+        InputError: if it is one.
+    """
+    named = os.environ.get("SPIRILLUM_CACHE", "")
+    folder = cache_folder()
+    if not named or named.lower() == "off" or (folder is not None and os.access(folder, os.W_OK | os.X_OK)):
+        return
+    raise InputError(
+        f"SPIRILLUM_CACHE = {clipped(named, 200)} cannot be written to; allowed: a folder you may write to, or off"
+    )
 
 
 @lru_cache(maxsize=8)
