@@ -10,7 +10,7 @@ import sys
 from _thread import interrupt_main
 from collections.abc import Sequence
 from contextlib import suppress
-from io import TextIOWrapper
+from io import TextIOBase, TextIOWrapper
 from itertools import pairwise
 from pathlib import Path
 from threading import Timer
@@ -74,6 +74,22 @@ def _prepare() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)
+    if sys.stdout is None:  # else what is printed would be lost without a word
+        sys.stdout = _Closed()
+
+
+class _Closed(TextIOBase):
+    """Standard output that was closed before the program began."""
+
+    def write(self, _text: str) -> int:
+        """Say that an answer would be lost.
+
+        Raises:
+            InputError: always.
+        """
+        from spirillum.errors import InputError
+
+        raise InputError("standard output is closed, and the answer is lost; allowed: a terminal, a file or a pipe")
 
 
 _interrupts: list[int] = []
@@ -173,7 +189,8 @@ def _of_usage(error: Any) -> str:
 def _of_place(error: OSError) -> str:
     """What is wrong with a file's name or place; empty if it is something else."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return "no space is left for the output; allowed: a place with space"
+        target = "the output" if error.filename is None else str(error.filename)[:200]
+        return f"no space is left for {target}; allowed: a place with space"
     if error.errno in _PLACES:
         return f"{str(error.filename)[:80]}: {error.strerror}; allowed: another name or place"
     return ""

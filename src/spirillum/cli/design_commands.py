@@ -81,7 +81,7 @@ def design(
     """
     from spirillum.cli import renderer
     from spirillum.designs.design import design as answer
-    from spirillum.files import PICTURES, output_target, write_text
+    from spirillum.files import PICTURES, output_target, whole_files
     from spirillum.robot.text import robot_text
 
     target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
@@ -110,18 +110,19 @@ def design(
             tail_rate=tail_rate,
             progress=progress,
         )
-    if picture is not None:
-        from spirillum.view.figures.design import design_figure
-        from spirillum.view.figures.style import save_as
+    with whole_files([path for path in (picture, printed, target) if path is not None]) as parts:
+        if picture is not None:
+            from spirillum.view.figures.design import design_figure
+            from spirillum.view.figures.style import save_as
 
-        save_as(design_figure(found), picture)
-    if target is not None:
-        words = f"Best design of {loaded.name}: {found.objectives[0].words}, model {found.model}."
-        write_text(target, robot_text(found.robot, words))
-    if printed is not None:
-        from spirillum.exports.write import export
+            save_as(design_figure(found), parts[picture])
+        if printed is not None:
+            from spirillum.exports.write import export
 
-        export(found.robot, printed)
+            export(found.robot, parts[printed])
+        if target is not None:
+            words = f"Best design of {loaded.name}: {found.objectives[0].words}, model {found.model}."
+            parts[target].write_text(robot_text(found.robot, words), encoding="utf-8")
     files = {"file": None if output is None else str(output), "picture": None if plot is None else str(plot)}
     files |= {"stl": None if stl is None else str(stl)}
     renderer.show(renderer.with_files(found.to_dict(), **files), json=json)

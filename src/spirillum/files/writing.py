@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 from spirillum.errors import InputError
-from spirillum.files.locks import private_folder
+from spirillum.files.locks import LEFTOVER, private_folder
 from spirillum.files.names import checked_path
 
 __all__ = [
@@ -57,6 +57,7 @@ _AT_THE_END = {
 _OWN = re.compile(rb"(?i)written by `?spirillum|\"schema\": ?\"spirillum\.[a-z-]+/\d")
 _HEAD, _TAIL = 1 << 16, 1 << 12
 _ANYTHING = "a file name"
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
 
@@ -186,10 +187,11 @@ def whole_files(
                 inside = inside / str(number)
                 inside.mkdir()
             temporary[path] = inside / place.name
-        yield temporary
-        made = {path: made for path, made in temporary.items() if made.exists()}
-        for part in made.values():
-            _finish(part, sync=sync)
+        with _named(temporary):
+            yield temporary
+            made = {path: made for path, made in temporary.items() if made.exists()}
+            for part in made.values():
+                _finish(part, sync=sync)
         for path, part in made.items():
             check_replaceable(path, replace, begins[path])  # it may have come meanwhile
             try:
@@ -199,6 +201,24 @@ def whole_files(
         if sync:
             for folder in folders:
                 synced(folder)
+
+
+@contextmanager
+def _named(temporary: Mapping[Path, Path]) -> Iterator[None]:
+    """Say want of space of the file that is being made, for a user does not know the hidden ones.
+
+    Args:
+        temporary: files, and the hidden ones in their places.
+    """
+    try:
+        yield
+    except OSError as error:
+        hidden = error.filename is None or LEFTOVER in str(error.filename)
+        if error.errno not in _NO_SPACE or not hidden:
+            raise
+        known = [path for path, part in temporary.items() if str(part) == str(error.filename)]
+        begun = [path for path, part in temporary.items() if part.exists()]
+        raise OSError(error.errno, error.strerror, str((known or begun or list(temporary))[-1])) from error
 
 
 def holds_own_only(folder: Path) -> bool:
@@ -240,9 +260,9 @@ def whole_folder(path: Path) -> Iterator[Path]:
 
 
 def _unwritable(path: Path, error: OSError) -> Exception:
-    """A sentence on a place that cannot be written to; want of space stays what it is."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return error
+    """A sentence on a place that cannot be written to; want of space stays what it is, and names the place."""
+    if error.errno in _NO_SPACE:
+        return OSError(error.errno, error.strerror, str(path))
     return InputError(f"{path} cannot be written ({error.strerror}); allowed: a folder you may write to")
 
 
