@@ -92,6 +92,12 @@ def test_gain_and_narrowing_are_those_of_a_linear_gaussian_measurement(
         assert found.narrowing[name] == pytest.approx(np.sqrt(after[place, place]) / spread[place], rel=0.02)
 
 
+def test_a_candidate_that_stands_twice_is_refused(fitted: Path) -> None:
+    path = candidates(fitted, "40,20,2.5", "40,12,1.5", "40.0,20,2.50")
+    with pytest.raises(sp.InputError, match=r"candidates\.csv, .*wavelength_mm = 20, .* stands twice; allowed: each"):
+        sp.suggest(fitted / "posterior.nc", WIDE, candidates=path)
+
+
 def test_candidates_that_the_draws_do_not_tell_apart_are_a_tie(
     fitted: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -49,6 +50,15 @@ def test_a_table_that_is_not_kept_says_so() -> None:
     assert not [sentence for sentence in found.warnings if "SPIRILLUM_CACHE" in sentence]
     lost = Prepared(found.robot, found.table, kept=False)
     assert "SPIRILLUM_CACHE is off" in lost.warnings[-1]
+
+
+def test_an_error_above_the_allowed_one_is_written_with_digits_that_differ() -> None:
+    found = sp.prepare("biorob2012-wide")
+    for error, said in ((0.0201, "2.01 %"), (0.02 + 1e-9, "2.0000001 %"), (0.034, "3.4 %")):
+        worse = replace(found.table, error={**found.table.error, "sideways_force": error})
+        (sentence,) = Prepared(found.robot, worse).warnings
+        assert f"sideways force is off by up to {said} at yawed places" in sentence
+        assert "more than the 2 %" in sentence
 
 
 @pytest.mark.parametrize("workers", [0, 65, True])

@@ -303,6 +303,9 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
         ({"unknown": {"tail.wavelength": "5 mm:9 mm"}}, "varied and unknown"),
         ({"judged": {"draws": 1}}, "draws"),
         ({"bench": {"mandrel": -1.0}}, "bench.mandrel"),
+        ({"bench": {"mandrel": float("nan")}}, "bench.mandrel = nan is no number; allowed: "),
+        ({"judged": {"level": float("nan")}}, "level = nan is no number; allowed: "),
+        ({"bench": {"clearance": "100 mm"}}, "bench.clearance = 100 mm; allowed: at most 17 mm, which the tube leaves"),
     ],
 )
 def test_what_is_wrong_is_said(change: dict, words: str) -> None:

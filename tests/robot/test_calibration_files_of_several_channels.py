@@ -80,6 +80,10 @@ def test_a_file_without_factors_leaves_the_robot_its_own(tmp_path: Path) -> None
         ('[fitted]\nviscosity = "3 mm"\n', '"mm" is not a unit of viscosity'),
         ("[calibration]\nsbt = 3\n", "calibration.sbt"),
         (TABLES + '[provenance]\nfriction_reading = "foo"\n', "friction_reading"),
+        (
+            TABLES + '[provenance]\nmodel = "xyz"\n',
+            "provenance.model = 'xyz' is not allowed; allowed: a model that swims",
+        ),
         (TABLES.partition("[fitted]")[0] * 2, "calibration.sbt holds two entries for the same geometry"),
     ],
 )

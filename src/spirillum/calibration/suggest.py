@@ -299,7 +299,7 @@ def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
     if not 1 <= len(table.below) <= _MOST:
         raise InputError(f"{path} holds {len(table.below)} candidates; allowed: 1 to {_MOST}")
     by_channel = {round(robot.channel.diameter, 9): robot for robot in robots if robot.channel}
-    found = []
+    found: dict[tuple[float, ...], Robot] = {}
     for row in table.rows():
         channel, wavelength, amplitude = (
             1e-3 * row.number(name, name, low=1e-6, high=1e6, blank=(), allowed="a length of 1e-06 to 1e+06 mm")
@@ -309,5 +309,8 @@ def _listed(path: Path, robots: Sequence[Robot]) -> list[Robot]:
         if robot is None:
             allowed = ", ".join(f"{diameter * 1e3:g} mm" for diameter in sorted(by_channel))
             raise InputError(f"{row.place}, column channel_diameter_mm: {row.text(_COLUMNS[0])}; allowed: {allowed}")
-        found.append(with_tail(robot, wavelength, amplitude))
-    return list({tail_words(robot): robot for robot in found}.values())  # a tail that stands twice is one candidate
+        if (channel, wavelength, amplitude) in found:
+            tail = ", ".join(f"{name} = {row.text(name)}" for name in _COLUMNS)
+            raise InputError(f"{row.place}: {tail} stands twice; allowed: each candidate once")
+        found[channel, wavelength, amplitude] = with_tail(robot, wavelength, amplitude)
+    return list(found.values())

@@ -7,11 +7,13 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field
 
+from spirillum.errors import InputError
 from spirillum.robot.arguments import Options
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.fields import LengthOrZero
 from spirillum.robot.geometry import coil_curvature
 from spirillum.robot.limits import Limit
+from spirillum.units import show
 
 __all__ = ["Bench"]
 
@@ -27,6 +29,24 @@ class Bench(Options):
     around its own diameter (IEC 60851-3, mandrel winding)."""
     clearance: LengthOrZero | None = None
     """Least distance of the tail from the glass where its axis is the tube's; None: one wire diameter."""
+
+    def check(self, designs: RobotBatch) -> None:
+        """Refuse a clearance that no design leaves, before any of them is swum.
+
+        Args:
+            designs: some of them, with the widest channel, the thinnest wire and the smallest amplitude of all.
+
+        Raises:
+            InputError: if there is none.
+        """
+        room = 0.5 * float(designs.channel_diameter.max() - designs.wire_diameter.min())
+        amplitude = float(designs.amplitude.min())
+        most = room - amplitude
+        if self.clearance is not None and 0.0 <= most < self.clearance:
+            raise InputError(
+                f"bench.clearance = {show(self.clearance, 'mm')}; allowed: at most {show(most, 'mm')}, which the tube "
+                f"leaves beside a tail of {show(amplitude, 'mm')} amplitude"
+            )
 
     def limits(self, batch: RobotBatch) -> list[Limit]:
         """The conditions, for every robot of a batch."""

@@ -111,6 +111,7 @@ def design(
     objectives = _objectives(maximise, minimise, options)
     conditions = tuple(condition_of(text) for text in ([subject_to] if isinstance(subject_to, str) else subject_to))
     wound = Bench.of(bench)
+    wound.check(space.batch(np.array([[0.0], [1.0]]) * np.ones(space.size)))
 
     def under(drawn: Drawn) -> Evaluation:
         return Evaluation(space, chosen, objectives, conditions, wound, drawn, options.confidence, rate)

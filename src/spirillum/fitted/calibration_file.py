@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.files import read_toml
+from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.robot.fields import (
     AlsoReads,
     BackEmfConstant,
@@ -54,6 +55,17 @@ _Word = Annotated[Text, Field(max_length=500)]
 def _as_list(value: Any) -> Any:
     """A single table, as in a robot file, is a list of one."""
     return [value] if isinstance(value, Mapping) else value
+
+
+def _fitted_model(name: str) -> str:
+    """The name of a model that may have been fitted, or none.
+
+    Raises:
+        ValueError: for any other name.
+    """
+    if name and name not in SWIMMER_MODELS:
+        raise ValueError(f"a model that swims: {', '.join(SWIMMER_MODELS)}")
+    return name
 
 
 _Entries = Annotated[
@@ -125,7 +137,7 @@ class Provenance(Section):
     """Rows that were used."""
     robots: Annotated[tuple[_Word, ...], Field(max_length=1000)] = ()
     """Robots that the rows belong to."""
-    model: _Word = ""
+    model: Annotated[_Word, AfterValidator(_fitted_model)] = ""
     """Hydrodynamic model that was fitted."""
     method: _Word = ""
     """Method of the fit."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -98,6 +99,11 @@ def refused_value(error: ValidationError, field: str) -> str:
 def _refused(problem: Mapping[str, Any], field: str) -> str:
     """A sentence of field, value, and what is allowed."""
     shown, words = clipped(problem.get("input")), _allowed(problem, field)
+    given = problem.get("input")
+    if isinstance(given, float) and math.isnan(
+        given
+    ):  # it is in no range; the limit that was looked at first says little
+        return f"{field or 'the file'} = nan is no number; allowed: {words}"
     hint = ""
     if problem["type"] == "literal_error":
         hint = did_you_mean(str(problem["input"])[:60], re.findall(r"'([^']+)'", words))

@@ -49,8 +49,8 @@ class Prepared(Shown):
     def warnings(self) -> tuple[str, ...]:
         """What to be careful about, a sentence each."""
         worse = [
-            f"{name.replace('_', ' ')} is off by up to {100.0 * self.table.error[name]:.2g} % at yawed places that "
-            f"were not used, more than the {100.0 * allowed:.2g} % that a table should have"
+            f"{name.replace('_', ' ')} is off by up to {_above(self.table.error[name], allowed)} % at yawed places "
+            f"that were not used, more than the {100.0 * allowed:.2g} % that a table should have"
             for name, allowed in RESPONSES.items()
             if self.table.error[name] > allowed
         ]
@@ -82,6 +82,12 @@ class Prepared(Shown):
             },
             "seconds": quantity(self.table.seconds, "s"),
         }
+
+
+def _above(error: float, allowed: float) -> str:
+    """An error in percent, with as many digits as show that it is above the one that is allowed."""
+    texts = (f"{100.0 * error:.{digits}g}" for digits in range(2, 18))
+    return next((text for text in texts if float(text) > 100.0 * allowed), f"{100.0 * error:.17g}")
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
