@@ -63,6 +63,7 @@ def test_table_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_pa
         (["--at", "1mm", "--with", "="], "--with '=' is not PATH=VALUE"),
         (["--at", "1mm", "--task", "stopp"], "(did you mean stop-at?)"),
         (["--at", "1mm", "--controller", "pid"], "controller = 'pid'"),
+        (["--at", "1mm", "--workers", "3"], "workers = 3 without seeds, whose runs they share; allowed: 1, or seeds"),
         (["--at", "1mm", "--seeds", "-1"], "seeds = -1; allowed: 0 to"),
         (["--at", "1mm", "--duration", "0s"], "task.duration = 0 s"),
         (["--at", "1mm", "--lab", "nowhere.toml"], "nowhere.toml does not exist"),

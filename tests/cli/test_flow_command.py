@@ -13,7 +13,10 @@ import pytest
 import xarray as xr
 
 WIDE = "biorob2012-wide"
-SMALL = ("--model", "slender", "--resolution", "30", "--volume-resolution", "20", "--tail-rate", "1.2Hz")
+QUICK = ("--model", "slender", "--tail-rate", "1.2Hz")
+PLANE = (*QUICK, "--resolution", "30")
+BOX = (*QUICK, "--volume-resolution", "20")
+SMALL = (*PLANE, *BOX)
 
 
 @pytest.fixture(autouse=True)
@@ -67,7 +70,7 @@ def test_summary_agrees_with_the_files(run: Callable[..., Any], tmp_path: Path) 
 @pytest.mark.parametrize("name", ["flow.png", "flow.pdf", "flow.svg", "flow.nc"])
 def test_every_kind_of_plane_is_written(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
     arguments = ("--plane", "yz", "--offset", "-50mm", "--extent", "10mm", "--frame", "body")
-    outcome = run("flow", WIDE, *SMALL, *arguments, "-o", str(tmp_path / name))
+    outcome = run("flow", WIDE, *PLANE, *arguments, "-o", str(tmp_path / name))
     assert outcome.code == 0
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert "plane yz, 30 x 30 points" in " ".join(outcome.out.split())
@@ -76,7 +79,7 @@ def test_every_kind_of_plane_is_written(run: Callable[..., Any], tmp_path: Path,
 
 @pytest.mark.parametrize("name", ["flow.vti", "flow.nc"])
 def test_a_box_alone_is_written(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
-    outcome = run("flow", WIDE, *SMALL, "--volume", str(tmp_path / name))
+    outcome = run("flow", WIDE, *BOX, "--volume", str(tmp_path / name))
     assert outcome.code == 0
     assert [path.name for path in tmp_path.iterdir()] == [name]
     assert "box, 20 x 9 x 9 points" in " ".join(outcome.out.split())  # a long path wraps the title
@@ -97,7 +100,7 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
     assert "ends of the channel: closed" in table
     assert "gap" in table
     imposed = ("--model", "tube", "--flow=-1mm/s", "--gap", "1mm", "--pitch", "0deg", "--tolerance", "0.05")
-    assert run("flow", WIDE, *SMALL, *imposed, "-o", str(tmp_path / "flow.png")).code == 0
+    assert run("flow", WIDE, *PLANE, *imposed, "-o", str(tmp_path / "flow.png")).code == 0
 
 
 @pytest.mark.parametrize(
@@ -117,6 +120,10 @@ def test_in_the_tube(run: Callable[..., Any], tmp_path: Path) -> None:
         (["-o", "flow.png", "--resolution", "1000000"], "resolution = 1000000; allowed"),
         (["-o", "flow.png", "--resolution", "many"], "--resolution"),
         (["--volume", "flow.vti", "--volume-resolution", "900"], "allowed: at most 2000000 points"),
+        (["--volume", "flow.vti", "--plane", "xy"], "--plane without a plane (-o FILE)"),
+        (["--volume", "flow.vti", "--offset", "1mm"], "--offset without a plane (-o FILE)"),
+        (["--volume", "flow.vti", "--resolution", "30"], "--resolution without a plane (-o FILE)"),
+        (["-o", "flow.png", "--volume-resolution", "30"], "--volume-resolution without --volume FILE"),
         (["-o", "flow.png", "--phase", "1"], 'phase = "1" has no unit'),
         (["-o", "flow.png", "--frame", "tail"], "frame = 'tail'"),
         (["-o", "flow.png", "--model", "rft"], "model = 'rft'; allowed: auto, slender, tube"),

@@ -179,6 +179,13 @@ def test_what_cannot_be_stored_gets_a_sentence(tmp_path: Path) -> None:
     assert tree(store) == before
 
 
+def test_a_store_prints_no_ranking_to_shorten(run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    outcome = run("study", "--store", str(tmp_path / "study.zarr"), "--rows", "1")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "--rows 1 with --store, which prints no ranking; allowed: " in outcome.err
+    assert not (tmp_path / "study.zarr").exists()
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit on the size of files")
 def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(tmp_path: Path) -> None:
     """A limit on the size of files stands for the disk."""

@@ -60,6 +60,8 @@ from spirillum.cli.virtual_commands import render, virtual_experiment
 
 __all__ = ["app", "command_line"]
 
+_ROWS = 10
+
 app = typer.Typer(
     name="spirillum",
     help="Predict, measure and explain how a robot with a rotating helical tail swims in a fluid-filled channel.",
@@ -321,7 +323,7 @@ def study(
     ] = None,
     calibration: Calibration = None,
     posterior: Posterior = None,
-    rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = 10,
+    rows: Annotated[int, typer.Option(min=1, help="Robots in the ranking.")] = _ROWS,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -330,7 +332,10 @@ def study(
     Example: `spirillum study -o my-study`
     """
     from spirillum.cli import renderer
+    from spirillum.errors import InputError
 
+    if store is not None and rows != _ROWS:
+        raise InputError(f"--rows {rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)")
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer
         from spirillum.results.study import study_answer

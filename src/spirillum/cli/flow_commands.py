@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 __all__ = ["flow"]
 
+_PLANE, _OFFSET, _POINTS, _BOX_POINTS = "xz", "0mm", 240, 80
+
 
 def _complete_accuracies(incomplete: str) -> list[str]:
     return starting(("high", "standard"), incomplete)
@@ -58,16 +60,16 @@ def flow(
     ] = None,
     plane: Annotated[
         str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
-    ] = "xz",
+    ] = _PLANE,
     offset: Annotated[
         str, typer.Option(metavar="LENGTH", help="Place of the plane on the axis across it, such as -50mm.")
-    ] = "0mm",
+    ] = _OFFSET,
     extent: Annotated[
         str | None,
         typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
     ] = None,
-    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
-    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
+    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = _POINTS,
+    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = _BOX_POINTS,
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     frame: Annotated[
         str, typer.Option(autocompletion=complete_frames, help="lab, or body (moving with its forward velocity).")
@@ -115,6 +117,9 @@ def flow(
     from spirillum.results.flow import check_targets, write_flow
 
     check_targets(output, volume)
+    of_the_plane = {"plane": plane != _PLANE, "offset": offset != _OFFSET, "resolution": resolution != _POINTS}
+    _check_used(of_the_plane if output is None else {}, "a plane (-o FILE)")
+    _check_used({"volume-resolution": volume_resolution != _BOX_POINTS} if volume is None else {}, "--volume FILE")
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow, yaw)
     fineness = {"accuracy": accuracy, "tolerance": tolerance}
     if run is None:
@@ -159,6 +164,21 @@ def flow(
         for path, dataset in written.items():
             write_flow(found, dataset, path)
     renderer.show(flow_answer(found, written), json=json)
+
+
+def _check_used(options: dict[str, bool], need: str) -> None:
+    """Refuse options of a file that is not asked for.
+
+    Args:
+        options: those that belong to it, and whether they are given.
+        need: what asks for it.
+
+    Raises:
+        InputError: if one is given.
+    """
+    given = [name for name, there in options.items() if there]
+    if given:
+        raise InputError(f"--{given[0]} without {need}, to which it belongs; allowed: both or neither")
 
 
 def _check_run(given: dict[str, Any], time: str | None, phase: str, model: str) -> None:

@@ -260,6 +260,8 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
         raise InputError(f"seed = {clipped(seed)}; allowed: 0 to {_LAST_SEED - seeds}")
     if not 1 <= workers <= 256:
         raise InputError(f"workers = {clipped(workers)}; allowed: 1 to 256")
+    if workers > 1 and not seeds:
+        raise InputError(f"workers = {workers} without seeds, whose runs they share; allowed: 1, or seeds from 1")
     for name in arguments:
         if name not in _ALLOWED:
             hint = did_you_mean(str(name)[:60], _ALLOWED)
