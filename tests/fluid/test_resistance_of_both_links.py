@@ -81,9 +81,3 @@ def test_table_shows_three_blocks(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_model_of_the_body_alone_refuses_both() -> None:
     with pytest.raises(sp.InputError, match="part = 'both' with model 'perrin'; allowed: body"):
         both(model="perrin")
-
-
-@pytest.mark.parametrize("part", ["body", "coupling"])
-def test_a_part_that_does_not_turn_has_no_phase(part: str) -> None:
-    with pytest.raises(sp.InputError, match=rf"phase = '90 deg' with part '{part}', which does not turn with the tail"):
-        sp.resistance("biorob2012-wide", part=part, model="slender", phase="90 deg")

@@ -11,7 +11,7 @@ import numpy as np
 
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
-from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.errors import InputError, did_you_mean
 from spirillum.fluid.algebra import transfer
 from spirillum.fluid.model import PARTS, ResistanceModel, SwimmerModel
 from spirillum.fluid.registry import check_placement, find_model
@@ -28,8 +28,6 @@ __all__ = ["Resistance", "resistance"]
 
 _UNITS = [["N s/m", "N s"], ["N s", "N m s"]]
 _BOTH = "both"
-_WITHOUT_PHASE = ("body", "coupling")
-"""Parts that do not turn with the tail."""
 _LINKS = ("body", "rotor")
 """Order of the two links in a 12x12."""
 
@@ -104,7 +102,7 @@ def resistance(
             the model knows.
         model: `perrin` (body only), `rft`, `slender`, `tube`, or `sbt` (axial entries only).
         about: reference point, `body` (the origin) or `tail-root`.
-        phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad; 0 for `body` and `coupling`.
+        phase: phase phi of the tail, with its unit (``"90 deg"``) or a float in rad.
         resolution: of the models `slender` and `tube`: `accuracy`, `tolerance`; None: the robot's own.
         placement: where in the channel the robot lies, for a model that computes the walls: `gap`, `eccentricity`,
             `pitch`, `tail_drop`, `ends`, `flow`, each a quantity with its unit or a float in SI.
@@ -125,11 +123,6 @@ def resistance(
     if about not in ("body", "tail-root"):
         raise InputError(f"about = {about!r}; allowed: body, tail-root")
     angle = parse_option("phase", phase, KINDS["angle"])
-    if part in _WITHOUT_PHASE and angle != 0.0:
-        raise InputError(
-            f"phase = {clipped(phase)} with part '{part}', which does not turn with the tail; allowed: 0, or another "
-            "part"
-        )
     batch = RobotBatch.of(ready, Placement.of(placement))
     check_placement(batch.placement, chosen)
     outside = broken(chosen.part_domain(batch, "robot" if part == _BOTH else part))
@@ -151,7 +144,7 @@ def resistance(
 
 def _warnings(robot: Robot, model: ResistanceModel, batch: RobotBatch, part: str) -> tuple[str, ...]:
     found = list(robot.warnings)
-    if part not in _WITHOUT_PHASE:
+    if part not in ("body", "coupling"):
         found += [limit.sentence() for limit in broken(model.cautions(batch))]
     if model.axial_only:
         found.append(
