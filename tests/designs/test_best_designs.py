@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import direct, minimize_scalar
 
+import posteriors
 import spirillum as sp
 from spirillum.designs.answer import Learned
 from spirillum.designs.bench import Bench
@@ -177,6 +178,23 @@ def test_calibration_factors_are_named(unsure: sp.Design) -> None:
     assert unsure.to_dict()["calibrated"]
     assert any("calibration factors, the same for every design, stand for the" in item for item in unsure.warnings)
     assert not any("walls are left out" in item for item in unsure.warnings)
+
+
+def test_a_posterior_is_said_what_predict_says_of_it(tmp_path) -> None:
+    """Whose geometry it was fitted to, that it is synthetic, and that its factors stand for the walls."""
+    file = posteriors.write(tmp_path / "posterior.nc")
+    few = {"draws": 8}
+    away = sp.design(
+        "ecoli", {"tail.wavelength": "2 um:2.5 um"}, maximise="forward_velocity", posterior=file, judged=few
+    )
+    assert set(sp.predict("ecoli", posterior=file).warnings) <= set(away.warnings)
+    assert any("is used outside its geometry: channel.diameter = none" in item for item in away.warnings)
+    assert any("o.csv says that its numbers are synthetic" in item for item in away.warnings)
+    bare = sp.load("biorob2012-wide").model_copy(update={"calibration": {}})
+    found = sp.design(bare, {"tail.wavelength": "20 mm:30 mm"}, maximise="forward_velocity", posterior=file, judged=few)
+    assert found.calibrated
+    assert any("calibration factors, the same for every design, stand for the" in item for item in found.warnings)
+    assert not any("walls are left out" in item for item in found.warnings)
 
 
 def test_a_lead_within_the_models_error_is_no_lead(unsure: sp.Design) -> None:

@@ -125,8 +125,8 @@ class Design(Shown):
 
     @property
     def calibrated(self) -> bool:
-        """Whether calibration factors of the robot for this model apply to every design."""
-        return self.model in self.robot.calibration
+        """Whether calibration factors for this model, the robot's or a posterior's, apply to every design."""
+        return self.model in self.searched.space.robot.calibration
 
     @property
     def winding(self) -> dict[str, float]:

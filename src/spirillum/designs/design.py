@@ -23,12 +23,14 @@ from spirillum.designs.search import Archive, best_design, pareto_front
 from spirillum.designs.space import Space, space_of
 from spirillum.designs.unknowns import Drawn, Unknowns, unknowns_of
 from spirillum.errors import InputError
+from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.robot.text import with_numbers
 from spirillum.swimming.answer import LEVEL, STEADY, Swimming
+from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.drive_warnings import drive_warnings
 from spirillum.swimming.model_choice import AUTO
 from spirillum.swimming.steady import friction_reading
@@ -238,7 +240,7 @@ def _answer(
         swum=archive.count,
         refused=archive.refused,
         breaking=archive.breaking,
-        warnings=_warnings(given, stated, best, swum, bound_by, list(stated.drawn.values)),
+        warnings=_warnings(given, unknowns, stated, best, swum, bound_by),
     )
 
 
@@ -334,10 +336,11 @@ def _built(given: Robot, space: Space, best: Samples) -> Robot:
 
 
 def _warnings(
-    given: Robot, stated: Evaluation, best: Samples, swum: Swimming, bound_by: Sequence[str], unknown: Sequence[str]
+    given: Robot, unknowns: Unknowns, stated: Evaluation, best: Samples, swum: Swimming, bound_by: Sequence[str]
 ) -> tuple[str, ...]:
     """What to be careful about, a sentence each."""
     found = list(given.warnings)
+    known, built = unknowns.robot, _built(unknowns.robot, stated.space, best)
     if given.channel is not None and stated.model.name == "tube":
         found.append(
             "all designs lie at the reference place (a gap of 0.5 mm for the paper's body, level): `spirillum predict` "
@@ -347,17 +350,20 @@ def _warnings(
         name = stated.model.name
         walls = (
             f"calibration factors, the same for every design, stand for the channel's walls (model '{name}')"
-            if name in given.calibration
+            if name in known.calibration
             else f"the channel's walls are left out, which makes a robot faster than it is (model '{name}')"
         )
         found.append(
             f"{walls}: let `spirillum predict` with model tube answer for the best design and others near it, whose "
             "order walls may change"
         )
-    if not {"friction.effective", "friction", "shared_friction"} & set(unknown):
-        reading = friction_reading(given.friction.reading)
-        found += drive_warnings(stated.space.robot, stated.model, reading, swum, stated.tail_rate)
-    found += _near_step_out(_built(given, stated.space, best), swum)
+    if stated.model.name in known.calibration:
+        found += calibration_warnings(built, stated.model.name)
+    reading = friction_reading(given.friction.reading)
+    if not {"friction.effective", "friction", "shared_friction"} & set(stated.drawn.values):
+        found += drive_warnings(known, stated.model, reading, swum, stated.tail_rate)
+    found += fitted_of(None, unknowns.posterior).answer_warnings(known, stated.model, reading, stated.tail_rate)
+    found += _near_step_out(built, swum)
     found += [limit.sentence() for limit in broken(stated.model.cautions(stated.space.batch(best[None])))]
     if any("end of its range" in words for words in bound_by):
         found.append("the best design lies at the end of a range: a wider one may hold a better design")

@@ -136,6 +136,20 @@ class Fitted:
             "for another torque: rates and speeds of the robot's own drive do not follow from the observations there"
         ]
 
+    def answer_warnings(self, robot: Robot, model: SwimmerModel, reading: str, rate: float | None) -> list[str]:
+        """All that has to be said beside a steady motion.
+
+        Args:
+            robot: the robot.
+            model: the hydrodynamic model.
+            reading: reading of the friction.
+            rate: prescribed tail rate; None: the robot's own drive, whose friction then matters.
+        """
+        idle = self.idle_warnings([robot], [model])
+        if rate is None:
+            return [*idle, *self.run_warnings(robot, model, reading)]
+        return [*idle, *self.origin_warnings([robot], [model])]
+
     def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[str]:
         """All that has to be said of a robot that is driven by its own motor.
 

@@ -354,10 +354,7 @@ class _Case:
 
     def fitted_warnings(self) -> list[str]:
         """What to be careful about in what was fitted."""
-        idle = self.fitted.idle_warnings([self.robot], [self.model])
-        if self.rate is None:
-            return [*idle, *self.fitted.run_warnings(self.robot, self.model, self.friction)]
-        return [*idle, *self.fitted.origin_warnings([self.robot], [self.model])]
+        return self.fitted.answer_warnings(self.robot, self.model, self.friction, self.rate)
 
     def why_not(self) -> str:
         """Why there is no steady motion."""
