@@ -56,6 +56,7 @@ def test_table_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_pa
         (["--at", "1mm", "--with", "camera.late=1s"], "camera.late is not a known field (did you mean latency?)"),
         (["--at", "1mm", "--with", "optics.fps=1"], "lab.optics is not a known table"),
         (["--at", "1mm", "--with", "remote.delay=2h"], "remote.delay"),
+        (["--at", "1mm", "--with", "camera.latency=50"], "camera.latency = 50 has no unit; allowed: a number with its"),
         (["--at", "1mm", "--with", "camera"], "--with 'camera' is not PATH=VALUE"),
         (["--at", "2mm", "--seen-by", "me"], "seen-by = 'me'; allowed: model, tracker"),
         (["--at", "2mm", "--remote", "/dev/no-such-port"], "/dev/no-such-port cannot be opened"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
 from spirillum.controllers.sensors import FlowPulse, draw
 from spirillum.controllers.signals import News
+from spirillum.errors import InputError
 
 SPEED = 1e-3
 
@@ -133,6 +135,18 @@ class Broken(Always):
         if news.time > 1.0:
             raise self.how
         return 1.0
+
+
+def test_a_number_without_unit_is_si_in_python_and_refused_in_a_file(tmp_path: Path) -> None:
+    """As in a robot file."""
+    tables = {"camera": {"latency": 0.05, "fps": 20.0}}
+    assert Lab.of(tables).camera.latency == pytest.approx(0.05)
+    file = tmp_path / "lab.toml"
+    file.write_text("[camera]\nfps = 20.0\nlatency = 0.05\n")
+    with pytest.raises(InputError, match=r"camera\.latency = 0.05 has no unit; allowed: a number with its unit"):
+        Lab.of(file)
+    file.write_text('[camera]\nfps = 20.0\nlatency = "50 ms"\n')
+    assert Lab.of(file) == Lab.of(tables)
 
 
 def test_an_interrupt_keeps_the_run_with_the_drive_off(toy: Any) -> None:

@@ -149,16 +149,23 @@ class Lab(Section):
         """A lab from what a caller may give.
 
         Args:
-            value: a lab, its tables by name, a TOML file with them, or None: the defaults.
+            value: a lab, its tables by name, a TOML file with them, or None: the defaults. A number is a quantity in SI
+                in tables, and none in a file.
 
         Raises:
             InputError: for an unknown table or field, or a wrong value.
         """
         if isinstance(value, cls):
             return value
-        table = read_toml(Path(value), _WHAT) if isinstance(value, str | Path) else value or {}
+        if isinstance(value, str | Path):
+            return cls.read(value, {})
+        return cls._from(value or {}, written=False)
+
+    @classmethod
+    def _from(cls, table: Any, *, written: bool) -> Self:
+        """A lab from its tables; `written` where every quantity needs its unit."""
         if not isinstance(table, Mapping):
-            raise InputError(f"lab = {str(value)[:60]!r}; allowed: {_WHAT}, or its tables by name")
+            raise InputError(f"lab = {str(table)[:60]!r}; allowed: {_WHAT}, or its tables by name")
         sections: dict[str, type[Options]] = {
             name: info.annotation
             for name, info in cls.model_fields.items()
@@ -168,7 +175,8 @@ class Lab(Section):
             if name not in sections:
                 hint = did_you_mean(str(name)[:60], sections)
                 raise InputError(f"lab.{str(name)[:60]} is not a known table{hint}; allowed: {', '.join(sections)}")
-        return cls(**{name: section.of(table.get(name)) for name, section in sections.items()})
+        read = {name: section.as_written if written else section.of for name, section in sections.items()}
+        return cls(**{name: reader(table.get(name)) for name, reader in read.items()})
 
     @classmethod
     def read(cls, path: str | Path | None, changes: Mapping[str, Any]) -> Self:
@@ -176,10 +184,10 @@ class Lab(Section):
 
         Args:
             path: TOML file; None: the defaults.
-            changes: values by dotted name, as ``{"camera.latency": "50 ms"}``.
+            changes: values by dotted name, as ``{"camera.latency": "50 ms"}``; quantities with their unit.
 
         Raises:
-            InputError: for a file that cannot be read, an unknown table or field, or a wrong value.
+            InputError: for a file that cannot be read, an unknown table or field, a wrong value, or one without unit.
         """
         tables: dict[str, Any] = {} if path is None else read_toml(Path(path), _WHAT)
         for name, value in changes.items():
@@ -187,7 +195,7 @@ class Lab(Section):
             if not dot or not isinstance(tables.get(table, {}), dict):
                 raise InputError(f"lab: {name[:60]!r} is no field; allowed: TABLE.FIELD, such as camera.latency")
             tables[table] = {**tables.get(table, {}), entry: value}
-        return cls.of(tables)
+        return cls._from(tables, written=True)
 
     @classmethod
     def exact(cls) -> Self:

@@ -40,17 +40,32 @@ class Options(Section):
         """
         if isinstance(value, cls):
             return value
+        return cls._read(value, written=False)
+
+    @classmethod
+    def as_written(cls, value: Any) -> Self:
+        """Options from a table of a file or from words of the command line, where every quantity has its unit.
+
+        Args:
+            value: fields by name, or None: the defaults.
+
+        Raises:
+            InputError: as `of`, and for a quantity without unit.
+        """
+        return cls._read(value, written=True)
+
+    @classmethod
+    def _read(cls, value: Any, *, written: bool) -> Self:
         if not (value is None or isinstance(value, Mapping)):
             allowed = ", ".join(cls.model_fields)
-            offered: Any = value
-            words = clipped(offered) if isinstance(offered, int) else repr(str(offered)[:60])
+            words = clipped(value) if isinstance(value, int) else repr(str(value)[:60])
             raise InputError(f"{cls.argument} = {words}; allowed: {allowed}, each by name")
         for name in value or {}:
             if name not in cls.model_fields:
                 hint = did_you_mean(str(name)[:60], cls.model_fields)
                 allowed = ", ".join(cls.model_fields)
                 raise InputError(f"{cls.argument}.{str(name)[:60]} is not a known field{hint}; allowed: {allowed}")
-        units = {item.path: item.unit for item in field_values(cls.model_construct())}
+        units = {} if written else {item.path: item.unit for item in field_values(cls.model_construct())}
         given = {name: _with_unit(item, units.get(name)) for name, item in (value or {}).items() if item is not None}
         checked = problems_in(cls, given, cls.argument if cls.prefixed else "")
         if isinstance(checked, list):
