@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import posteriors
 import spirillum as sp
 from spirillum import InputError
 from spirillum.fitted.posterior_file import read_posterior
@@ -50,6 +52,53 @@ def test_a_tail_that_was_not_fitted_has_the_middle_in_predict_and_in_study(calib
     assert "B_eff of 1 of 2 tails was not fitted" in dataset.attrs["warnings"]
     assert "inferred under friction reading 'rotor' and is used under 'paper'" in dataset.attrs["warnings"]
     assert "o.csv says that its numbers are synthetic" in dataset.attrs["warnings"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("predict", WIDE, "--calibration", "calibration.toml"),
+        ("predict", WIDE, "--calibration", "calibration.toml", "--tail-rate", "1 Hz"),
+        ("predict", WIDE, "--posterior", "posterior.nc"),
+        ("compare-models", WIDE, "--calibration", "calibration.toml"),
+        ("simulate", WIDE, "-o", "run.nc", "--calibration", "calibration.toml"),
+        ("settle", WIDE, "--calibration", "calibration.toml"),
+        ("export", WIDE, "robot.urdf", "--calibration", "calibration.toml"),
+        ("study", "-o", "study", "--calibration", "calibration.toml"),
+        ("study", "-o", "study", "--posterior", "posterior.nc"),
+        ("suggest", "posterior.nc"),
+        ("design", WIDE, "--vary", "tail.wavelength=20mm:30mm", "--posterior", "posterior.nc"),
+    ],
+)
+def test_a_field_that_is_set_is_not_replaced_by_a_file_without_a_word(
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, calibration: Path, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(calibration.parent)
+    posteriors.write(Path("posterior.nc"))
+    outcome = run(*command, "--set", "friction.effective=1e-9 N m s/rad")
+    assert (outcome.code, outcome.out) == (2, "")
+    file = next(word for word in command if word in ("calibration.toml", "posterior.nc"))
+    assert f"friction.effective is set or varied, and replaced by what {file} has fitted; allowed: one" in outcome.err
+    if file == "posterior.nc":
+        outcome = run(*command, "--set", "calibration={sbt={body_drag=30}}")
+        assert "calibration.sbt.body_drag is set or varied, and replaced by what posterior.nc" in outcome.err
+
+
+def test_a_field_that_a_study_varies_is_not_replaced_by_a_file(calibration: Path) -> None:
+    study = {"title": "t", "models": ["rft"], "robots": [WIDE]}
+    both = {**study, "vary": {"friction.effective": ["1e-9 N m s/rad", "1e-8 N m s/rad"]}}
+    with pytest.raises(InputError, match=r"friction\.effective is set or varied, and replaced by what .*calibration"):
+        sp.study(both, calibration=calibration)
+
+
+def test_a_fit_refuses_a_field_that_it_does_not_look_at(run: Callable[..., Any], tmp_path: Path) -> None:
+    """The priors of the factors and B_eff know nothing of the robot's own; that of the viscosity does."""
+    for setting, name in (("calibration.sbt.body_drag=30", "body_drag"), ("friction.effective=1e-9 N m s", "friction")):
+        outcome = run("calibrate", str(tmp_path / "o.csv"), WIDE, "--set", setting)
+        assert outcome.code == 2
+        assert f"{setting.split('=')[0]} is set, and the fit of '{name}' does not look at it" in outcome.err
+    outcome = run("calibrate", str(tmp_path / "o.csv"), WIDE, "--set", "fluid.viscosity=3 Pa s")
+    assert "o.csv does not exist" in outcome.err
 
 
 def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibration: Path) -> None:

@@ -6,7 +6,7 @@ all directions have the same scale there, and no bound is ever hit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
-from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.robot.options import CALIBRATED
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "Prior",
     "Uniform",
     "assumed_uncertainties",
+    "check_not_set",
     "free_names",
 ]
 
@@ -332,6 +333,36 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
             f"{fields[bound[0]]}=5%) in place of freeing it"
         )
     return names
+
+
+_IN_PLACE_OF = {
+    "body_drag": "calibration.{model}.body_drag",
+    "body_rotation": "calibration.{model}.body_rotation",
+    "friction": "friction.effective",
+    "shared_friction": "friction.effective",
+}
+"""Parameter to the field whose value a fit does not look at; priors of the others are around the robot's own values."""
+
+
+def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model: str) -> None:
+    """Refuse set fields of a robot that a fit replaces without having looked at them.
+
+    Args:
+        fields: dotted names of the fields that were set.
+        free: names of the free parameters, as `free_names` takes them.
+        model: name of the model.
+
+    Raises:
+        InputError: for such a field, or wrong names.
+    """
+    asked, known = set(fields), find_swimmer_model(model).name
+    for name in free_names(free, known):
+        field = _IN_PLACE_OF.get(name, "").format(model=known)
+        if field in asked:
+            raise InputError(
+                f"{field} is set, and the fit of '{name}' does not look at it; allowed: one of them (--free names what "
+                "is fitted)"
+            )
 
 
 def assumed_uncertainties(given: Mapping[str, str | float] | None) -> dict[str, float]:

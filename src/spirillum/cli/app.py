@@ -149,7 +149,7 @@ def predict(
 
     with renderer.progress_bar(quiet=json) as progress:
         result = answer(
-            loaded_robot(robot, settings),
+            loaded_robot(robot, settings, calibration, posterior),
             model=model,
             tail_rate=tail_rate,
             friction=friction,
@@ -203,7 +203,7 @@ def compare_models(
     from spirillum.swimming.comparison import compare_models as answer
 
     target = None if output is None else output_target(output, PICTURES, "models.png")
-    loaded = loaded_robot(robot, settings)
+    loaded = loaded_robot(robot, settings, calibration)
     with renderer.progress_bar(quiet=json) as progress:
         result = answer(
             loaded,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from spirillum.calibration.methods import METHODS
-from spirillum.cli.inputs import loaded_robot
+from spirillum.cli.inputs import loaded_robot, overrides_from
 from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
 from spirillum.fluid.tube.announced import TABLE_TAKES
@@ -68,11 +68,14 @@ def calibrate(
 
     Example: `spirillum calibrate observations.csv biorob2012-wide biorob2012-narrow -o my-calibration`
     """
+    from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
     from spirillum.cli import renderer
+    from spirillum.fitted.replaced import set_fields
     from spirillum.results.calibration import calibrate as answer
 
     robots = [loaded_robot(name, settings) for name in robot]
+    check_not_set(set_fields(overrides_from(settings)), free, model)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
@@ -184,6 +187,6 @@ def suggest(
     if rows < 1:
         raise InputError(f"rows = {rows}; allowed: at least 1")
     names = robot or (PAPER_ROBOTS if settings else ())
-    robots = [loaded_robot(name, settings) for name in names] or None
+    robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
     found = answer(posterior, robots, candidates=candidates, trials=trials)
     renderer.show(found.to_dict(), json=json, rows=rows)

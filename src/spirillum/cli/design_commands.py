@@ -87,7 +87,7 @@ def design(
     target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
     picture = None if plot is None else output_target(plot, PICTURES, "design.png")
     printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
-    loaded = loaded_robot(robot, settings)
+    loaded = loaded_robot(robot, settings, posterior=posterior)
     judged = {
         "statistic": statistic,
         "level": level,

@@ -93,7 +93,7 @@ def export(
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
     found = answer(
-        loaded_robot(robot, settings),
+        loaded_robot(robot, settings, calibration),
         target,
         phase=angle(phase),
         fineness=fineness,

@@ -9,6 +9,8 @@ from spirillum.errors import InputError
 from spirillum.units import KINDS, parse_option
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from spirillum.robot.robot import Robot
 
 __all__ = ["angle", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
@@ -41,15 +43,29 @@ def _each_once(pairs: Iterable[tuple[str, _V]], option: str) -> dict[str, _V]:
     return found
 
 
-def loaded_robot(robot: str, settings: list[str] | None) -> Robot:
+def loaded_robot(
+    robot: str, settings: list[str] | None, calibration: Path | None = None, posterior: Path | None = None
+) -> Robot:
     """The robot with its fields set.
 
+    Args:
+        robot: a preset's name or a robot file.
+        settings: the options `--set`.
+        calibration: calibration file that will be applied to the robot; None without one.
+        posterior: posterior that will be applied to it; None without one.
+
     Raises:
-        InputError: if it or a field is wrong.
+        InputError: if it or a field is wrong, or a field is set whose value one of these files replaces.
     """
     from spirillum.robot.load import load
 
-    return load(robot, **overrides_from(settings))
+    overrides = overrides_from(settings)
+    found = load(robot, **overrides)
+    if overrides and not (calibration is None and posterior is None):
+        from spirillum.fitted.replaced import check_not_replaced, set_fields
+
+        check_not_replaced(set_fields(overrides), found, calibration, posterior)
+    return found
 
 
 def placement_from(

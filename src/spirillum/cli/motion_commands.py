@@ -197,7 +197,7 @@ def simulate(
         check_column(column)
     if movie is not None:
         check_movie(movie)
-    loaded = loaded_robot(robot, settings)
+    loaded = loaded_robot(robot, settings, calibration, posterior)
     with renderer.progress_bar(quiet=json) as progress:
         dataset = answer(
             loaded,

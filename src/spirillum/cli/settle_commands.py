@@ -67,7 +67,7 @@ def settle(
     from spirillum.files import PICTURES, output_target
 
     target = None if output is None else output_target(output, PICTURES, "settling.png")
-    loaded = loaded_robot(robot, settings)
+    loaded = loaded_robot(robot, settings, calibration)
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             loaded,

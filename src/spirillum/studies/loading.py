@@ -20,6 +20,7 @@ from spirillum.fitted.calibration_file import (
     read_calibration,
 )
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
+from spirillum.fitted.replaced import check_kept, set_fields
 from spirillum.fitted.warnings import Fitted, fitted_of
 from spirillum.fluid.registry import SWIMMER_MODELS, check_placement
 from spirillum.robot.load import load
@@ -150,7 +151,8 @@ def load_study(
                 "are followed with nothing fitted"
             )
     fitted, drawn = _fitted(study, calibration, posterior)
-    robots = tuple(_fitted_robot(robot, fitted, drawn) for robot in robots)
+    given = (*set_fields(overrides or {}), *study.vary)
+    robots = tuple(_fitted_robot(robot, fitted, drawn, given, str(posterior or calibration)) for robot in robots)
     _check_varied(study, overrides or {}, name)
     study, cautions = _with_models(study, robots, calibration, drawn)
     try:
@@ -358,11 +360,20 @@ def _for_all(choices: Iterable[ModelChoice]) -> ModelChoice:
     return found
 
 
-def _fitted_robot(robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None) -> Robot:
-    """The robot with what a calibration or the middle of a posterior says."""
+def _fitted_robot(
+    robot: Robot, file: CalibrationFile | None, posterior: PosteriorFile | None, kept: Sequence[str], source: str
+) -> Robot:
+    """The robot with what a calibration or the middle of a posterior says.
+
+    Raises:
+        InputError: where `source`, their file, replaces one of the fields `kept`, which were set or varied.
+    """
     if posterior is not None:
-        return posterior.central(robot)
-    return robot if file is None else calibrated_robot(robot, file)
+        found = posterior.central(robot)
+    else:
+        found = robot if file is None else calibrated_robot(robot, file)
+    check_kept(kept, robot, found, source)
+    return found
 
 
 def _check_drives(study: Study, sources: Sequence[str], robots: Sequence[Robot], name: str) -> None:

@@ -1,0 +1,75 @@
+"""Fields that somebody has set and a file of fitted values replaces: one of them would be lost without a word."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from spirillum.errors import InputError
+from spirillum.fitted.calibration_file import with_calibration
+from spirillum.fitted.posterior_file import read_posterior
+from spirillum.robot.robot import Robot
+
+__all__ = ["check_kept", "check_not_replaced", "set_fields"]
+
+
+def set_fields(overrides: Mapping[str, Any]) -> tuple[str, ...]:
+    """Dotted names of the fields that overrides set, those of their tables one by one."""
+    return tuple(_leaves(overrides, ""))
+
+
+def _leaves(table: Mapping[str, Any], above: str) -> Iterator[str]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}"
+
+
+def check_not_replaced(
+    fields: Iterable[str], robot: Robot, calibration: str | Path | None, posterior: str | Path | None
+) -> None:
+    """Refuse set fields of a robot whose values a calibration file or a posterior replaces.
+
+    Args:
+        fields: dotted names of the fields that were set.
+        robot: the robot with them.
+        calibration: calibration file; None without one.
+        posterior: file of a posterior; None without one.
+
+    Raises:
+        InputError: for such a field, or a file that cannot be read.
+    """
+    asked = tuple(fields)
+    if asked and calibration is not None:
+        check_kept(asked, robot, with_calibration(robot, calibration), str(calibration))
+    if asked and posterior is not None:
+        check_kept(asked, robot, read_posterior(posterior).central(robot), str(posterior))
+
+
+def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) -> None:
+    """Refuse set fields that are not the same in a robot before and after fitted values have replaced its own.
+
+    Args:
+        fields: dotted names of the fields that were set.
+        before: the robot with them.
+        after: the same robot with the fitted values.
+        source: file of the fitted values.
+
+    Raises:
+        InputError: for such a field.
+    """
+    own, fitted = before.model_dump(), after.model_dump()
+    for field in fields:
+        if _at(own, field) != _at(fitted, field):
+            raise InputError(
+                f"{field} is set or varied, and replaced by what {source} has fitted; allowed: one of them"
+            )
+
+
+def _at(table: Any, field: str) -> Any:
+    """A value among nested tables; None where there is none."""
+    for name in field.split("."):
+        table = table.get(name) if isinstance(table, Mapping) else None
+    return table
