@@ -84,6 +84,16 @@ def test_a_field_that_is_set_is_not_replaced_by_a_file_without_a_word(
         assert "calibration.sbt.body_drag is set or varied, and replaced by what posterior.nc" in outcome.err
 
 
+@pytest.mark.parametrize("command", [("predict", WIDE), ("simulate", WIDE, "-o", "run.nc")])
+def test_a_calibration_file_is_not_left_out_again(
+    run: Callable[..., Any], monkeypatch: pytest.MonkeyPatch, calibration: Path, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(calibration.parent)
+    outcome = run(*command, "--calibration", "calibration.toml", "--no-calibration")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert "calibration together with no-calibration (calibrated = False); allowed: one of them" in outcome.err
+
+
 def test_a_field_that_a_study_varies_is_not_replaced_by_a_file(calibration: Path) -> None:
     study = {"title": "t", "models": ["rft"], "robots": [WIDE]}
     both = {**study, "vary": {"friction.effective": ["1e-9 N m s/rad", "1e-8 N m s/rad"]}}

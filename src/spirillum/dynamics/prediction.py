@@ -17,7 +17,7 @@ from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming import prediction
 from spirillum.swimming.discrepancy import posterior_for_of
-from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
+from spirillum.swimming.model_choice import AUTO, ModelChoice, check_calibrated, choose_model, posterior_alone
 from spirillum.swimming.prediction import Prediction, interval_statement, with_middles
 
 __all__ = ["predict"]
@@ -76,6 +76,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         InputError: for wrong input, a robot outside the model's domain, or a free motion that cannot be followed for a
             turn.
     """
+    check_calibrated(calibration, calibrated=calibrated)
     known = None
     if posterior is not None and motion == "free" and model in ("tube", AUTO):
         known = posterior_alone(posterior, model, calibration, calibrated=calibrated)

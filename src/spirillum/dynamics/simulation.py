@@ -36,7 +36,7 @@ from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.swimming.freedom import check_full, motion_of
-from spirillum.swimming.model_choice import AUTO, posterior_alone
+from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
 from spirillum.swimming.preparation import table_for
 from spirillum.swimming.steady import friction_reading, requirements
@@ -109,6 +109,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     Raises:
         InputError: for wrong input, a robot outside the model's domain, or a model without all entries.
     """
+    check_calibrated(calibration, calibrated=calibrated)
     known = None
     if posterior is not None:
         known = posterior_alone(posterior, model, calibration, calibrated=calibrated)

@@ -27,6 +27,7 @@ __all__ = [
     "UNBOUNDED",
     "WALLED",
     "ModelChoice",
+    "check_calibrated",
     "choose_model",
     "fitted_models",
     "has_table",
@@ -73,6 +74,20 @@ def posterior_alone(
     if calibration is not None or not calibrated:
         raise InputError("posterior together with another calibration, or with none; allowed: a posterior alone")
     return read_posterior(posterior, *([] if model == AUTO else [model]))
+
+
+def check_calibrated(calibration: str | Path | None, *, calibrated: bool) -> None:
+    """Refuse a calibration file where calibration factors are not wanted.
+
+    Args:
+        calibration: calibration file; None without one.
+        calibrated: whether calibration factors are wanted.
+
+    Raises:
+        InputError: for both.
+    """
+    if calibration is not None and not calibrated:
+        raise InputError("calibration together with no-calibration (calibrated = False); allowed: one of them")
 
 
 def choose_model(
