@@ -234,6 +234,22 @@ def test_a_calibration_that_does_nothing_says_so(tmp_path: Path) -> None:
     assert not any("nothing in" in said for said in served)
 
 
+def test_friction_alone_is_idle_at_a_prescribed_rate(calibration: Path) -> None:
+    """B_eff is inferred from the rate there, but where it brakes the body."""
+    at_rate = {"model": "tube", "calibration": calibration, "tail_rate": "1 Hz", "band": False}
+    idle = sp.predict(WIDE, **at_rate)
+    assert idle.forward_velocity == pytest.approx(
+        sp.predict(WIDE, model="tube", tail_rate="1 Hz", band=False).forward_velocity, rel=1e-12
+    )
+    assert any(f"nothing in {calibration} is for model 'tube'" in words for words in idle.warnings)
+    assert not any("rests on no measurement" in words for words in idle.warnings)
+    assert "fitted_by" not in idle.to_dict()
+    braked = sp.predict(WIDE, **at_rate, friction="body")
+    assert not any("nothing in" in words for words in braked.warnings)
+    assert braked.to_dict()["fitted_by"] == "calibration.toml"
+    assert not any("nothing in" in words for words in sp.predict(WIDE, **{**at_rate, "tail_rate": None}).warnings)
+
+
 def test_limits_are_spoken_of_only_where_there_are_some(calibration: Path) -> None:
     study = {"title": "t", "models": ["rft"], "friction": ["rotor"], "robots": [WIDE, "biorob2012-narrow"]}
     other = {"tail.wavelength": "13 mm"}

@@ -29,7 +29,7 @@ from spirillum.dynamics.turn_map import STEPS
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import FittedContact, calibrated_contact
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import fitted_of
+from spirillum.fitted.warnings import fitted_of, friction_acts
 from spirillum.fluid.tube.table import TubeTable
 from spirillum.kernels import rigid_links
 from spirillum.kernels import tube_motion as kernel
@@ -161,7 +161,8 @@ def free_motion(
     warnings = (*held.warnings, *(checked.said if lies else ()), *_said(run, links, weight=weight))
     known = lies and checked.known
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
-    source = fitted_of(calibration, posterior).source_of(ready, held.model)
+    acts = friction_acts(held.friction, held.tail_rate)
+    source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)
     found = replace(held, swimming=swimming, error_estimate=error, warnings=warnings, motion="free", fitted_by=source)
     found = replace(found, lying=run.lying)
     return FreeMotion(found, run, links, gap, laid, checked)

@@ -21,7 +21,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.robot import Robot
 
-__all__ = ["Fitted", "fitted_of"]
+__all__ = ["Fitted", "fitted_of", "friction_acts"]
 
 _COEFFICIENTS = ("normal_factor", "tangential_factor")
 """Fitted fields that act on `rft` alone."""
@@ -53,54 +53,63 @@ class Fitted:
         """Coefficient of dry friction under a robot with a model: only one that places it knows of any."""
         return self.friction_coefficient if model.placed else None
 
-    def serves(self, robot: Robot, model: SwimmerModel) -> bool:
+    def serves(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> bool:
         """Whether anything of it acts on a robot's answer with a model.
 
         Args:
             robot: the robot.
             model: the hydrodynamic model.
+            friction: whether B_eff acts on the answer, see `friction_acts`.
         """
         if self.file is None or model.name in self.file.calibration:
             return True
-        left_out = () if model.name == "rft" else _COEFFICIENTS
+        left_out = (*(() if model.name == "rft" else _COEFFICIENTS), *(() if friction else ("friction",)))
         values = [getattr(self.file.fitted, name) for name in FittedValues.model_fields if name not in left_out]
         placed = model.placed and (placement_in(self.file, robot) is not None or self.file.contact != FittedContact())
         known = any(value is not None for value in values)
-        return placed or known or friction_of_tails(robot, self.friction) != (None, ())
+        return placed or known or (friction and friction_of_tails(robot, self.friction) != (None, ()))
 
-    def source_of(self, robot: Robot, model: SwimmerModel) -> str:
+    def source_of(self, robot: Robot, model: SwimmerModel, *, friction: bool = True) -> str:
         """Name of the file whose values act on a robot's answer with a model; empty where none does.
 
         Args:
             robot: the robot.
             model: the hydrodynamic model.
+            friction: whether B_eff acts on the answer, see `friction_acts`.
         """
         name = self.name if self.file is None else Path(self.name).name
-        return name if self.serves(robot, model) else ""
+        return name if self.serves(robot, model, friction=friction) else ""
 
-    def idle_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[str]:
+    def idle_warnings(
+        self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
+    ) -> list[str]:
         """Models to which nothing of a calibration file applies.
 
         Args:
             robots: the robots that are answered for.
             models: the models that answer.
+            friction: whether B_eff acts on the answers, see `friction_acts`.
         """
         replaced = self.file is not None and self.file.calibration
         instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
         return [
             f"nothing in {self.name or 'the calibration'} is for model '{model.name}': {instead}"
             for model in models
-            if not any(self.serves(robot, model) for robot in robots)
+            if not any(self.serves(robot, model, friction=friction) for robot in robots)
         ]
 
-    def origin_warnings(self, robots: Sequence[Robot], models: Sequence[SwimmerModel]) -> list[str]:
+    def origin_warnings(
+        self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
+    ) -> list[str]:
         """Whether anything of it that is used was measured.
 
         Args:
             robots: the robots that are answered for.
             models: the models that answer.
+            friction: whether B_eff acts on the answers, see `friction_acts`.
         """
-        if not self.synthetic or not any(self.serves(robot, model) for robot in robots for model in models):
+        pairs = ((robot, model) for robot in robots for model in models)
+        if not self.synthetic or not any(self.serves(*pair, friction=friction) for pair in pairs):
             return []
         return [
             f"{self.synthetic} says that its numbers are synthetic: what was fitted to them rests on no measurement"
@@ -145,10 +154,11 @@ class Fitted:
             reading: reading of the friction.
             rate: prescribed tail rate; None: the robot's own drive, whose friction then matters.
         """
-        idle = self.idle_warnings([robot], [model])
+        acts = friction_acts(reading, rate)
+        idle = self.idle_warnings([robot], [model], friction=acts)
         if rate is None:
             return [*idle, *self.run_warnings(robot, model, reading)]
-        return [*idle, *self.origin_warnings([robot], [model])]
+        return [*idle, *self.origin_warnings([robot], [model], friction=acts)]
 
     def run_warnings(self, robot: Robot, model: SwimmerModel, reading: str) -> list[str]:
         """All that has to be said of a robot that is driven by its own motor.
@@ -197,6 +207,16 @@ class Fitted:
                 f"B_eff of {zero} of {len(robots)} tails came out negative in the calibration: zero is used"
             )
         return sentences
+
+
+def friction_acts(reading: str, rate: float | None) -> bool:
+    """Whether B_eff acts on an answer: at a prescribed tail rate it is inferred from it, but where it brakes the body.
+
+    Args:
+        reading: reading of the friction.
+        rate: prescribed tail rate; None: the robot's own drive.
+    """
+    return rate is None or reading == "body"
 
 
 def fitted_of(

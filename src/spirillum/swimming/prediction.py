@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
-from spirillum.fitted.warnings import Fitted, fitted_of
+from spirillum.fitted.warnings import Fitted, fitted_of, friction_acts
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.tube.announced import TILTED
 from spirillum.robot.actuation import FrictionReading
@@ -294,7 +294,7 @@ def predict(  # noqa: PLR0913 - the options of the command
         interval_of=interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
-        fitted_by=fitted.source_of(ready, chosen),
+        fitted_by=fitted.source_of(ready, chosen, friction=friction_acts(reading, rate)),
     )
 
 
