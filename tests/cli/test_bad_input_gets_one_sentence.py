@@ -28,6 +28,10 @@ WIDE = "biorob2012-wide"
         (["render", WIDE, "-o", "film.mp4", "--trouble", ""], "trouble ''; allowed: lost-frames"),
         (["predict", WIDE, "--model", "cfd"], "model = 'cfd'; allowed: auto, sbt, rft"),
         (["predict", WIDE, "--model", "perrin"], "model = 'perrin'"),
+        (
+            ["predict", WIDE, "--model", "slender", "--band"],
+            "band = True with model 'slender'; allowed: only with",
+        ),
         (["predict", WIDE, "--friction", "ice"], "friction = 'ice'; allowed: none, rotor, body, paper"),
         (["predict", WIDE, "--tail-rate", "1"], 'tail-rate = "1" has no unit'),
         (["predict", WIDE, "--tail-rate", "1/s"], "does not say what turns"),

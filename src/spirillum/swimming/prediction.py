@@ -15,6 +15,7 @@ from spirillum.errors import InputError
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import Fitted, fitted_of, friction_acts
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.registry import SWIMMER_MODELS
 from spirillum.fluid.tube.announced import TILTED
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
@@ -243,6 +244,8 @@ def predict(  # noqa: PLR0913 - the options of the command
         robot = drawn.central(robot)
         where = drawn.placed(robot, given)
     choice = choose_model(model, robot, placement=where, calibration=calibration, posterior=drawn, motion=motion)
+    if band:
+        _check_band(choice.model)
     ready, chosen, batch = prepared(
         robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
     )
@@ -432,6 +435,20 @@ def _rate(value: str | float | None, placement: Placement) -> float | None:
     if rate == 0 and not placement.flow:
         raise InputError("tail-rate = 0: a tail at rest drives nothing; allowed: any other rate")
     return rate
+
+
+def _check_band(model: str) -> None:
+    """Refuse a band of a model that knows no places.
+
+    Raises:
+        InputError: for such a model.
+    """
+    walled = [name for name, known in SWIMMER_MODELS.items() if known.placed]
+    if model not in walled:
+        raise InputError(
+            f"band = True with model '{model}'; allowed: only with a model that computes the walls "
+            f"({', '.join(walled)})"
+        )
 
 
 def _free_warnings(robot: Robot, motion: str) -> list[str]:
