@@ -180,6 +180,14 @@ def test_calibration_factors_are_named(unsure: sp.Design) -> None:
     assert not any("walls are left out" in item for item in unsure.warnings)
 
 
+@pytest.mark.parametrize("judged", [{"statistic": "quantile"}, {"level": 0.2}, {"draws": 64}, {"confidence": 0.9}])
+def test_what_judges_draws_is_refused_where_there_are_none(judged: dict[str, object]) -> None:
+    """A seed serves the search, too."""
+    (name,) = judged
+    with pytest.raises(InputError, match=f"{name} where nothing is unknown; allowed: with a field that is not known"):
+        sp.design(PLAIN, TWO, maximise="forward_velocity", model="rft", judged={**judged, "seed": 2})
+
+
 def test_a_posterior_is_said_what_predict_says_of_it(tmp_path) -> None:
     """Whose geometry it was fitted to, that it is synthetic, and that its factors stand for the walls."""
     file = posteriors.write(tmp_path / "posterior.nc")
@@ -235,7 +243,6 @@ def test_front_holds_no_design_that_another_beats() -> None:
         maximise="forward_velocity",
         minimise="shaft_power",
         model="sbt",
-        judged={"draws": 8},
     )
     assert found.front is not None
     speed, power = found.front["forward_velocity"], found.front["shaft_power"]
@@ -327,8 +334,7 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
     ],
 )
 def test_what_is_wrong_is_said(change: dict, words: str) -> None:
-    given = {"vary": {"tail.wavelength": "10 mm:30 mm"}, "maximise": "forward_velocity", "judged": {"draws": 8}}
-    given["model"] = "sbt"
+    given = {"vary": {"tail.wavelength": "10 mm:30 mm"}, "maximise": "forward_velocity", "model": "sbt"}
     with pytest.raises(InputError, match=re.escape(words)):
         sp.design("biorob2012-wide", **(given | change))
 

@@ -60,11 +60,18 @@ def design(
     ] = "auto",
     tail_rate: TailRate = None,
     statistic: Annotated[
-        str, typer.Option(metavar="mean|quantile", help="Of the objective over what is not known.")
-    ] = "mean",
-    level: Annotated[float, typer.Option(help="Of the quantile: share of the draws that are worse.")] = 0.1,
-    confidence: Annotated[float, typer.Option(help="Share of the draws in which a condition has to hold.")] = 0.95,
-    draws: Annotated[int, typer.Option(help="Draws of what is not known under which designs are compared.")] = 256,
+        str | None,
+        typer.Option(metavar="mean|quantile", help="Of the objective over what is not known; else its mean."),
+    ] = None,
+    level: Annotated[
+        float | None, typer.Option(help="Of the quantile: share of the draws that are worse; else 0.1.")
+    ] = None,
+    confidence: Annotated[
+        float | None, typer.Option(help="Share of the draws in which a condition has to hold; else 0.95.")
+    ] = None,
+    draws: Annotated[
+        int | None, typer.Option(help="Draws of what is not known under which designs are compared; else 256.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of draws and search.")] = 1,
     mandrel: Annotated[
         float, typer.Option(help="Least diameter around which the wire is bent, in wire diameters.")

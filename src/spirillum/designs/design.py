@@ -99,6 +99,8 @@ def design(
     """
     given, options = load(robot), Judged.of(judged)
     unknowns = unknowns_of(given, unknown, posterior, model)
+    if unknowns.known:
+        options.check_read()
     space = space_of(unknowns.robot, vary)
     choice = chosen_model(model, given, space, unknowns)
     chosen = find_swimmer_model(choice.model)

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from spirillum.errors import InputError
 from spirillum.robot.arguments import Options
 
 __all__ = ["Judged"]
@@ -26,3 +27,16 @@ class Judged(Options):
     """Draws under which the search swims every design; what is stated rests on four times as many, drawn anew."""
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Of draws and search."""
+
+    def check_read(self) -> None:
+        """Refuse what was given where everything is known: there are no draws to judge by; a seed serves the search.
+
+        Raises:
+            InputError: naming all of it.
+        """
+        given = [name for name in type(self).model_fields if name in self.model_fields_set and name != "seed"]
+        if given:
+            raise InputError(
+                f"{', '.join(given)} where nothing is unknown; allowed: with a field that is not known (unknown) or a "
+                "posterior"
+            )
