@@ -126,7 +126,7 @@ def test_capsule_drains_as_a_line_does() -> None:
         robot,
         placement={"gap": "0.02 mm"},
         roughness="1 nm",
-        timing={"duration": "30 s", "samples_per_turn": 10_000, "turns": 1.0},
+        timing={"duration": "30 s", "samples_per_turn": 10_000},
         model="rft",
     )
     gap = run["wall_gap"].values

@@ -56,8 +56,9 @@ def simulate(
     motion: _RunMotion = None,
     friction: Friction = None,
     turns: Annotated[
-        float, typer.Option(help="Length of the run in turns of the tail (of the field).", rich_help_panel=_TIMING)
-    ] = 3.0,
+        float | None,
+        typer.Option(help="Length of the run in turns of the tail (of the field); else 3.", rich_help_panel=_TIMING),
+    ] = None,
     duration: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="Length of the run in time instead, such as 2s.", rich_help_panel=_TIMING),
@@ -159,9 +160,12 @@ def simulate(
         typer.Option(metavar="FILE", help="Draw the run too: .png, .pdf or .svg.", rich_help_panel=_PICTURES),
     ] = None,
     column: Annotated[
-        str,
-        typer.Option(help="Width of the plot: single or double, as the columns of a page.", rich_help_panel=_PICTURES),
-    ] = "double",
+        str | None,
+        typer.Option(
+            help="With --plot: its width, single or double, as the columns of a page; else double.",
+            rich_help_panel=_PICTURES,
+        ),
+    ] = None,
     movie: Annotated[
         Path | None,
         typer.Option(
@@ -172,8 +176,9 @@ def simulate(
     calibration: Calibration = None,
     posterior: Posterior = None,
     draws: Annotated[
-        int, typer.Option(help="With --posterior: draws that are run for the intervals of the means, 20 to 1000.")
-    ] = 100,
+        int | None,
+        typer.Option(help="With --posterior: draws that are run for the intervals of the means, 20 to 1000; else 100."),
+    ] = None,
     accuracy: Accuracy = None,
     settings: Settings = None,
     json: Json = False,
@@ -186,15 +191,19 @@ def simulate(
     from spirillum.dynamics.answer import run_answer
     from spirillum.dynamics.simulation import simulate as answer
     from spirillum.dynamics.tube_integration import INTERRUPTED
+    from spirillum.errors import InputError
     from spirillum.files import PICTURES, netcdf_target, output_target, write_dataset
 
     target = netcdf_target(output)
     over_time = flow is not None and (flow.lower().endswith(".csv") or Path(flow).is_file())
     picture = None if plot is None else output_target(plot, PICTURES, "run.png")
+    width = column or "double"
     if picture is not None:
         from spirillum.view.figures.trajectory import check_column
 
-        check_column(column)
+        check_column(width)
+    elif column is not None:
+        raise InputError(f"column = {column[:40]!r} without a plot, whose width it is; allowed: with --plot")
     if movie is not None:
         check_movie(movie)
     loaded = loaded_robot(robot, settings, calibration, posterior)
@@ -229,7 +238,7 @@ def simulate(
             progress=progress,
         )
         write_dataset(dataset, target)
-        files, warnings = _drawn(dataset, picture, column, movie, progress)
+        files, warnings = _drawn(dataset, picture, width, movie, progress)
     found = run_answer(dataset)
     found["warnings"] += warnings
     renderer.show(renderer.with_files(found, file=str(output), **files), json=json)

@@ -21,9 +21,9 @@ from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_mo
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DRAWS", "check_draws", "chosen_run", "with_intervals"]
+__all__ = ["chosen_run", "drawn_number", "with_intervals"]
 
-DRAWS = 100
+_DRAWS = 100
 """Draws of a posterior that are run."""
 _FEWEST, _MOST = 20, 1000
 _FACTORS = {
@@ -86,15 +86,22 @@ def chosen_run(
     return choice, motion or "free", said
 
 
-def check_draws(draws: int) -> None:
-    """Refuse a number of draws that tells nothing, or that takes too long.
+def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
+    """How many draws of a posterior are run.
+
+    Args:
+        draws: the number that is asked for; None: 100.
+        posterior: the posterior; None without one.
 
     Raises:
-        InputError: for such a number.
+        InputError: for a number that tells nothing or takes too long, or one without a posterior.
     """
-    given: Any = draws
+    given: Any = _DRAWS if draws is None else draws
     if isinstance(given, bool) or not isinstance(given, Integral) or not _FEWEST <= int(given) <= _MOST:
         raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
+    if draws is not None and posterior is None:
+        raise InputError(f"draws = {draws} without a posterior, whose draws they are; allowed: with one")
+    return int(given)
 
 
 def with_intervals(

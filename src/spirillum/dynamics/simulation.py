@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.dynamics.averages import stretches_on
-from spirillum.dynamics.fitted_runs import DRAWS, check_draws, chosen_run, with_intervals
+from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
 from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.held import held_run
 from spirillum.dynamics.integration import BATTERY_EMPTY, INTEGRATOR, Progress, integrate
@@ -57,7 +57,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
     calibrated: bool = True,
     calibration: str | Path | None = None,
     posterior: str | Path | None = None,
-    draws: int = DRAWS,
+    draws: int | None = None,
     timing: Timing | Mapping[str, Any] | None = None,
     resolution: Resolution | Mapping[str, Any] | None = None,
     placement: Placement | Mapping[str, Any] | None = None,
@@ -86,7 +86,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         calibration: calibration file whose factors replace the robot's.
         posterior: file of a calibration's posterior: its middle replaces the robot's values, and mean speed and rates
             have 95 % intervals (`..._low`, `..._high`), the model's discrepancy included.
-        draws: how many draws of the posterior are run for these, 20 to 1000.
+        draws: how many draws of the posterior are run for these, 20 to 1000; None: 100.
         timing: `turns` or `duration`, `samples_per_turn`, and the remote's `on` or `duty`, see `Timing`; None: three
             turns, on throughout.
         resolution: of `slender`, and of `tube` held: `accuracy`, `tolerance`, `phases`; None: the robot's own.
@@ -115,7 +115,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         known = posterior_alone(posterior, model, calibration, calibrated=calibrated)
     placed, times = Placement.of(placement), Timing.of(timing)
     times.check()
-    check_draws(draws)
+    number = drawn_number(draws, known)
     if friction is not None:
         friction_reading(friction)
     height = None if roughness is None else parse_option("roughness", roughness, KINDS["length"])
@@ -167,7 +167,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)
         dataset = with_intervals(
-            dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), draws, tell
+            dataset, known, central, lambda one, draw: run(one, same_length, draw=draw), number, tell
         )
     warnings = [line for line in dataset.attrs["warnings"].split("\n") if line]
     more = {"model_reason": choice.reason} if choice.reason else {}

@@ -85,9 +85,12 @@ class Timing(Options):
         """Refuse what no run can have, before anything is known of the robot's own rate.
 
         Raises:
-            InputError: for a length that is none, no samples, times that go back, or a wrong duty file.
+            InputError: for a length that is none or is given twice, no samples, times that go back, or a wrong duty
+                file.
         """
         end = stated_duration(self.turns, self.duration)
+        if end is not None and "turns" in self.model_fields_set:
+            raise InputError(f"turns = {self.turns:g} together with a duration; allowed: one of them")
         check_samples(self.samples_per_turn)
         schedule(self.on, self.duty, 1.0, math.inf if end is None else end)
 
