@@ -54,6 +54,16 @@ WIDE = "biorob2012-wide"
         ),
         (["resistance", WIDE, "--part", "tail", "--model", "perrin"], "allowed: body"),
         (["resistance", WIDE, "--part", "coupling"], "allowed: body, tail, rotor, robot"),
+        (
+            ["compare-models", WIDE, "--model", "sbt", "--model", "slender", "--phases", "3"],
+            "phases = 3 with models 'sbt' and 'slender'; allowed: only with model 'tube'",
+        ),
+        (
+            ["compare-models", WIDE, "--model", "sbt", "--accuracy", "high"],
+            "accuracy = 'high' with model 'sbt'; allowed: only with model 'slender' or 'tube'",
+        ),
+        (["compare-models", WIDE, "--model", "sbt", "--tolerance", "0.01"], "tolerance = 0.01 with model 'sbt'"),
+        (["compare-models", WIDE, "--model", "sbt", "--model", "sbt"], "model 'sbt' is named twice; allowed: each"),
         (["resistance", WIDE, "--part", "wing"], "part = 'wing'"),
         (["resistance", WIDE, "--about", "nose"], "allowed: body, tail-root"),
         (["resistance", WIDE, "--phase", "1"], "has no unit"),

@@ -160,23 +160,24 @@ def parse_setting(text: str, option: str = "--set", example: str = "tail.wavelen
     return path, parsed["value"] if set(parsed) == {"value"} else value
 
 
-def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None, model: str | None = None) -> Robot:
+def with_resolution(robot: Robot, resolution: Resolution | Mapping[str, Any] | None, *models: str) -> Robot:
     """The robot with another resolution of the models `slender` and `tube`.
 
     Args:
         robot: a checked robot.
         resolution: fields of `Resolution` that replace the robot's own.
-        model: the model that will be asked; None: any.
+        models: the models that will be asked; none: any.
 
     Raises:
-        InputError: for a wrong value, or a field that the model does not read.
+        InputError: for a wrong value, or a field that none of the models reads.
     """
     options = robot.model
     for name, value in Resolution.of(resolution).model_dump(exclude_none=True).items():
         section, readers = ("slender", ("slender", "tube")) if name == "accuracy" else ("tube", ("tube",))
-        if model is not None and model not in readers:
+        if models and not set(models) & set(readers):
+            asked = f"model{'s' if len(models) > 1 else ''} {' and '.join(repr(model) for model in models)}"
             allowed = " or ".join(f"'{reader}'" for reader in readers)
-            raise InputError(f"{name} = {value!r} with model {model!r}; allowed: only with model {allowed}")
+            raise InputError(f"{name} = {value!r} with {asked}; allowed: only with model {allowed}")
         changed = getattr(options, section).model_copy(update={name: value})
         options = options.model_copy(update={section: changed})
     return robot.model_copy(update={"model": options})

@@ -184,11 +184,11 @@ def compare_models(
     Raises:
         InputError: for wrong input, or if no model answers.
     """
-    own = with_resolution(load(robot), resolution)
+    names = _chosen(models)
+    own = with_resolution(load(robot), resolution, *names)
     factors = calibration is not None if calibrated is None else calibrated
     ready = own if calibration is None else with_calibration(own, calibration)
     reading = friction_reading(friction or ready.friction.reading)
-    names = _chosen(models)
     place = Placement.of(placement)
     check_placement(place, *(find_swimmer_model(name) for name in names))
     predictions: dict[str, Prediction] = {}
@@ -215,15 +215,19 @@ def compare_models(
 
 
 def _chosen(models: Sequence[str] | None) -> list[str]:
-    """Names of the models, each once.
+    """Names of the models.
 
     Raises:
-        InputError: for an unknown name, or none at all.
+        InputError: for an unknown name, one that stands twice, or none at all.
     """
     asked = list(SWIMMER_MODELS) if models is None else [models] if isinstance(models, str) else list(models)
     if not asked:
         raise InputError(f"models = []; allowed: one or more of {', '.join(SWIMMER_MODELS)}")
-    return list(dict.fromkeys(find_swimmer_model(name).name for name in asked))
+    names = [find_swimmer_model(name).name for name in asked]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"model '{twice[0]}' is named twice; allowed: each model once")
+    return names
 
 
 def _nobody_answers(refusals: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
