@@ -14,11 +14,16 @@ import types
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache, wraps
 from numbers import Integral, Real
-from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
 from spirillum.errors import InputError, clipped, did_you_mean
 
-__all__ = ["as_number", "check_kind", "checked"]
+if TYPE_CHECKING:
+    import numpy as np
+
+    from spirillum.arrays import Samples, Whole
+
+__all__ = ["as_number", "check_kind", "checked", "number_array", "whole_array"]
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -120,6 +125,55 @@ def as_number(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.nan
+
+
+def number_array(name: str, value: Any, allowed: str = "numbers") -> Samples:
+    """A number, or numbers of any shape, as an array of floats.
+
+    Args:
+        name: what it is called.
+        value: what was given.
+        allowed: for the sentence of an error.
+
+    Raises:
+        InputError: for what is no number: text, None, True or False.
+    """
+    found = _array_of(name, value, "iuf", allowed)
+    return found.astype(float, copy=False)
+
+
+def whole_array(name: str, value: Any, allowed: str = "whole numbers") -> Whole:
+    """A whole number, or whole numbers of any shape, as an array of indices.
+
+    Args:
+        name: what it is called.
+        value: what was given.
+        allowed: for the sentence of an error.
+
+    Raises:
+        InputError: for what is no whole number.
+    """
+    import numpy as np
+
+    found = _array_of(name, value, "iu", allowed)
+    return found.astype(np.intp, copy=False)
+
+
+def _array_of(name: str, value: Any, kinds: str, allowed: str) -> np.ndarray:
+    """An array whose items are of one of these kinds, letters of `numpy.dtype.kind`.
+
+    Raises:
+        InputError: if they are not, or the rows are of several lengths.
+    """
+    import numpy as np
+
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}") from error
+    if found.dtype.kind not in kinds:
+        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")
+    return found
 
 
 def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:

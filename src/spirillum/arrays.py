@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
-
-from spirillum.errors import InputError, clipped
 
 if TYPE_CHECKING:
     _Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
@@ -32,8 +30,6 @@ __all__ = [
     "Values",
     "Vectors",
     "Whole",
-    "number_array",
-    "whole_array",
 ]
 
 Values: TypeAlias = Float[_Floats, "*#n"]
@@ -64,48 +60,3 @@ Matrix6: TypeAlias = Float[_Floats, "*#n 6 6"]
 """Resistance matrix of one rigid part: force then torque against velocity then rotation."""
 Matrix12: TypeAlias = Float[_Floats, "*#n 12 12"]
 """Resistance matrix of both parts: body, then rotor."""
-
-
-def number_array(name: str, value: Any, allowed: str = "numbers") -> Samples:
-    """A number, or numbers of any shape, as an array of floats.
-
-    Args:
-        name: what it is called.
-        value: what was given.
-        allowed: for the sentence of an error.
-
-    Raises:
-        InputError: for what is no number: text, None, True or False.
-    """
-    found = _array_of(name, value, "iuf", allowed)
-    return found.astype(float, copy=False)
-
-
-def whole_array(name: str, value: Any, allowed: str = "whole numbers") -> Whole:
-    """A whole number, or whole numbers of any shape, as an array of indices.
-
-    Args:
-        name: what it is called.
-        value: what was given.
-        allowed: for the sentence of an error.
-
-    Raises:
-        InputError: for what is no whole number.
-    """
-    found = _array_of(name, value, "iu", allowed)
-    return found.astype(np.intp, copy=False)
-
-
-def _array_of(name: str, value: Any, kinds: str, allowed: str) -> np.ndarray:
-    """An array whose items are of one of these kinds, letters of `numpy.dtype.kind`.
-
-    Raises:
-        InputError: if they are not, or the rows are of several lengths.
-    """
-    try:
-        found = np.asarray(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}") from error
-    if found.dtype.kind not in kinds:
-        raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")
-    return found

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, cast, get_type_
 
 import numpy as np
 
-from spirillum.argument_kinds import checked
-from spirillum.arrays import Flags, PerRobot, Values, number_array, whole_array
+from spirillum.argument_kinds import checked, number_array, whole_array
+from spirillum.arrays import Flags, PerRobot, Values
 from spirillum.errors import InputError, clipped
 from spirillum.robot import geometry
 from spirillum.robot.actuation import DriveKind, FrictionReading

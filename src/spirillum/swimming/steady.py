@@ -8,7 +8,8 @@ from typing import NamedTuple, cast, get_args
 
 import numpy as np
 
-from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples, number_array
+from spirillum.argument_kinds import number_array
+from spirillum.arrays import Flags, Matrix12, MeanFlow, PerRobot, Samples
 from spirillum.errors import InputError
 from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
