@@ -57,7 +57,7 @@ def test_a_full_disk_is_said_and_leaves_nothing(tmp_path: Path, command: list[st
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such limits")
 def test_a_design_is_written_with_its_body_for_a_printer_or_not_at_all(tmp_path: Path) -> None:
-    search = ["--vary", "tail.wavelength=20mm:30mm", "--maximise", "forward_velocity", "--draws", "16"]
+    search = ["--vary", "tail.wavelength=20mm:30mm", "--maximise", "forward_velocity"]
     files = ["-o", "best.toml", "--stl", "best.stl"]
     found = limited(tmp_path, ["design", "biorob2012-wide", "--model", "rft", *search, *files], 30_000)
     assert found.returncode == 2

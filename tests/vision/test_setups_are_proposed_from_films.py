@@ -96,7 +96,8 @@ def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, mo
     found = sp.propose_setup(tmp_path / "a.mp4", progress=lambda what, done, total: looks.append((what, done, total)))
     assert found.found("robot").confidence == "not found"
     assert any("give the right ROBOT" in warning for warning in found.warnings)
-    assert looks[0] == ("looking for the ruler", 0, 1)
+    assert looks[:2] == [("reading frames", 0, 1), ("looking for the ruler", 0, 1)]
+    assert looks[2][:2] == ("looking for the robot", 0)  # before the first look, which takes a while
     assert looks[-1][0] == "looking for the robot"
     assert looks[-1][1] == looks[-1][2]
     with pytest.raises(InputError, match=r"spacing .* out of range"):

@@ -98,6 +98,7 @@ def scouted(
     """
     tell = progress or (lambda _what, _done, _total: None)
     anywhere = _setup(robot, video.size, 1e-4, "right")
+    tell("reading frames", 0, 1)
     frames = samples_of(video, anywhere.start, anywhere.end)
     stills = _Stills(frames)
     _check_no_noise(stills.at(1), video)
@@ -105,6 +106,7 @@ def scouted(
     (lines, factor), directions = _ruler(stills, bounds_of(anywhere, video), reduction(video.size))
     guesses = _guesses(robot, video.size, lines, spacing)
     looks = 2 * len(guesses) * len(directions)
+    tell("looking for the robot", 0, looks)
     for place, guess in enumerate(guesses):
         found = _found_at(video, robot, (guess, lines, directions), stills)
         for done, (direction, known) in enumerate(found, 1 + 2 * len(directions) * place):
