@@ -127,3 +127,10 @@ def test_numbers_and_lists_of_numpy_are_numbers_and_lists() -> None:
 
 def test_public_functions_can_be_sent_to_another_process() -> None:
     assert pickle.loads(pickle.dumps(sp.predict)) is sp.predict
+
+
+@pytest.mark.parametrize("name", ["tail_rate", "motor_rate"])
+@pytest.mark.parametrize("wrong", [np.array(["a"]), "1", True, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str)
+def test_rates_have_to_be_numbers(name: str, wrong: Any) -> None:
+    with pytest.raises(sp.InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
+        sp.swim(sp.RobotBatch.of(sp.load("biorob2012-wide")), **{name: wrong})

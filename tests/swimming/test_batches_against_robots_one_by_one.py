@@ -170,13 +170,6 @@ def test_rates_have_to_match_the_batch(wide: Any, name: str) -> None:
         swim(batch, **{name: np.ones(3)})
 
 
-@pytest.mark.parametrize("name", ["tail_rate", "motor_rate"])
-@pytest.mark.parametrize("wrong", [np.array(["a"]), "1", True, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str)
-def test_rates_have_to_be_numbers(wide: Any, name: str, wrong: Any) -> None:
-    with pytest.raises(InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
-        swim(wide, **{name: wrong})
-
-
 @pytest.mark.parametrize(
     "wrong", [np.nan, [np.nan, np.nan], None, True, "1", [1.0, None], 10**400, [[1], [2, 3]]], ids=str
 )
