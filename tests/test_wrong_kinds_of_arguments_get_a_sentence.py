@@ -18,6 +18,7 @@ from spirillum.dynamics.tube_options import InTube
 from spirillum.robot.arguments import Options
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
+from spirillum.swimming.steady import swim
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
@@ -133,4 +134,4 @@ def test_public_functions_can_be_sent_to_another_process() -> None:
 @pytest.mark.parametrize("wrong", [np.array(["a"]), "1", True, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str)
 def test_rates_have_to_be_numbers(name: str, wrong: Any) -> None:
     with pytest.raises(sp.InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
-        sp.swim(sp.RobotBatch.of(sp.load("biorob2012-wide")), **{name: wrong})
+        swim(sp.RobotBatch.of(sp.load("biorob2012-wide")), **{name: wrong})
