@@ -41,7 +41,7 @@ def open_run(path: str | Path) -> xr.Dataset:
 
 
 def numbers_of(dataset: xr.Dataset, name: str, more: tuple[str, ...] = (), shape: tuple[int, ...] = ()) -> Samples:
-    """(n, *shape) values of a run's variable over `time` and further dimensions, finite and not huge.
+    """Values, (n, ...), of a run's variable over `time` and further dimensions, finite and not huge.
 
     Args:
         dataset: a run, or some of its samples.
