@@ -312,9 +312,9 @@ def show(value: float, unit: str) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
-def show_apart(one: float, other: float, unit: str) -> tuple[str, str]:
-    """Texts of two SI values in a display `unit`, with as many digits as tell them apart, at least four."""
-    for digits in range(4, 17):
+def show_apart(one: float, other: float, unit: str, least: int = 4) -> tuple[str, str]:
+    """Texts of two SI values in a display `unit`, with as many digits as tell them apart, and at least some."""
+    for digits in range(least, 18):
         texts = tuple(f"{shown_in(value, unit):.{digits}g}" for value in (one, other))
         if texts[0] != texts[1] or one == other:
             break

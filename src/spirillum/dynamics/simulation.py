@@ -127,12 +127,12 @@ def simulate(  # noqa: PLR0913 - the options of the command
     held, asked, about = motion_of(motion) == "held", InTube.of(in_tube), Field.of(field)
     if held and about != Field():
         raise InputError("field with motion 'held', which has no field; allowed: motion 'free'")
-    walled, fixed = model == "tube" and not held, None
+    walled = model == "tube" and not held
+    fixed = placed if held and find_swimmer_model(model).placed else None
     contact = calibrated_contact(calibration) if known is None else known.contact()
     if held:
         source = calibration if known is None else known.source
-        fixed = placed if find_swimmer_model(model).placed else None
-        _check_held(Placement() if fixed else placed, roughness, contact, str(source), weight=weight)
+        _check_held(placed if fixed is None else Placement(), roughness, contact, str(source), weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
     _check_in_tube(asked, model, walled=walled)

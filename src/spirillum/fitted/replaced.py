@@ -60,8 +60,11 @@ def check_kept(fields: Iterable[str], before: Robot, after: Robot, source: str) 
     Raises:
         InputError: for such a field.
     """
+    asked = tuple(fields)
+    if not asked or after is before:
+        return
     own, fitted = before.model_dump(), after.model_dump()
-    for field in fields:
+    for field in asked:
         if _at(own, field) != _at(fitted, field):
             raise InputError(
                 f"{field} is set or varied, and replaced by what {source} has fitted; allowed: one of them"

@@ -100,9 +100,7 @@ def _refused(problem: Mapping[str, Any], field: str) -> str:
     """A sentence of field, value, and what is allowed."""
     shown, words = clipped(problem.get("input")), _allowed(problem, field)
     given = problem.get("input")
-    if isinstance(given, float) and math.isnan(
-        given
-    ):  # it is in no range; the limit that was looked at first says little
+    if isinstance(given, float) and math.isnan(given):  # the limit that was looked at first says little
         return f"{field or 'the file'} = nan is no number; allowed: {words}"
     hint = ""
     if problem["type"] == "literal_error":

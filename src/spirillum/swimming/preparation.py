@@ -24,6 +24,7 @@ from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
 from spirillum.swimming.loading import prepared
+from spirillum.units import show_apart
 
 __all__ = ["Prepared", "preparations_answer", "prepare", "prepare_all"]
 
@@ -49,8 +50,7 @@ class Prepared(Shown):
     def warnings(self) -> tuple[str, ...]:
         """What to be careful about, a sentence each."""
         worse = [
-            f"{name.replace('_', ' ')} is off by up to {_above(self.table.error[name], allowed)} % at yawed places "
-            f"that were not used, more than the {100.0 * allowed:.2g} % that a table should have"
+            _worse(name, self.table.error[name], allowed)
             for name, allowed in RESPONSES.items()
             if self.table.error[name] > allowed
         ]
@@ -84,10 +84,11 @@ class Prepared(Shown):
         }
 
 
-def _above(error: float, allowed: float) -> str:
-    """An error in percent, with as many digits as show that it is above the one that is allowed."""
-    texts = (f"{100.0 * error:.{digits}g}" for digits in range(2, 18))
-    return next((text for text in texts if float(text) > 100.0 * allowed), f"{100.0 * error:.17g}")
+def _worse(name: str, error: float, allowed: float) -> str:
+    """That a table is further off than one should be; both errors are relative."""
+    off, most = show_apart(100.0 * error, 100.0 * allowed, "1", least=2)
+    what = f"{name.replace('_', ' ')} is off by up to {off} % at yawed places that were not used"
+    return f"{what}, more than the {most} % that a table should have"
 
 
 def preparations_answer(found: Sequence[Prepared]) -> dict[str, Any]:
