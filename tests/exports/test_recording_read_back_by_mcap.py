@@ -155,10 +155,10 @@ def test_command_writes_what_python_writes(run: xr.Dataset, tmp_path: Path, caps
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["run.nc", "run.mcap", "--gap", "1mm"], "options of a robot with .mcap"),
-        (["run.nc", "run.mcap", "--phase", "90deg"], "options of a robot with .mcap"),
-        (["run.nc", "run.mcap", "--fineness", "2"], "options of a robot with .mcap"),
-        (["biorob2012-wide", "robot.stl", "--film", "x.mp4"], "only with .mcap"),
+        (["run.nc", "run.mcap", "--gap", "1mm"], "--gap with .mcap; allowed: "),
+        (["run.nc", "run.mcap", "--phase", "0rad"], "--phase with .mcap; allowed: "),
+        (["run.nc", "run.mcap", "--fineness", "2"], "--fineness with .mcap; allowed: "),
+        (["biorob2012-wide", "robot.stl", "--film", "x.mp4"], "--film with .stl; allowed: only with .mcap"),
         (["nowhere.nc", "run.mcap"], "nowhere.nc"),
     ],
 )

@@ -180,9 +180,9 @@ def test_what_cannot_be_stored_gets_a_sentence(tmp_path: Path) -> None:
 
 
 def test_a_store_prints_no_ranking_to_shorten(run, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    outcome = run("study", "--store", str(tmp_path / "study.zarr"), "--rows", "1")
+    outcome = run("study", "--store", str(tmp_path / "study.zarr"), "--rows", "10")
     assert (outcome.code, outcome.out) == (2, "")
-    assert "--rows 1 with --store, which prints no ranking; allowed: " in outcome.err
+    assert "--rows 10 with --store, which prints no ranking; allowed: " in outcome.err
     assert not (tmp_path / "study.zarr").exists()
 
 

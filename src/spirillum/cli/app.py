@@ -14,7 +14,7 @@ from spirillum.cli.control_commands import control
 from spirillum.cli.design_commands import design
 from spirillum.cli.export_commands import export
 from spirillum.cli.flow_commands import flow
-from spirillum.cli.inputs import angle, loaded_robot, overrides_from, placement_from
+from spirillum.cli.inputs import angle, given_options, loaded_robot, overrides_from, placement_from
 from spirillum.cli.measure_commands import measure
 from spirillum.cli.motion_commands import magnetic_sweep, simulate
 from spirillum.cli.observation_commands import observations_app
@@ -275,6 +275,7 @@ def resistance(
 
 
 def study(
+    context: typer.Context,
     source: Annotated[Path | None, typer.Argument(help="Study file (TOML); without one, the paper's study.")] = None,
     output: Annotated[
         Path | None,
@@ -334,7 +335,7 @@ def study(
     from spirillum.cli import renderer
     from spirillum.errors import InputError
 
-    if store is not None and rows != _ROWS:
+    if store is not None and given_options(context, "rows"):
         raise InputError(f"--rows {rows} with --store, which prints no ranking; allowed: a folder of results (-o DIR)")
     with renderer.progress_bar(quiet=json) as progress:
         from spirillum.results.study import study as answer

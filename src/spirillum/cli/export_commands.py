@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import angle, loaded_robot, placement_from
+from spirillum.cli.inputs import angle, given_options, loaded_robot, placement_from
 from spirillum.cli.options import (
     Calibration,
     Friction,
@@ -23,7 +23,12 @@ from spirillum.cli.options import (
 
 __all__ = ["export"]
 
-_PHASE = "0rad"
+_OF_ROBOTS = (
+    *("phase", "fineness", "unit", "sidecar", "no_sidecar", "model", "friction", "calibration", "gap", "pitch", "flow"),
+    "settings",
+)
+_OF_RECORDINGS = ("film", "speed")
+"""Options of either kind of export alone: of a robot, and of a run for Foxglove."""
 
 
 def _complete_units(incomplete: str) -> list[str]:
@@ -31,6 +36,7 @@ def _complete_units(incomplete: str) -> list[str]:
 
 
 def export(
+    context: typer.Context,
     robot: Annotated[
         str,
         typer.Argument(
@@ -43,7 +49,7 @@ def export(
             metavar="FILE", help="File to write: .stl, .glb, .vtp, .urdf, .mjcf (also .xml), .fmu, or .mcap."
         ),
     ],
-    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = _PHASE,
+    phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     fineness: Annotated[float, typer.Option(help="Triangles along every line, relative to the normal ones.")] = 1.0,
     unit: Annotated[
         str | None, typer.Option(autocompletion=_complete_units, help="Unit of an STL file: mm, or m.")
@@ -83,13 +89,12 @@ def export(
     if target.suffix == ".mcap":
         from spirillum.exports.recording import export_run
 
-        given = (unit, model, friction, calibration, gap, pitch, flow, settings)
-        if any(item is not None for item in given) or phase != _PHASE or fineness != 1.0 or sidecar or no_sidecar:
-            raise InputError("options of a robot with .mcap; allowed: --film and --speed, for the run has its robot")
+        if given := given_options(context, *_OF_ROBOTS):
+            raise InputError(f"{given[0]} with .mcap; allowed: --film and --speed, for the run has its robot")
         renderer.show(export_run(robot, target, film=film, speed=speed).to_dict(), json=json)
         return
-    if film is not None or speed != 1.0:
-        raise InputError(f"--film or --speed with {target.suffix or 'no ending'}; allowed: only with .mcap")
+    if given := given_options(context, *_OF_RECORDINGS):
+        raise InputError(f"{given[0]} with {target.suffix or 'no ending'}; allowed: only with .mcap")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
     found = answer(

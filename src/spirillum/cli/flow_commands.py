@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from spirillum.cli.inputs import angle, loaded_robot, placement_from
+from spirillum.cli.inputs import angle, given_options, loaded_robot, placement_from
 from spirillum.cli.options import (
     Eccentricity,
     Ends,
@@ -33,7 +33,12 @@ if TYPE_CHECKING:
 
 __all__ = ["flow"]
 
-_PLANE, _OFFSET, _POINTS, _BOX_POINTS = "xz", "0mm", 240, 80
+_OF_PLANES = ("plane", "offset", "resolution")
+_OF_RUNS = (
+    *("robot", "tail_rate", "friction", "settings", "phase"),
+    *("gap", "eccentricity", "pitch", "yaw", "tail_drop", "ends", "imposed_flow"),
+)
+"""What a run says itself."""
 
 
 def _complete_accuracies(incomplete: str) -> list[str]:
@@ -47,6 +52,7 @@ def _complete_models(incomplete: str) -> list[str]:
 
 
 def flow(
+    context: typer.Context,
     robot: Annotated[
         str | None,
         typer.Argument(autocompletion=complete_robots, help="A preset's name or a TOML file; none with --run."),
@@ -60,16 +66,16 @@ def flow(
     ] = None,
     plane: Annotated[
         str, typer.Option(autocompletion=complete_planes, help="xz (side), xy (from above) or yz (across).")
-    ] = _PLANE,
+    ] = "xz",
     offset: Annotated[
         str, typer.Option(metavar="LENGTH", help="Place of the plane on the axis across it, such as -50mm.")
-    ] = _OFFSET,
+    ] = "0mm",
     extent: Annotated[
         str | None,
         typer.Option(metavar="LENGTH", help="How far plane and box reach beyond the robot; else 1.2 diameters."),
     ] = None,
-    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = _POINTS,
-    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = _BOX_POINTS,
+    resolution: Annotated[int, typer.Option(help="Points along the plane's longer side.")] = 240,
+    volume_resolution: Annotated[int, typer.Option(help="Points along the box's longest side.")] = 80,
     phase: Annotated[str, typer.Option(metavar="ANGLE", help="Phase of the tail, such as 90deg.")] = "0rad",
     frame: Annotated[
         str, typer.Option(autocompletion=complete_frames, help="lab, or body (moving with its forward velocity).")
@@ -117,9 +123,7 @@ def flow(
     from spirillum.results.flow import check_targets, write_flow
 
     check_targets(output, volume)
-    of_the_plane = {"plane": plane != _PLANE, "offset": offset != _OFFSET, "resolution": resolution != _POINTS}
-    _check_used(of_the_plane if output is None else {}, "a plane (-o FILE)")
-    _check_used({"volume-resolution": volume_resolution != _BOX_POINTS} if volume is None else {}, "--volume FILE")
+    _check_options(context, output, volume, run, time, model)
     placement = placement_from(gap, eccentricity, pitch, tail_drop, ends, imposed_flow, yaw)
     fineness = {"accuracy": accuracy, "tolerance": tolerance}
     if run is None:
@@ -144,8 +148,6 @@ def flow(
                 frame=frame,
             )
     else:
-        given = {"robot": robot, "tail-rate": tail_rate, "friction": friction, "set": settings, **placement}
-        _check_run(given, time, phase, model)
 
         def around() -> Flow:
             from spirillum.dynamics.flow_of_run import flow_of_run
@@ -166,31 +168,30 @@ def flow(
     renderer.show(flow_answer(found, written), json=json)
 
 
-def _check_used(options: dict[str, bool], need: str) -> None:
-    """Refuse options of a file that is not asked for.
+def _check_options(
+    context: typer.Context, output: Path | None, volume: Path | None, run: Path | None, time: str | None, model: str
+) -> None:
+    """Refuse options of a file that is not asked for, and what a run says itself.
 
     Args:
-        options: those that belong to it, and whether they are given.
-        need: what asks for it.
+        context: of the command.
+        output: file of the plane; None without one.
+        volume: file of the box; None without one.
+        run: the run; None for the flow around a robot.
+        time: moment of the run; None without one.
+        model: as it was asked for.
 
     Raises:
-        InputError: if one is given.
+        InputError: if one is given, or no moment of a run.
     """
-    given = [name for name, there in options.items() if there]
-    if given:
-        raise InputError(f"--{given[0]} without {need}, to which it belongs; allowed: both or neither")
-
-
-def _check_run(given: dict[str, Any], time: str | None, phase: str, model: str) -> None:
-    """Refuse what a run says itself.
-
-    Raises:
-        InputError: if it is given, or no moment.
-    """
-    stated = [name for name, value in given.items() if value is not None]
-    stated += ["phase"] if phase != "0rad" else []
-    stated += ["model"] if model not in ("auto", "tube") else []
-    if stated:
-        raise InputError(f"{stated[0]} together with a run, which says it; allowed: --run and --time alone")
+    if output is None and (given := given_options(context, *_OF_PLANES)):
+        raise InputError(f"{given[0]} without a plane (-o FILE), to which it belongs; allowed: both or neither")
+    if volume is None and given_options(context, "volume_resolution"):
+        raise InputError("--volume-resolution without --volume FILE, to which it belongs; allowed: both or neither")
+    if run is None:
+        return
+    ours = () if model in ("auto", "tube") else ("model",)
+    if given := given_options(context, *_OF_RUNS, *ours):
+        raise InputError(f"{given[0]} together with a run, which says it; allowed: --run and --time alone")
     if time is None:
         raise InputError("no moment of the run; allowed: --time, such as 0.5s")

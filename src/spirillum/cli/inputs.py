@@ -11,11 +11,32 @@ from spirillum.units import KINDS, parse_option
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import typer
+
     from spirillum.robot.robot import Robot
 
-__all__ = ["angle", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
+__all__ = ["angle", "given_options", "loaded_robot", "overrides_from", "pairs_of", "placement_from", "time_window"]
 
 _V = TypeVar("_V")
+
+
+def given_options(context: typer.Context, *parameters: str) -> list[str]:
+    """Options that were typed, also those with the value that they have otherwise.
+
+    Args:
+        context: of the command.
+        parameters: names of the command's parameters that are asked about.
+
+    Returns:
+        The options as they are typed, such as ``--volume-resolution``, in the order of the command's help.
+    """
+    return [
+        max(parameter.opts, key=len)
+        for parameter in context.command.params
+        if parameter.name in parameters
+        and (source := context.get_parameter_source(parameter.name)) is not None
+        and source.name != "DEFAULT"
+    ]
 
 
 def overrides_from(settings: list[str] | None) -> dict[str, Any]:

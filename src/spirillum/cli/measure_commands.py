@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from spirillum.cli.inputs import overrides_from
+from spirillum.cli.inputs import given_options, overrides_from
 from spirillum.cli.options import Json, Settings
 
 __all__ = ["measure"]
@@ -160,8 +160,7 @@ def _check_apart(context: typer.Context, *, feasibility: bool) -> None:
     """
     from spirillum.errors import InputError
 
-    sources = {name: context.get_parameter_source(name) for name in _APART[not feasibility]}
-    given = [f"--{name.replace('_', '-')}" for name, source in sources.items() if source and source.name != "DEFAULT"]
+    given = given_options(context, *_APART[not feasibility])
     if given and feasibility:
         raise InputError(f"{', '.join(given)} with --feasibility, which measures nothing; allowed: without it")
     if given:

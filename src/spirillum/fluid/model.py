@@ -53,8 +53,13 @@ class ResistanceModel(ABC):
         """What the model leaves out with these options, and what that costs."""
         return self.known_error
 
-    def own_error(self, batch: RobotBatch) -> str:
-        """What the model leaves out of the robot of a batch of one, and what that costs it."""
+    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
+        """What the model leaves out of a robot, and what that costs it.
+
+        Args:
+            batch: one robot.
+            fitted_by: file of a calibration or a posterior whose values act on it; empty without one.
+        """
         return self.stated_error(batch.options)
 
     @abstractmethod

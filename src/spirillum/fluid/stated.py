@@ -78,6 +78,15 @@ def said_of_tail(batch: RobotBatch, errors: Mapping[tuple[float, float], TailErr
     return f"{of}: drag {drag}, thrust {thrust}, axial torque {torque} of the tail"
 
 
+def what_is_fitted(fitted_by: str) -> str:
+    """What an answer has from observations, in half a sentence.
+
+    Args:
+        fitted_by: file of a calibration or a posterior whose values act on the answer; empty without one.
+    """
+    return f"what {fitted_by} has fitted is taken from it" if fitted_by else "nothing is fitted"
+
+
 def walls_left_out(batch: RobotBatch) -> str:
     """That the walls of a robot's channel are left out, after a semicolon; empty for a robot without one."""
     return "; the walls of its channel are not computed" if math.isfinite(float(batch.channel_diameter[0])) else ""

@@ -16,6 +16,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fitted.warnings import Fitted, fitted_of, friction_acts
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import SWIMMER_MODELS
+from spirillum.fluid.stated import what_is_fitted
 from spirillum.fluid.tube.announced import TILTED
 from spirillum.robot.actuation import FrictionReading
 from spirillum.robot.batch import RobotBatch
@@ -40,8 +41,6 @@ from spirillum.swimming.steady import calibrated_balance, friction_reading, spee
 from spirillum.units import KINDS, parse_option
 
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
-
-_NOTHING_FITTED = "nothing is fitted"
 
 
 @dataclass(frozen=True)
@@ -102,8 +101,7 @@ class Prediction(Shown):
             return free_in_tube(self.fitted_by)
         if self.model.placed and self.intervals is not None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
-        own = self.model.own_error(self.batch)
-        return own.replace(_NOTHING_FITTED, _taken_from(self.fitted_by)) if self.fitted_by else own
+        return self.model.own_error(self.batch, self.fitted_by)
 
     @cached_property
     def placement(self) -> dict[str, Any]:
@@ -382,14 +380,9 @@ def free_in_tube(fitted_by: str) -> str:
     Args:
         fitted_by: file of a calibration or a posterior whose values act on it; empty without one.
     """
-    computed = "walls, weight and contact are computed"
-    if fitted_by:
-        return f"{computed}, {_taken_from(fitted_by)}; roughness and dry friction are assumed where it has none"
-    return f"{computed}, {_NOTHING_FITTED}; roughness and dry friction are assumed"
-
-
-def _taken_from(source: str) -> str:
-    return f"what {source} has fitted is taken from it"
+    computed = f"walls, weight and contact are computed, {what_is_fitted(fitted_by)}"
+    where = " where it has none" if fitted_by else ""
+    return f"{computed}; roughness and dry friction are assumed{where}"
 
 
 def with_middles(swum: Swimming, intervals: Intervals) -> Swimming:

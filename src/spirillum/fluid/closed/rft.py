@@ -186,7 +186,7 @@ class Rft(SwimmerModel):
             "other by a factor of up to two in speed; body and tail do not interact, which alone adds some 15 % to it"
         )
 
-    def own_error(self, batch: RobotBatch) -> str:
+    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`; sets other than the printed one were held against one tail only."""
         if batch.options.rft.coefficients != "printed":
             return self.stated_error(batch.options) + walls_left_out(batch)

@@ -98,7 +98,7 @@ class Sbt(SwimmerModel):
     parts = ("body", "tail", "rotor", "robot")
     axial_only = True
 
-    def own_error(self, batch: RobotBatch) -> str:
+    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`."""
         spin = "" if batch.options.sbt.spin else " (the wire's own spin, some 8 % of the torque, is an option)"
         return (

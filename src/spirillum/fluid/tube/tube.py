@@ -25,7 +25,7 @@ from spirillum.arrays import Axial, AxialLoad, Matrix6, Matrix12, MeanFlow, PerR
 from spirillum.errors import InputError
 from spirillum.fluid.algebra import axis_rotation, joint_locked
 from spirillum.fluid.model import SwimmerModel
-from spirillum.fluid.stated import CHECKED, said_of_tail
+from spirillum.fluid.stated import CHECKED, said_of_tail, what_is_fitted
 from spirillum.fluid.tube.cache import is_kept, kept_or_computed
 from spirillum.fluid.tube.confined import Held, held_in_tube, share_basis
 from spirillum.fluid.tube.domain import placement_answer, seat_limits, seat_of
@@ -216,7 +216,7 @@ class Tube(SwimmerModel):
         """
         self._coarser, self._first = coarser, 0.5 if between else 0.0
 
-    def own_error(self, batch: RobotBatch) -> str:
+    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`: the numerics state theirs; what is left is the place that nobody gave."""
         placement = batch.placement
         unknown = ["the gap under the body"] if placement.gap is None and placement.eccentricity is None else []
@@ -228,7 +228,7 @@ class Tube(SwimmerModel):
             place = "gap and pitch are taken as given: their own uncertainty comes on top"
         standard = batch.options.slender.accuracy == "standard"
         wire = f"; without walls, {said_of_tail(batch, CHECKED['slender'])}" if standard else ""
-        return f"walls are computed, nothing is fitted; {place}{wire}"
+        return f"walls are computed, {what_is_fitted(fitted_by)}; {place}{wire}"
 
     def fineness(self, options: ModelOptions) -> Fineness:
         """How finely the flow is resolved with these options."""

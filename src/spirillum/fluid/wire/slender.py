@@ -119,7 +119,7 @@ class Slender(SwimmerModel):
         """See `ResistanceModel.stated_error`."""
         return _STATED[options.slender.accuracy]
 
-    def own_error(self, batch: RobotBatch) -> str:
+    def own_error(self, batch: RobotBatch, fitted_by: str = "") -> str:
         """See `ResistanceModel.own_error`."""
         coupled = bool(batch.coupling_length[0] > 0 and batch.coupling_diameter[0] > 0)
         found = (
