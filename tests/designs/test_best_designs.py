@@ -320,6 +320,7 @@ def test_conditions_have_the_units_of_their_quantity() -> None:
         ({"maximise": ()}, "0 objectives"),
         ({"maximise": "forward_speed"}, "did you mean forward_velocity"),
         ({"subject_to": ["motor_current < 0.4 A"]}, "NAME <= VALUE UNIT"),
+        ({"subject_to": "motor_current < 0.4 A"}, "NAME <= VALUE UNIT"),
         ({"subject_to": ["motor_current <= 0.4 V"]}, "is not a unit of"),
         ({"subject_to": ["motor_current <= nan A"]}, "not finite"),
         ({"subject_to": ["__import__('os') <= 1 A"]}, "NAME <= VALUE UNIT"),

@@ -59,7 +59,7 @@ def design(
     *,
     maximise: str | Sequence[str] = (),
     minimise: str | Sequence[str] = (),
-    subject_to: Sequence[str] = (),
+    subject_to: str | Sequence[str] = (),
     unknown: Mapping[str, str | Sequence[object]] | None = None,
     posterior: str | Path | None = None,
     judged: Judged | Mapping[str, Any] | None = None,
@@ -81,7 +81,7 @@ def design(
         maximise: a quantity to make large, as `forward_velocity`; or a condition, as ``"forward_velocity >= 1 mm/s"``,
             of which the probability is made large. Two objectives, from here or `minimise`, give a Pareto front.
         minimise: a quantity to make small.
-        subject_to: conditions, as ``"motor_current <= 0.4 A"``.
+        subject_to: a condition, as ``"motor_current <= 0.4 A"``, or several.
         unknown: dotted field to the range over which it is uniform.
         posterior: file of a calibration's posterior, whose draws are what is not known.
         judged: `statistic`, `level`, `confidence`, `draws`, `seed`.

@@ -90,6 +90,8 @@ class Contact(Section):
     """Of dry friction where asperities touch; between lubricated surfaces 0.05 to 0.15."""
 
 
+_READ_BY = {"laid_down": "predicted", "contact": "settled"}
+"""Tables of a study and the switch without which nothing reads them."""
 _Values = Annotated[list[Any], Field(min_length=1, max_length=10_000)]
 
 
@@ -163,6 +165,11 @@ class Study(Section):
         ]
         if any(not 1e-3 * Hz <= abs(rate) <= 1e4 * Hz for rate in self.assumed_motor_rates):
             problems.append("assumed_motor_rates holds a rate out of range; allowed: 0.001 Hz to 10000 Hz")
+        problems += [
+            f"{table} without {switch}, which reads it; allowed: {switch} = true or false beside it, or no [{table}]"
+            for table, switch in _READ_BY.items()
+            if table in self.model_fields_set and switch not in self.model_fields_set
+        ]
         problems += self._problems_of_the_band()
         varied = len(self.robots or ()) * math.prod(len(values) for values in self.vary.values())
         if self.vary and varied > _MOST_ROBOTS:
