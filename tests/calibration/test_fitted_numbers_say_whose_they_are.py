@@ -111,6 +111,25 @@ def test_a_fit_refuses_a_field_that_it_does_not_look_at(run: Callable[..., Any],
     assert "o.csv does not exist" in outcome.err
 
 
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        (("calibrate", "--set", "tail.wavelength=20 mm"), "tail.wavelength is set, and the observations say the"),
+        (("calibrate", "--prepare"), "prepare with model 'sbt', which takes no tables"),
+        (("calibrate", "--method", "paper", "--seed", "1"), "--seed with method 'paper', which samples no posterior"),
+        (("rank-models", "--set", "tail.amplitude=2 mm"), "tail.amplitude is set, and the observations say the"),
+        (("rank-models", "--set", "calibration.rft.body_drag=30"), "calibration.rft.body_drag is set, and the fit"),
+        (("rank-models", "--prepare"), "prepare with models sbt, rft, which take no tables; allowed: with 'tube'"),
+    ],
+)
+def test_a_fit_refuses_what_it_would_not_use(
+    run: Callable[..., Any], tmp_path: Path, command: tuple[str, ...], sentence: str
+) -> None:
+    outcome = run(command[0], str(tmp_path / "o.csv"), WIDE, *command[1:])
+    assert (outcome.code, outcome.out) == (2, "")
+    assert sentence in outcome.err
+
+
 def test_predict_says_whose_friction_it_takes_and_under_which_reading(calibration: Path) -> None:
     other = load(WIDE, **{"tail.wavelength": "13 mm"})
     found = sp.predict(other, model="rft", calibration=calibration, friction="paper").warnings

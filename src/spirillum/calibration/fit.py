@@ -92,6 +92,8 @@ def fit_model(
             f"friction = {friction!r}; allowed: {', '.join(_READINGS)}, for no other reading lets (18) give B_eff"
         )
     names = free_names(free, find_swimmer_model(model).name)
+    if prepare and model != "tube":
+        raise InputError(f"prepare with model '{model}', which takes no tables; allowed: with model 'tube'")
     assumed = assumed_uncertainties(assume_uncertainty)
     if assumed and method == "paper":
         raise InputError("assume-uncertainty with method 'paper', which gives no intervals; allowed: another method")

@@ -335,6 +335,8 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
     return names
 
 
+_OBSERVED = ("tail.wavelength", "tail.amplitude")
+"""Fields whose values stand in the observations."""
 _IN_PLACE_OF = {
     "body_drag": "calibration.{model}.body_drag",
     "body_rotation": "calibration.{model}.body_rotation",
@@ -345,7 +347,7 @@ _IN_PLACE_OF = {
 
 
 def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model: str) -> None:
-    """Refuse set fields of a robot that a fit replaces without having looked at them.
+    """Refuse set fields of a robot that the observations replace, or a fit without having looked at them.
 
     Args:
         fields: dotted names of the fields that were set.
@@ -356,6 +358,12 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
         InputError: for such a field, or wrong names.
     """
     asked, known = set(fields), find_swimmer_model(model).name
+    observed = [field for field in _OBSERVED if field in asked]
+    if observed:
+        raise InputError(
+            f"{observed[0]} is set, and the observations say the {observed[0].partition('.')[2]} of each tail; "
+            "allowed: other fields"
+        )
     for name in free_names(free, known):
         field = _IN_PLACE_OF.get(name, "").format(model=known)
         if field in asked:

@@ -31,7 +31,7 @@ from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.load import PAPER_ROBOTS
 from spirillum.shown import Shown, counted
 
-__all__ = ["Ranked", "Ranking", "rank_models", "ranked_fits"]
+__all__ = ["Ranked", "Ranking", "free_by_model", "rank_models", "ranked_fits"]
 
 _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
@@ -191,27 +191,43 @@ def rank_models(
     Raises:
         InputError: for wrong input, or a single model.
     """
+    wanted = free_by_model(models, free)
+    if prepare and "tube" not in wanted:
+        raise InputError(
+            f"prepare with models {', '.join(wanted)}, which take no tables; allowed: with 'tube' among them"
+        )
+    fits = {}
+    for name, names in wanted.items():
+        fits[name] = fit_model(
+            observations,
+            robots,
+            model=name,
+            free=names,
+            method="posterior",
+            sampling=sampling,
+            prepare=prepare and name == "tube",
+            progress=progress,
+        )
+    return ranked_fits(fits)
+
+
+def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None) -> dict[str, tuple[str, ...]]:
+    """Models that are ranked, each with its free parameters.
+
+    Args:
+        models: hydrodynamic models, as `rank_models` takes them.
+        free: free parameters of every model, as `rank_models` takes them.
+
+    Raises:
+        InputError: for unknown names, a single model, or parameters that not all models have.
+    """
     names = list(dict.fromkeys(models or _MODELS))
     if len(names) < 2:
         raise InputError(f"models = {', '.join(names)}; allowed: at least two models to rank")
     if free:
         _check_common(names, free)
     wanted = {name: free or (_FREE_IN_TUBE if name == "tube" else _FREE) for name in names}
-    for name in names:  # all of them, before the first is fitted
-        free_names(wanted[name], find_swimmer_model(name).name)
-    fits = {}
-    for name in names:
-        fits[name] = fit_model(
-            observations,
-            robots,
-            model=name,
-            free=wanted[name],
-            method="posterior",
-            sampling=sampling,
-            prepare=prepare,
-            progress=progress,
-        )
-    return ranked_fits(fits)
+    return {name: free_names(wanted[name], find_swimmer_model(name).name) for name in names}
 
 
 def _check_common(models: Sequence[str], free: str | Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from spirillum.calibration.methods import METHODS
-from spirillum.cli.inputs import loaded_robot, overrides_from
+from spirillum.cli.inputs import given_options, loaded_robot, overrides_from
 from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
 from spirillum.fluid.tube.announced import TABLE_TAKES
@@ -28,6 +28,7 @@ def _complete_methods(incomplete: str) -> list[str]:
 
 
 def calibrate(
+    context: typer.Context,
     observations: _Observations,
     robot: _Robots,
     model: NamedModel = "sbt",
@@ -76,6 +77,8 @@ def calibrate(
 
     robots = [loaded_robot(name, settings) for name in robot]
     check_not_set(set_fields(overrides_from(settings)), free, model)
+    if method in METHODS and method != "posterior" and given_options(context, "seed"):
+        raise InputError(f"--seed with method '{method}', which samples no posterior; allowed: with method posterior")
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
@@ -141,11 +144,16 @@ def rank_models(
 
     Example: `spirillum rank-models observations.csv --model sbt --model rft --model slender`
     """
+    from spirillum.calibration.parameters import check_not_set
     from spirillum.calibration.posterior import Sampling
+    from spirillum.calibration.ranking import free_by_model
     from spirillum.calibration.ranking import rank_models as answer
     from spirillum.cli import renderer
+    from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
+    for name, fitted in free_by_model(model, free).items():
+        check_not_set(set_fields(overrides_from(settings)), fitted, name)
     names = robot or PAPER_ROBOTS
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
