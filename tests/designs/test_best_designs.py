@@ -188,6 +188,19 @@ def test_what_judges_draws_is_refused_where_there_are_none(judged: dict[str, obj
         sp.design(PLAIN, TWO, maximise="forward_velocity", model="rft", judged={**judged, "seed": 2})
 
 
+@pytest.mark.parametrize(
+    ("judged", "words"),
+    [
+        ({"level": 0.2}, "level = 0.2 with statistic 'mean'"),
+        ({"confidence": 0.9}, "confidence = 0.9 without a condition"),
+    ],
+)
+def test_what_nothing_reads_of_how_draws_are_judged_is_refused(judged: dict[str, object], words: str) -> None:
+    unknown = {"fluid.viscosity": ("0.5 Pa s", "1 Pa s")}
+    with pytest.raises(InputError, match=words):
+        sp.design(PLAIN, TWO, maximise="forward_velocity", model="rft", unknown=unknown, judged=judged)
+
+
 def test_a_posterior_is_said_what_predict_says_of_it(tmp_path) -> None:
     """Whose geometry it was fitted to, that it is synthetic, and that its factors stand for the walls."""
     file = posteriors.write(tmp_path / "posterior.nc")

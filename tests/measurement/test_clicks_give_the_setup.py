@@ -1,5 +1,6 @@
 """Clicks in a picture against what was planted there: spacing, scale, direction, order of the stripes."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -134,3 +135,19 @@ def test_no_clicks_name_no_stripes() -> None:
 def test_values_of_a_setup_file_are_read_back(value):
     text = setup_text({"robot.file": (toml_value(value), "as asked for")})
     assert tomllib.loads(text)["robot"]["file"] == value
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"index": float("nan")}, "tank.index = nan; allowed: from 1 to 3"),
+        ({"index": 0.0}, "tank.index = 0; allowed"),
+        ({"index": -1.4}, "tank.index = -1.4; allowed"),
+        ({"camera": 0.05}, "camera.height = 50 mm, with marks, axis or surface at 60 mm; allowed: a lens above"),
+    ],
+)
+def test_optics_that_cannot_be_give_no_scale(changed: dict[str, float], words: str) -> None:
+    """Nothing of a wrong index or height comes into a setup as a length per pixel."""
+    right = {"heights": (0.0, 0.01), "camera": 0.5, "surface": 0.06, "index": 1.4}
+    with pytest.raises(InputError, match=re.escape(words)):
+        length_per_pixel_between((0.0, 0.0), (100.0, 0.0), 0.01, **(right | changed))

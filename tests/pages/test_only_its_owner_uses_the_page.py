@@ -174,6 +174,8 @@ def test_only_knobs_can_be_turned() -> None:
         ("look", {"film": "\ud800"}),
         ("measure", {}),
         ("robot", {"lane": [[10**400]]}),
+        ("robot", {"lane": 0.0}),
+        ("robot", {"lane": False}),
     ],
 )
 def test_what_the_bench_cannot_take_gets_a_sentence(

@@ -74,6 +74,22 @@ def test_a_film_is_of_a_robot_that_is_named_or_of_a_run(run: Run, tmp_path: Path
         (("-o", "a.mp4", "--depth-error", "1m"), "depth_error = 1000 mm"),
         (("-o", "a.mp4", "--depth-error=-20mm"), "depth_error = -20 mm"),
         (("-o", "a.mp4", "--run", "no.nc"), "no.nc does not exist"),
+        (("-o", "a.mp4", "--glare-fixed"), "glare_moves = False (--glare-fixed) without glare; allowed: "),
+        (
+            (
+                "-o",
+                "a.mp4",
+                "--forward-velocity",
+                "1mm/s",
+                "--body-rate",
+                "1Hz",
+                "--tail-rate",
+                "1Hz",
+                "--friction",
+                "body",
+            ),
+            "friction = 'body' with a prescribed forward velocity, body and tail rate",
+        ),
         (("-o", "no/where/a.mp4"), "no such folder"),
     ],
 )

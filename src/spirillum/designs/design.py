@@ -99,8 +99,7 @@ def design(
     """
     given, options = load(robot), Judged.of(judged)
     unknowns = unknowns_of(given, unknown, posterior, model)
-    if unknowns.known:
-        options.check_read()
+    options.check_read(known=unknowns.known, conditions=bool(subject_to))
     space = space_of(unknowns.robot, vary)
     choice = chosen_model(model, given, space, unknowns)
     chosen = find_swimmer_model(choice.model)

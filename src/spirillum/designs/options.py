@@ -28,15 +28,28 @@ class Judged(Options):
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 1
     """Of draws and search."""
 
-    def check_read(self) -> None:
-        """Refuse what was given where everything is known: there are no draws to judge by; a seed serves the search.
+    def check_read(self, *, known: bool, conditions: bool) -> None:
+        """Refuse what was given and nothing reads; a seed serves the search in any case.
+
+        Args:
+            known: everything is known, so that there are no draws to judge by.
+            conditions: designs have to keep some.
 
         Raises:
-            InputError: naming all of it.
+            InputError: naming it.
         """
         given = [name for name in type(self).model_fields if name in self.model_fields_set and name != "seed"]
-        if given:
+        if given and known:
             raise InputError(
                 f"{', '.join(given)} where nothing is unknown; allowed: with a field that is not known (unknown) or a "
                 "posterior"
+            )
+        if "level" in given and self.statistic != "quantile":
+            raise InputError(
+                f"level = {self.level:g} with statistic '{self.statistic}', which has none; allowed: with quantile"
+            )
+        if "confidence" in given and not conditions:
+            raise InputError(
+                f"confidence = {self.confidence:g} without a condition (subject_to) that would have to hold; allowed: "
+                "with one"
             )

@@ -87,14 +87,22 @@ def length_per_pixel_between(
         heights: of the marks and of the robot's axis, m.
         camera: height of the lens, m.
         surface: height of the oil's surface, m; None: nothing refracts.
-        index: refractive index below it.
+        index: refractive index below it, from 1 to 3.
 
     Raises:
-        InputError: if the clicks are too close to each other.
+        InputError: if the clicks are too close to each other, for another index, or what lies above the lens.
     """
     pixels = float(np.hypot(other[0] - one[0], other[1] - one[1]))
     if pixels < _SHORTEST:
         raise InputError(f"the clicks are {pixels:.0f} pixels apart; allowed: at least {_SHORTEST:.0f}")
+    if not 1.0 <= index <= 3.0:
+        raise InputError(f"tank.index = {index:g}; allowed: from 1 to 3")
+    above = max(*heights, 0.0 if surface is None else surface)
+    if not above < camera:
+        raise InputError(
+            f"camera.height = {1e3 * camera:g} mm, with marks, axis or surface at {1e3 * above:g} mm; allowed: a lens "
+            "above all of them"
+        )
     marks, axis = (apparent_distance(height, camera, surface, index) for height in heights)
     return length / pixels * axis / marks
 

@@ -63,9 +63,11 @@ class _Doors:
         return JSONResponse({"said": said, **await asyncio.to_thread(self._bench.state)})
 
     def _robot_of_swim(self, message: Mapping[str, Any]) -> None:
-        found = self._theatre.recording(message["lane"]) if message.get("lane") in (0, 1) else None
+        lane: Any = message.get("lane")
+        numbered = isinstance(lane, int) and not isinstance(lane, bool)
+        found = self._theatre.recording(lane) if numbered and lane in (0, 1) else None
         if found is None:
-            raise InputError(f"lane = {str(message.get('lane'))[:20]}; allowed: a robot that is there")
+            raise InputError(f"lane = {str(lane)[:20]}; allowed: a robot that is there")
         self._bench.desk.take_robot(found[0].predicted())
 
     def _fields(self, message: Mapping[str, Any]) -> None:

@@ -190,7 +190,9 @@ class Desk:
                 f"({', '.join(missing)}) have to stand in the form first"
             )
         heights = {name: parse_option(name, self._fields[name], KINDS["length or zero"]) for name in needed}
-        surface = self._fields.get("tank.surface")
+        surface, index = self._fields.get("tank.surface"), self._fields.get("tank.index", 1.4)
+        if not isinstance(index, (int, float)):
+            raise InputError(f"tank.index = {str(index)[:40]!r}; allowed: a number")
         scale = length_per_pixel_between(
             one,
             other,
@@ -198,7 +200,7 @@ class Desk:
             heights=(heights["markers.height"], heights["robot.axis_height"]),
             camera=heights["camera.height"],
             surface=None if surface is None else parse_option("tank.surface", surface, KINDS["length"]),
-            index=float(self._fields.get("tank.index", 1.4)),
+            index=index,
         )
         self._put("markers.spacing", "")
         self._put("markers.length_per_pixel", f"{1e3 * scale:.6g} mm")

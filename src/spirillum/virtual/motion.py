@@ -66,6 +66,12 @@ def steady_rates(
     }
     fixed = {name: value for name, value in given.items() if value is not None}
     if len(fixed) == len(given):
+        if motion.friction is not None or motion.model not in (None, AUTO):
+            idle = "model" if motion.friction is None else "friction"
+            raise InputError(
+                f"{idle} = {str(getattr(motion, idle))[:40]!r} with a prescribed forward velocity, body and tail rate, "
+                "which leave nothing to compute; allowed: two of them at most"
+            )
         return fixed, "prescribed", ()
     from spirillum.swimming.prediction import predict
 

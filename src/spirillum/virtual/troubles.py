@@ -82,11 +82,11 @@ def with_troubles(
         degradation: what the caller gave; its own fields stay, those of a preset give way.
 
     Raises:
-        InputError: for an unknown name, or a value out of range.
+        InputError: for an unknown name, a value out of range, or a glare that stands still where there is none.
     """
     stated = Degradation.of(degradation)
     if not isinstance(value, str):
-        return Troubles.of(value), stated
+        return Troubles.of(value), stated.with_glare_to_fix()
     chosen: dict[str, Any] = {}
     disturbed: dict[str, Any] = {}
     for word in (part.strip() for part in value.split(",")):
@@ -97,7 +97,7 @@ def with_troubles(
     given = degradation.model_dump(exclude_unset=True) if isinstance(degradation, Degradation) else degradation
     fields = given if isinstance(given, Mapping) else {}
     disturbed = {name: size for name, size in disturbed.items() if fields.get(name) is None}
-    return Troubles.of(chosen), stated.model_copy(update=disturbed)
+    return Troubles.of(chosen), stated.model_copy(update=disturbed).with_glare_to_fix()
 
 
 def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
