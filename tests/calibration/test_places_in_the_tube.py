@@ -199,6 +199,20 @@ def test_predictions_with_a_posterior_lie_where_it_does(one_gap: Path) -> None:
     assert given.intervals.middle["forward_velocity"] == pytest.approx(middle.forward_velocity, rel=0.03)
 
 
+def test_what_was_fitted_in_another_channel_is_not_said_to_be_used(one_gap: Path) -> None:
+    """A gap is that of its channel: elsewhere the answer is that without the fit, and says so."""
+    plain = sp.predict(NARROW, model="tube", tail_rate="1.3 Hz")
+    for option, name in (("posterior", "posterior.nc"), ("calibration", "calibration.toml")):
+        answer = sp.predict(NARROW, model="tube", tail_rate="1.3 Hz", **{option: one_gap / "fitted" / name})
+        assert answer.forward_velocity == plain.forward_velocity
+        assert (answer.fitted_by, answer.intervals) == ("", None)
+        assert answer.known_error == plain.known_error
+        assert answer.band is not None
+        (said,) = [words for words in answer.warnings if "nothing in" in words]
+        assert "is for the channel of this robot (it was fitted in 40 mm)" in said
+        assert not any("synthetic" in words for words in answer.warnings)
+
+
 def test_a_posterior_of_places_needs_a_table(one_gap: Path) -> None:
     with pytest.raises(InputError, match="has no table of its tube"):
         sp.predict(

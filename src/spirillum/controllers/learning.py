@@ -287,7 +287,7 @@ def _refined(axis: Samples, near: Samples) -> Samples:
 def _factor(axis: Samples, weight: Samples, largest: float) -> Factor:
     """Median and interval of a factor from its density over the power."""
     if axis.size == 1:
-        return Factor(1.0, 1.0, 1.0, told=True)
+        return Factor(1.0, 1.0, 1.0, told=False)  # a model without walls has no gap to learn
     parts = 0.5 * (weight[1:] + weight[:-1])
     cumulative = np.concatenate([[0.0], np.cumsum(parts)]) / parts.sum()
     low, value, high = np.interp([0.025, 0.5, 0.975], cumulative, axis)

@@ -100,6 +100,19 @@ class PosteriorFile:
         rates = [abs(rate) for tail in self.tails if (rate := tail.get("tail_rate")) is not None]
         return float(np.median(rates)) if rates else None
 
+    def acts_on(self, robot: Robot, *, walls: bool, friction: bool) -> bool:
+        """Whether a fitted number acts on a robot's motion; the model's discrepancy, which widens intervals, aside.
+
+        Args:
+            robot: the robot; a gap, pitch or B_eff of another channel than its own does not.
+            walls: whether the model computes the walls, so that a fitted place matters.
+            friction: whether B_eff acts on the answer.
+        """
+        of_lying = {*_PLACE, *FittedContact.model_fields}
+        lies = walls and (bool(self._of_place(robot, self.middle)) or "friction_coefficient" in self.draws)
+        rubs = friction and friction_of_tails(robot, self.frictions) != (None, ())
+        return lies or rubs or not of_lying.issuperset(self.draws)
+
     def placed(self, robot: Robot, placement: Placement, draw: int | None = None) -> Placement:
         """A placement with the fitted gap and pitch where it leaves them open; level if only the gap was fitted.
 

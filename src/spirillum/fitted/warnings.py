@@ -20,6 +20,7 @@ from spirillum.fitted.calibration_file import (
 from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.model import SwimmerModel
 from spirillum.robot.robot import Robot
+from spirillum.units import show
 
 __all__ = ["Fitted", "fitted_of", "friction_acts"]
 
@@ -45,7 +46,8 @@ class Fitted:
     """The calibration file; None without one."""
     name: str = ""
     """Name of the file, with the observations of a posterior."""
-
+    channels: tuple[float, ...] = ()
+    """Diameters of the channels in which it was fitted, m; none where the file does not say."""
     friction_coefficient: float | None = None
     """Coefficient of dry friction under a robot that was fitted; None: none was."""
 
@@ -92,11 +94,40 @@ class Fitted:
         """
         replaced = self.file is not None and self.file.calibration
         instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
-        return [
-            f"nothing in {self.name or 'the calibration'} is for model '{model.name}': {instead}"
-            for model in models
-            if not any(self.serves(robot, model, friction=friction) for robot in robots)
-        ]
+        idle = [model for model in models if not any(self.serves(robot, model, friction=friction) for robot in robots)]
+        elsewhere = "" if replaced or self.in_channel_of(robots) else self._fitted_elsewhere(robots)
+        found = []
+        for model in idle:
+            whom = elsewhere if elsewhere and model.name == self.model else f"model '{model.name}'"
+            found.append(f"nothing in {self.name or 'the calibration'} is for {whom}: {instead}")
+        return found
+
+    def in_channel_of(self, robots: Sequence[Robot]) -> bool:
+        """Whether one of some robots is in a channel in which it was fitted, or that is not known."""
+        own = [robot.channel.diameter for robot in robots if robot.channel is not None]
+        return not self.channels or any(np.isclose(one, self.channels, rtol=1e-6, atol=0.0).any() for one in own)
+
+    def _fitted_elsewhere(self, robots: Sequence[Robot]) -> str:
+        """The robots, and in which channels it was fitted instead."""
+        fitted = " and ".join(show(diameter, "mm") for diameter in self.channels)
+        which = "this robot" if len(robots) == 1 else "these robots"
+        return f"the channel of {which} (it was fitted in {fitted})"
+
+    def outside_warnings(
+        self, robot: Robot, model: SwimmerModel, posterior: PosteriorFile, *, friction: bool = True
+    ) -> list[str]:
+        """Whether draws of a posterior leave a robot's answer as it is without them.
+
+        Args:
+            robot: the robot.
+            model: the model that answers.
+            posterior: the posterior.
+            friction: whether B_eff acts on the answer, see `friction_acts`.
+        """
+        if posterior.acts_on(robot, walls=model.placed, friction=friction):
+            return []
+        what = self._fitted_elsewhere([robot]) if self.channels else "this robot"
+        return [f"nothing in {self.name} is for {what}: the robot's own numbers and the band over places are used"]
 
     def origin_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True
@@ -243,6 +274,7 @@ def fitted_of(
             drawn=True,
             name=posterior.source,
             friction_coefficient=None if rubbing is None else float(rubbing[0]),
+            channels=tuple(float(one) for one in posterior.channels if np.isfinite(one)),
         )
     if calibration is None:
         return Fitted()
@@ -252,4 +284,8 @@ def fitted_of(
     said = name or ("" if isinstance(calibration, CalibrationFile) else str(calibration))
     reading, model = provenance.friction_reading, provenance.model
     dry = file.contact.friction_coefficient
-    return Fitted(file.friction, reading, synthetic, model, file=file, name=said, friction_coefficient=dry)
+    places = {place.channel_diameter for place in file.placement} | {tail.channel_diameter for tail in file.friction}
+    channels = tuple(sorted(places))
+    return Fitted(
+        file.friction, reading, synthetic, model, file=file, name=said, channels=channels, friction_coefficient=dry
+    )

@@ -99,7 +99,7 @@ class Prediction(Shown):
         """What the model leaves out of this robot, and what that costs it."""
         if self.lying is not None:
             return free_in_tube(self.fitted_by)
-        if self.model.placed and self.intervals is not None:
+        if self.model.placed and self.intervals is not None and self.band is None:
             return "walls are computed; the interval covers what the posterior leaves open, all else is taken as given"
         return self.model.own_error(self.batch, self.fitted_by)
 
@@ -279,7 +279,11 @@ def predict(  # noqa: PLR0913 - the options of the command
     warnings += no_band_warnings(batch, chosen) if band is None and not with_band else []
     if intervals is not None and whose == "measured":
         result = with_middles(result, intervals)
-    warnings += case.fitted_warnings()
+    acts = friction_acts(reading, rate)
+    idle = [] if drawn is None or over is None else fitted.outside_warnings(ready, chosen, drawn, friction=acts)
+    if idle:
+        intervals = None
+    warnings += idle or case.fitted_warnings()
     return Prediction(
         robot=ready,
         model=chosen,
@@ -292,10 +296,10 @@ def predict(  # noqa: PLR0913 - the options of the command
         intervals=intervals,
         band=over,
         motion=motion_of(motion),
-        interval_of=interval_statement(drawn, ready, whose),
+        interval_of="" if idle else interval_statement(drawn, ready, whose),
         choice=choice,
         tail_rate=rate,
-        fitted_by=fitted.source_of(ready, chosen, friction=friction_acts(reading, rate)),
+        fitted_by="" if idle else fitted.source_of(ready, chosen, friction=acts),
     )
 
 

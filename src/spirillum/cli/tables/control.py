@@ -71,8 +71,8 @@ def _learnt(learnt: Answer, drawn: Answer) -> str:
     """Factors with their intervals beside the truth."""
     said = []
     for name, item in learnt.items():
-        words = f"{item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not told"
-        said.append(f"{name.replace('_factor', '')} times {words}, in truth {drawn[name]:.3g}")
+        words = f"times {item['value']:.3g} ({item['low']:.3g} to {item['high']:.3g})" if item["told"] else "not told"
+        said.append(f"{name.replace('_factor', '')} {words}, in truth {drawn[name]:.3g}")
     return "; ".join(said)
 
 
