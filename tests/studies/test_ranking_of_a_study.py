@@ -111,6 +111,23 @@ def test_robots_without_a_motor_are_ranked_by_power_and_equal_ones_are_called_so
     assert found.walls is False
 
 
+def test_robots_that_rounding_alone_tells_apart_are_named_together() -> None:
+    """Efficiency at a given rate does not know the viscosity: neither oil is the better one."""
+    study = {
+        "robots": ["biorob2012-wide"],
+        "models": ["rft"],
+        "friction": ["none"],
+        "vary": {"tail.amplitude": ["2 mm", "3 mm"], "fluid.viscosity": ["1 Pa s", "2 Pa s"]},
+    }
+    ranking = ranking_of(sp.study(study))
+    efficient = next(best for best in ranking.best if best.quantity == "hydrodynamic_efficiency")
+    assert {efficient.robot.name, *efficient.ties} == {f"amplitude 3 mm, viscosity {mu} Pa s" for mu in (1, 2)}
+    assert f"no better than {efficient.ties[0]}" in best_in_words(efficient.to_dict())
+    fastest = next(best for best in ranking.best if best.quantity == "forward_velocity")
+    assert fastest.ties == ()
+    assert "ties" not in fastest.to_dict()
+
+
 def test_the_order_of_a_datasets_dimensions_changes_no_ranking() -> None:
     dataset = sp.study(GRID)
     shape = (*dataset["forward_velocity"].shape, 3)

@@ -42,6 +42,10 @@ __all__ = [
 ]
 
 _ALIKE = 0.01
+_EQUAL = 1e-9
+"""Relative difference up to which two robots have one value: rounding."""
+_NAMED = 3
+"""Robots that are named where several are equal."""
 _MOST = 1000
 """Robots in an answer."""
 
@@ -123,6 +127,8 @@ class Best(NamedTuple):
     """Number of robots that have a value."""
     robots: int
     """Number of robots in the ranking."""
+    ties: tuple[str, ...] = ()
+    """Names of the other robots that have the same value, to rounding."""
 
     @property
     def alike(self) -> bool:
@@ -134,6 +140,7 @@ class Best(NamedTuple):
         found: dict[str, Any] = {"what": self.what, "quantity": self.quantity, "robot": self.robot.name}
         found |= {"alike": self.alike, "spread": quantity(self.spread, "1")}
         found |= {"robots": self.known, "of_robots": self.robots}
+        found |= {"ties": list(self.ties)} if self.ties else {}
         return found | ({"places": self.places, "of_places": self.of_places} if self.of_places else {})
 
 
@@ -201,7 +208,10 @@ def best_in_words(best: Mapping[str, Any], size: str = "") -> str:
     sure = f"at {best['places']} of {best['of_places']} places" if "places" in best else ""
     some = best["robots"] < best["of_robots"]
     among = f"among {best['robots']} of {best['of_robots']} robots, the others have no such value" if some else ""
-    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, sure, among)))
+    ties = best.get("ties", [])
+    more = f" and {len(ties) - _NAMED} more" if len(ties) > _NAMED else ""
+    equal = f"no better than {'; '.join(ties[:_NAMED])}{more}" if ties else ""
+    return ", ".join(filter(None, (f"{best['what']}: {best['robot']}", size, equal, sure, among)))
 
 
 def can_be_ranked(dataset: xr.Dataset) -> bool:
@@ -312,11 +322,13 @@ def _best(chosen: xr.Dataset, name: str, values: Values, ranked: Mapping[int, Ra
     winner = int(among[np.nanargmax(sign * values[among])])
     finite = values[among][np.isfinite(values[among])]
     spread = float(np.ptp(finite) / max(abs(values[winner]), 1e-300)) if finite.size > 1 else np.inf
+    near = np.abs(values[among] - values[winner]) <= _EQUAL * abs(values[winner])
+    ties = tuple(ranked[int(place)].name for place in among[near] if place != winner)
     places = chosen.get(f"{name}_at_place")
     if places is None:
-        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size)
+        return Best(word, name, ranked[winner], 0, 0, spread, finite.size, among.size, ties)
     others = places.transpose(*robot_dims(chosen), ...).values.astype(float).reshape(values.size, -1)
     there = sign * np.column_stack([values, others])[among]
     there = there[:, np.isfinite(there).all(axis=0)]
     wins = int(np.count_nonzero(among[np.argmax(there, axis=0)] == winner)) if there.shape[1] else 0
-    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size)
+    return Best(word, name, ranked[winner], wins, there.shape[1], spread, finite.size, among.size, ties)

@@ -53,7 +53,13 @@ def _drawn(ranking: StudyRanking) -> Figure:
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False, width_ratios=[1.6] + [1.0] * (len(names) - 1))
     ticks = 4 if len(names) < 4 else 2
     for panel, name in zip(panels[0], names, strict=True):
-        _column(panel, robots, name, {best.quantity: best.robot.name for best in ranking.best if not best.alike}, ticks)
+        _column(
+            panel,
+            robots,
+            name,
+            {best.quantity: (best.robot.name, *best.ties) for best in ranking.best if not best.alike},
+            ticks,
+        )
     first = panels[0][0]
     first.set_yticks(range(len(robots)), told_apart([robot.name for robot in robots], 40))
     first.set_ylim(len(robots) - 0.4, -0.6)
@@ -65,14 +71,16 @@ def _drawn(ranking: StudyRanking) -> Figure:
     return figure
 
 
-def _column(panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, str], ticks: int) -> None:
+def _column(
+    panel: Axes, robots: tuple[RankedRobot, ...], name: str, best: dict[str, tuple[str, ...]], ticks: int
+) -> None:
     """One quantity of all robots: points, and lines over their bands."""
     values, low, high = (_of(robots, which, name) for which in ("values", "low", "high"))
     scale = _scale(np.concatenate([values, high]), unit_of_ranked(name))
     rows = np.arange(len(robots))
     colour = COLOURS["blue"]
     panel.hlines(rows, scale(low), scale(high), color=colour, linewidth=2.2, alpha=0.35)
-    winner = np.array([robot.name == best.get(name) for robot in robots])
+    winner = np.array([robot.name in best.get(name, ()) for robot in robots])
     for chosen, face in ((winner, colour), (~winner, "white")):
         panel.plot(scale(values[chosen]), rows[chosen], "o", color=colour, markerfacecolor=face, markersize=5.5)
     panel.set_xlabel(RANKED[name].heading(scale.unit))
