@@ -239,7 +239,7 @@ anything = st.one_of(
 )
 
 
-@settings(max_examples=600)
+@settings(max_examples=100)
 @given(text=anything, kind=st.sampled_from(sorted(KINDS)))
 @example(text="2 m\nm", kind="length")
 @example(text="18 m\nnonsense", kind="length")
@@ -248,6 +248,17 @@ anything = st.one_of(
 @example(text="1 " + "/m" * 20, kind="length")
 @example(text="9" * 199 + " mm", kind="length")
 def test_any_text_is_a_quantity_or_an_input_error(text: Any, kind: str) -> None:
+    is_a_quantity_or_an_input_error(text, kind)
+
+
+@pytest.mark.slow
+@settings(max_examples=2000)
+@given(text=anything, kind=st.sampled_from(sorted(KINDS)))
+def test_of_many_texts_each_is_a_quantity_or_an_input_error(text: Any, kind: str) -> None:
+    is_a_quantity_or_an_input_error(text, kind)
+
+
+def is_a_quantity_or_an_input_error(text: Any, kind: str) -> None:
     started = time.process_time()
     try:
         value = parse_quantity(text, KINDS[kind])

@@ -174,11 +174,11 @@ def test_steady_means_of_runs_have_the_intervals_of_predictions(fitted: Any, tmp
 
     path = tmp_path / "posterior.nc"
     with xr.open_datatree(fitted[1] / "posterior.nc") as whole:
-        few = whole.isel(chain=slice(24), draw=slice(8)).load()
+        few = whole.isel(chain=slice(24), draw=slice(4)).load()
     values = {str(name): item.to_numpy() for name, item in few["posterior"].data_vars.items()}
     few.attrs["checksum"] = posterior_checksum(few.attrs, values)
     few.to_netcdf(path)
-    run = sp.simulate(WIDE, posterior=path, draws=200, timing={"duration": "2 s", "on": [("0 s", "1 s")]})
+    run = sp.simulate(WIDE, posterior=path, draws=100, timing={"duration": "2 s", "on": [("0 s", "1 s")]})
     steady = sp.predict(WIDE, posterior=path)
     assert steady.intervals is not None
     for name in ("forward_velocity", "tail_rotation_rate", "body_rotation_rate"):
@@ -188,7 +188,7 @@ def test_steady_means_of_runs_have_the_intervals_of_predictions(fitted: Any, tmp
         assert [item["low"], item["high"]] == pytest.approx([low, high], abs=0.01 * (high - low))
         assert (item["kind"], item["level"]) == ("interval", 0.95)
     assert "low" not in run_answer(run)["mean_electrical_power"]
-    assert 150 < run_answer(run)["draws"] <= 200
+    assert 75 < run_answer(run)["draws"] <= 100
 
 
 def test_each_draw_is_run_with_its_own_numbers(fitted: Any) -> None:

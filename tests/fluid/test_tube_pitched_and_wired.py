@@ -72,7 +72,7 @@ def in_tube_axes(pitch: float) -> np.ndarray:
     return np.kron(np.eye(2), turn)
 
 
-@pytest.mark.parametrize("pitch", [1e-9, 0.4])
+@pytest.mark.parametrize("pitch", [pytest.param(1e-9, marks=pytest.mark.slow), 0.4])
 def test_a_pitched_sphere_is_a_sphere(pitch: float) -> None:
     """Rings about a pitched axis, other waves and other modes: in the tube's axes the same matrix and load."""
     fineness = Fineness(tolerance=1e-5, order=10)
@@ -304,43 +304,55 @@ def test_a_lowered_tail_turns_about_its_own_axis() -> None:
     assert dropped.matrix[8, 8] > 1.1 * level.matrix[8, 8]  # nearer to the wall
 
 
-@pytest.mark.parametrize("seat", [Seat(1.0, 0.3), Seat(1.0, 0.25, 0.1), Seat(1.0, 0.25, -0.05, yaw=0.1)])
-@pytest.mark.parametrize("accuracy", ["standard", "high"])
+LEVEL, PITCHED, YAWED = Seat(1.0, 0.3), Seat(1.0, 0.25, 0.1), Seat(1.0, 0.25, -0.05, yaw=0.1)
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "seat"),
+    [
+        ("standard", LEVEL),
+        ("standard", PITCHED),
+        ("high", YAWED),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (("standard", YAWED), ("high", LEVEL), ("high", PITCHED))
+        ),
+    ],
+)
 def test_reduced_basis_against_all_fields(seat: Seat, accuracy: Literal["standard", "high"]) -> None:
-    """What a coil sends to a body that it nearly touches, at phases that are not in the basis: field by field."""
+    """What a coil sends to a body that it nearly touches, at a phase that is not in the basis: field by field."""
     solids = Solids([(ball(0.0, 0.4), 0)], seat, Fineness(accuracy, tolerance=1e-4), near(coil()))
-    for phase in (0.0, 1.0):
-        wire = turned(coil(), phase)
-        found = held_in_tube(solids, [(wire, 1)])
-        inner = Wire(
-            wire.points[:, [0, 2, 1]] * [1, 1, -1], wire.tangents[:, [0, 2, 1]] * [1, 1, -1], wire.lengths, wire.radius
-        )
-        system = wire_system([(inner, 1)], accuracy)
-        sources = Sources.of((inner,), system)
-        kept = solids.kept["reduced"]
-        assert isinstance(kept, list)
-        (reduced,) = kept
-        assert isinstance(reduced, Reduced)
-        placed = seat.placed(inner.points)
-        along = np.kron(np.eye(len(placed)), seat.rotation)
-        away = float(np.min(seat.distances(sources.x, sources.rho)))
-        wall = solids.rings.sent(reduced.waves, solids.systems, placed, along, away)
-        free: list[list[np.ndarray]] = [[], []]
-        for m, cross in enumerate(sources.velocities(solids.panels, solids.modes)):
-            for family, turn in zip(free, (np.real, np.imag), strict=True):
-                family.append(share(m) * sources.columns(cross * turn(sources.turn(m, cross.shape[1]))))
-        fields = [rows.gathered(family) for rows, family in zip(solids.rows, free, strict=True)]
-        fields = [np.concatenate(fields)] if len(wall) == 1 else fields
-        for values, reflected in zip(fields, wall, strict=True):
-            values[:, : reflected.shape[1]] -= reflected
-        coefficients = reduced.coefficients(sources, placed, along)
-        for number, (values, few, answers) in enumerate(zip(fields, coefficients, reduced.answers, strict=True)):
-            tractions = solids.solve_system(number, values)
-            dual = np.concatenate([family.dual for family in solids.systems[number]])
-            work = values.T @ (dual[:, None] * tractions)
-            scale = np.sqrt(np.diag(work).max())
-            np.testing.assert_allclose(few.T @ answers.work @ few / scale**2, work / scale**2, atol=1e-6)
-        assert found.asymmetry < 1e-5
+    wire = turned(coil(), 1.0)
+    found = held_in_tube(solids, [(wire, 1)])
+    inner = Wire(
+        wire.points[:, [0, 2, 1]] * [1, 1, -1], wire.tangents[:, [0, 2, 1]] * [1, 1, -1], wire.lengths, wire.radius
+    )
+    system = wire_system([(inner, 1)], accuracy)
+    sources = Sources.of((inner,), system)
+    kept = solids.kept["reduced"]
+    assert isinstance(kept, list)
+    (reduced,) = kept
+    assert isinstance(reduced, Reduced)
+    placed = seat.placed(inner.points)
+    along = np.kron(np.eye(len(placed)), seat.rotation)
+    away = float(np.min(seat.distances(sources.x, sources.rho)))
+    wall = solids.rings.sent(reduced.waves, solids.systems, placed, along, away)
+    free: list[list[np.ndarray]] = [[], []]
+    for m, cross in enumerate(sources.velocities(solids.panels, solids.modes)):
+        for family, turn in zip(free, (np.real, np.imag), strict=True):
+            family.append(share(m) * sources.columns(cross * turn(sources.turn(m, cross.shape[1]))))
+    fields = [rows.gathered(family) for rows, family in zip(solids.rows, free, strict=True)]
+    fields = [np.concatenate(fields)] if len(wall) == 1 else fields
+    for values, reflected in zip(fields, wall, strict=True):
+        values[:, : reflected.shape[1]] -= reflected
+    coefficients = reduced.coefficients(sources, placed, along)
+    for number, (values, few, answers) in enumerate(zip(fields, coefficients, reduced.answers, strict=True)):
+        tractions = solids.solve_system(number, values)
+        dual = np.concatenate([family.dual for family in solids.systems[number]])
+        work = values.T @ (dual[:, None] * tractions)
+        scale = np.sqrt(np.diag(work).max())
+        np.testing.assert_allclose(few.T @ answers.work @ few / scale**2, work / scale**2, atol=1e-6)
+    assert found.asymmetry < 1e-5
 
 
 def test_a_wire_alone_against_a_dense_matrix() -> None:

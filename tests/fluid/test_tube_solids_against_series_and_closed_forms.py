@@ -195,7 +195,7 @@ def test_a_sphere_near_the_wall_feels_a_film() -> None:
     along, around = 1 / a, 1 / a - 1 / radius
     root = 1 / np.sqrt(along * around)
     gaps = np.array([0.16, 0.08, 0.04, 0.02])
-    fineness = Fineness(tolerance=1e-5)
+    fineness = Fineness(tolerance=1e-4)
     matrices = np.array([held(sphere(a), radius, gap, fineness, a).matrix for gap in gaps])
     squeezed = np.diff(matrices[:, 2, 2]) / np.diff(1 / gaps) / (12 * np.pi * root / (along + around))
     pressure = 6 * along / (3 * along + 2 * around)

@@ -79,7 +79,9 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Page, Any]:
     study = tomllib.loads(STUDY.read_text("utf-8"))
     study["grid"] |= {"wavelengths": ["25 mm"], "amplitudes": ["2.5 mm", "3.5 mm"]}
     dataset = sp.study(study)
-    return folder, written(dataset, folder), dataset
+    with pytest.MonkeyPatch.context() as patch:  # what is drawn is no matter of the report
+        patch.setattr(Picture, "figure", lambda _picture: new_figure(1.0, 1.0))
+        return folder, written(dataset, folder), dataset
 
 
 def test_folder_holds_the_results_and_nothing_half_written(paper: tuple[Path, Page, Any]) -> None:
@@ -179,6 +181,7 @@ def test_study_without_claims_has_an_empty_list(tmp_path: Path) -> None:
     assert "Verdict" not in page.text
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_hostile_words_stay_words(tmp_path: Path) -> None:
     dataset = small_study(title=HOSTILE, note='" onload="x" <b>')
     dataset.attrs["warnings"] = HOSTILE

@@ -301,9 +301,20 @@ junk = st.recursive(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=80)
 @given(overrides=st.dictionaries(paths, junk, min_size=1, max_size=3))
 def test_any_table_is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> None:
+    is_a_robot_or_an_input_error(overrides)
+
+
+@pytest.mark.slow
+@settings(max_examples=1000)
+@given(overrides=st.dictionaries(paths, junk, min_size=1, max_size=3))
+def test_of_many_tables_each_is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> None:
+    is_a_robot_or_an_input_error(overrides)
+
+
+def is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> None:
     try:
         load("biorob2012-wide", **overrides)
     except InputError as error:

@@ -28,6 +28,13 @@ def drawn() -> tuple[Scene, Film]:
     return scenery, Film(images, FRAMES.tolist(), (FRAMES / FPS).tolist(), dict(scenery.setup))
 
 
+@pytest.fixture(scope="module")
+def clean(drawn, tmp_path_factory):
+    """The track of that film, with no trouble."""
+    scenery, film = drawn
+    return tracked(film, scenery, tmp_path_factory.mktemp("clean"))
+
+
 def tracked(film, scenery, folder):
     path, setup = film.write(folder, scenery.robot_text)
     return follow(path, *load_setup(setup))
@@ -43,9 +50,9 @@ def slope(time, values):
     return np.polyfit(time[seen], values[seen], 1)[0]
 
 
-def test_speed_rates_and_place_are_those_that_were_drawn(drawn, tmp_path):
-    scenery, film = drawn
-    found, true = tracked(film, scenery, tmp_path), scenery.truth
+def test_speed_rates_and_place_are_those_that_were_drawn(drawn, clean):
+    scenery, found = drawn[0], clean
+    true = scenery.truth
     assert slope(found.time, found.position[:, 0]) == pytest.approx(true.velocity, rel=0.01)
     assert slope(found.time, found.body_angle) == pytest.approx(true.body_rate, rel=0.01)
     assert slope(found.time, found.tail_phase) == pytest.approx(true.tail_rate, rel=0.002)
@@ -53,9 +60,8 @@ def test_speed_rates_and_place_are_those_that_were_drawn(drawn, tmp_path):
     assert not [flag.name for flag in found.flags if flag.spoils]
 
 
-def test_the_first_stripe_is_where_the_drawing_has_it(drawn, tmp_path):
-    scenery, film = drawn
-    found = tracked(film, scenery, tmp_path)
+def test_the_first_stripe_is_where_the_drawing_has_it(drawn, clean):
+    scenery, found = drawn[0], clean
     true = scenery.truth.body_angle + scenery.truth.body_rate * found.time
     off = np.degrees(found.body_angle - true) % HALF_TURN_OF_PATTERN
     assert np.minimum(off, HALF_TURN_OF_PATTERN - off).max() < 2.0
@@ -86,7 +92,7 @@ def test_with_a_wrong_spacing_the_body_is_learnt_as_large_as_it_looks(tmp_path):
     assert known.size == pytest.approx(1.1, abs=0.006)
 
 
-def test_half_hidden_stripes_are_told_and_widen_the_rate(drawn, tmp_path):
+def test_half_hidden_stripes_are_told_and_widen_the_rate(drawn, clean, tmp_path):
     scenery, film = drawn
     u, v = np.meshgrid(np.arange(scenery.size[0]), np.arange(scenery.size[1]))
     body, half = scenery.truth.robot.body, []
@@ -102,7 +108,6 @@ def test_half_hidden_stripes_are_told_and_widen_the_rate(drawn, tmp_path):
     short = Film(half[few], film.numbers[few], film.times[few], film.setup)
     (flag,) = [flag for flag in tracked(short, scenery, tmp_path).flags if flag.name == "stripes-under-glare"]
     assert "body_rotation_rate" in flag.spoils
-    clean = tracked(film, scenery, tmp_path)
     assert clean.body_angle_drift == 0.0
     assert "stripes-under-glare" not in {flag.name for flag in clean.flags}
 

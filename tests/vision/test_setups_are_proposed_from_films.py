@@ -91,7 +91,7 @@ def test_a_film_without_a_robot_says_what_is_missing(flat_pictures, tmp_path, mo
     monkeypatch.setattr(scouting, "best_other_size", lambda *given: None)  # it takes a while
     monkeypatch.setattr(scouting, "SCOUTING", replace(scouting.SCOUTING, shares=(0.25,)))
     empty = {"frames": 2, "start": (1.0, 0.0), "noise": 4.0}
-    flat_pictures.Flat(**empty, size=(320, 240), focal=350.0).write(tmp_path / "a.mp4")
+    flat_pictures.Flat(**empty, size=(320, 160), focal=350.0).write(tmp_path / "a.mp4")
     looks = []
     found = sp.propose_setup(tmp_path / "a.mp4", progress=lambda what, done, total: looks.append((what, done, total)))
     assert found.found("robot").confidence == "not found"

@@ -1,7 +1,5 @@
 """Pictures of a camera in a hand are moved to where the first one lies, by what stands still in them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -46,7 +44,7 @@ def test_a_camera_on_a_stand_does_not_sway(flat_pictures):
 
 
 def test_rates_from_a_hand_are_those_of_the_robot(flat_pictures, tmp_path):
-    flat = flat_pictures.Flat(frames=60, fps=20.0, velocity=4e-3, noise=2.0, body_rate=-1.5, tail_rate=9.0)
+    flat = flat_pictures.Flat(frames=36, fps=12.0, velocity=4e-3, noise=2.0, body_rate=-1.5, tail_rate=9.0)
     (tmp_path / "film").mkdir()
     for frame in shaken(flat, 3.0)[0]:
         cv2.imwrite(str(tmp_path / "film" / f"{frame.index:03d}.png"), frame.image[..., ::-1])
@@ -61,9 +59,6 @@ def test_rates_from_a_hand_are_those_of_the_robot(flat_pictures, tmp_path):
         seen = np.isfinite(values)
         assert np.polyfit(found.time[seen], values[seen], 1)[0] == pytest.approx(wanted[name], rel=0.01), name
     assert found.drift > 0.0  # how far the camera was carried is not known
-    still = replace(flat, frames=8)
-    assert still.write(tmp_path / "b.mp4")
-    assert follow(tmp_path / "b.mp4", *load_setup(tmp_path / "b.setup.toml")).drift == 0.0
 
 
 def test_a_wide_blur_on_a_reduced_picture_is_that_of_the_whole():

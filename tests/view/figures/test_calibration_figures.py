@@ -28,6 +28,7 @@ def _texts(figure: Any) -> str:
     return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any, tmp_path: Path) -> None:
     written = {Path(name).name for name in write_calibration(found, tmp_path).files}
     names = ("observed-40mm", "residuals", "posterior", "profiles")
