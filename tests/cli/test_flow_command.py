@@ -67,7 +67,10 @@ def test_summary_agrees_with_the_files(run: Callable[..., Any], tmp_path: Path) 
     assert "flow_rate_through_plane" not in second
 
 
-@pytest.mark.parametrize("name", ["flow.png", "flow.pdf", "flow.svg", "flow.nc"])
+VECTORS = [pytest.param(name, marks=pytest.mark.slow) for name in ("flow.pdf", "flow.svg")]
+
+
+@pytest.mark.parametrize("name", ["flow.png", "flow.nc", *VECTORS])
 def test_every_kind_of_plane_is_written(run: Callable[..., Any], tmp_path: Path, name: str) -> None:
     arguments = ("--plane", "yz", "--offset", "-50mm", "--extent", "10mm", "--frame", "body")
     outcome = run("flow", WIDE, *PLANE, *arguments, "-o", str(tmp_path / name))

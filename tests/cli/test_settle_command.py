@@ -35,9 +35,10 @@ def test_tables_and_json_say_the_same(run: Callable[..., Any], tmp_path: Path) -
     assert answer["film"]["gap"]["value"] == pytest.approx([5e-4, 3.976e-4, 3.162e-4, 2.515e-4, 2e-4], rel=1e-3)
 
 
-def test_prediction_says_where_it_lies(run: Callable[..., Any]) -> None:
-    """In its own drive, on the default wall of micrometres."""
-    outcome = run("predict", WIDE, "--model", "tube", "--motion", "free", *QUICK[2:], "--json")
+@pytest.mark.parametrize("wall", [("--roughness", "100um"), pytest.param((), marks=pytest.mark.slow)])
+def test_prediction_says_where_it_lies(run: Callable[..., Any], wall: tuple[str, ...]) -> None:
+    """In its own drive, on a rough wall and on the default one of micrometres, which it takes longer to come to."""
+    outcome = run("predict", WIDE, "--model", "tube", "--motion", "free", *wall, *QUICK[2:], "--json")
     answer = json.loads(outcome.out)
     assert answer["motion"] == "free"
     assert answer["lying"]["state"] == "steady"

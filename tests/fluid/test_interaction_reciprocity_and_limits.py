@@ -79,7 +79,7 @@ def any_rear(request: pytest.FixtureRequest, batch_of: Callable[..., Any]) -> An
     return batch_of(body__rear=request.param)
 
 
-@settings(max_examples=12)
+@settings(max_examples=6)  # of each rear
 @given(values=robots, turns=turns)
 def test_reciprocity_and_dissipation(any_rear: Any, values: dict[str, float], turns: float) -> None:
     """The matrix is symmetric before it is made so, and every motion of both parts takes power."""
@@ -92,7 +92,7 @@ def test_reciprocity_and_dissipation(any_rear: Any, values: dict[str, float], tu
     assert np.all(np.einsum("ni,ij,nj->n", motions, solution.matrix, motions) > 0)
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)  # of each rear
 @given(values=robots, turns=turns)
 def test_more_robot_takes_more_power(any_rear: Any, values: dict[str, float], turns: float) -> None:
     """Least dissipation: a part with another one added, held or free to follow, resists every motion more."""
@@ -118,7 +118,7 @@ def test_more_robot_takes_more_power(any_rear: Any, values: dict[str, float], tu
         assert parts["rotor"][0, 0] < coupling[0, 0] + parts["tail"][0, 0]
 
 
-@settings(max_examples=8)
+@settings(max_examples=4)  # of each rear
 @given(values=robots, turns=turns, phase=st.floats(-7, 7), other=st.floats(-7, 7))
 def test_phase(any_rear: Any, values: dict[str, float], turns: float, phase: float, other: float) -> None:
     """A tail at another phase is the robot turned, a body of revolution; entries about the axis do not feel it."""
@@ -148,7 +148,7 @@ def test_phase_against_a_tail_that_is_built_turned(wide: Any) -> None:
     assert_same(anew, found, 1e-10)
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)  # of each rear
 @given(values=robots, turns=turns)
 def test_left_handed_is_the_mirror_image(any_rear: Any, values: dict[str, float], turns: float) -> None:
     right = built(any_rear, values, turns)
@@ -160,7 +160,7 @@ def test_left_handed_is_the_mirror_image(any_rear: Any, values: dict[str, float]
     assert_same(MODEL.axial(left)[0], signs * MODEL.axial(right)[0], 1e-10)
 
 
-@settings(max_examples=6)
+@settings(max_examples=3)  # of each rear
 @given(values=robots, turns=turns, power=st.integers(-14, 10), thicker=st.floats(0.01, 100.0))
 def test_scale_and_viscosity(
     any_rear: Any, values: dict[str, float], turns: float, power: float, thicker: float

@@ -26,6 +26,7 @@ def rotation_in_a_tube(a: float, R: float, e: float) -> tuple[float, float]:
     return -4 * np.pi * D, 4 * np.pi * c * (B + D / np.tanh(alpha))
 
 
+@pytest.mark.slow  # the cheap form, to 2 %, is that of eccentric annuli
 def test_force_and_torque_per_length_of_the_papers_body() -> None:
     """Difference of two capsules in the wide tube at a gap of 1 mm; mm, viscosity 1.
 

@@ -181,7 +181,7 @@ def test_study_without_claims_has_an_empty_list(tmp_path: Path) -> None:
     assert "Verdict" not in page.text
 
 
-@pytest.mark.usefixtures("unplaced")
+@pytest.mark.usefixtures("blank")
 def test_hostile_words_stay_words(tmp_path: Path) -> None:
     dataset = small_study(title=HOSTILE, note='" onload="x" <b>')
     dataset.attrs["warnings"] = HOSTILE
@@ -191,7 +191,7 @@ def test_hostile_words_stay_words(tmp_path: Path) -> None:
     assert page.text.count(HOSTILE) >= 3
 
 
-@pytest.mark.usefixtures("unplaced")
+@pytest.mark.usefixtures("blank")
 def test_hostile_channel_names_stay_in_the_folder(tmp_path: Path) -> None:
     grid = {
         "channels": {"../x": "biorob2012-wide", "a/b": "biorob2012-narrow"},

@@ -72,6 +72,7 @@ def test_the_roll_of_a_ruler_is_found(flat_pictures):
         assert np.degrees(lines.roll) == pytest.approx(-roll, abs=0.3)
 
 
+@pytest.mark.slow
 def test_a_portrait_film_says_direction_and_shows_a_camera_that_moved(flat_pictures, tmp_path):
     path, _ = film(flat_pictures, tmp_path, 90.0, "up")
     found = sp.propose_setup(path, "biorob2012-wide", spacing="2 mm", fps=6.0)

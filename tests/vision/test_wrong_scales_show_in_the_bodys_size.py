@@ -65,15 +65,20 @@ def test_a_scale_off_by_a_twentieth_widens_the_interval_beyond_its_error(film, c
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
-@pytest.mark.parametrize("factor", [0.8, pytest.param(1.25, marks=pytest.mark.slow)])
+def named_spacing(flag, spacing):
+    """The one that would fit, mm, in place of that of the setup."""
+    assert f"in place of {spacing:.3g} mm would fit" in flag.sentence
+    return float(flag.sentence.partition("markers.spacing = ")[2].split(" ")[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.8, 1.25])
 def test_a_wrong_spacing_of_the_ruler_is_named(film, factor):
     flat, tracked = film
     track = tracked(markers_spacing=f'"{2.0 * factor} mm"')
     flag = flags(track)["size-does-not-fit"]
     assert "forward_velocity" in flag.spoils
-    assert f"in place of {2.0 * factor:.3g} mm would fit" in flag.sentence
-    named = float(flag.sentence.partition("markers.spacing = ")[2].split(" ")[0])
-    assert named == pytest.approx(2.0, rel=0.04)  # a pixel or so of a body of 70
+    assert named_spacing(flag, 2.0 * factor) == pytest.approx(2.0, rel=0.04)  # a pixel or so of a body of 70
     assert slope(track.time, track.tail_phase) == pytest.approx(flat.tail_rate, rel=2e-3)
     withheld = any("body_rotation_rate" in flag.spoils for flag in track.flags)  # stripes may seem uneven by the scale
     assert withheld or slope(track.time, track.body_angle) == pytest.approx(flat.body_rate, rel=0.02)
@@ -86,13 +91,14 @@ def test_a_stated_uncertainty_of_depth_explains_it(film):
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 
 
-@pytest.mark.parametrize(("spacing", "size"), [pytest.param("4 mm", 2.0, marks=pytest.mark.slow), ("1 mm", 0.5)])
+@pytest.mark.parametrize(("spacing", "size"), [pytest.param(4, 2.0, marks=pytest.mark.slow), (1, 0.5)])
 def test_a_scale_off_by_two_gives_rates_and_no_speed(film, spacing, size):
     flat, tracked = film
-    found = tracked(markers_spacing=f'"{spacing}"')
+    found = tracked(markers_spacing=f'"{spacing} mm"')
     assert found.scale.apparent_size == pytest.approx(size, rel=0.02)
     assert "forward_velocity" in flags(found)["size-does-not-fit"].spoils
     assert "lateral_position" in flags(found)["size-does-not-fit"].spoils
+    assert named_spacing(flags(found)["size-does-not-fit"], spacing) == pytest.approx(2.0, rel=0.04)
     assert slope(found.time, found.body_angle) == pytest.approx(flat.body_rate, rel=5e-3)
     assert slope(found.time, found.tail_phase) == pytest.approx(flat.tail_rate, rel=5e-3)
 

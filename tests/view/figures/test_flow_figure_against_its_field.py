@@ -133,7 +133,7 @@ def test_words_name_plane_frame_phase_and_motion(around: Flow) -> None:
 
 
 @pytest.mark.usefixtures("unplaced")
-@pytest.mark.parametrize(("plane", "resolution"), [("xz", 2), ("yz", 2), ("yz", 3), ("xz", 5)])
+@pytest.mark.parametrize(("plane", "resolution"), [("xz", 2), ("yz", 3)])
 def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str, tmp_path: Path) -> None:
     save_as(flow_figure(around, around.plane(plane, resolution=resolution)), tmp_path / "flow.png")
 
@@ -155,7 +155,7 @@ def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...
 
 def test_a_very_long_name_finds_room(sphere: Any, tmp_path: Path) -> None:
     fields = {"name": "$x_{1}$ of a very long name " * 6, "channel": "none"}
-    _drawn(fields, ("png", "pdf", "svg"), sphere, tmp_path)
+    _drawn(fields, ("svg",), sphere, tmp_path)
 
 
 def _drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
@@ -174,7 +174,7 @@ def test_a_plane_inside_a_solid_is_drawn(around: Flow, sphere: Any, tmp_path: Pa
 
 
 @pytest.mark.parametrize(("plane", "offset"), [("xz", 0.0), ("xz", 0.012), ("xy", 0.004), ("yz", -0.05)])
-@pytest.mark.parametrize("pitch", ["0 deg", "3 deg"])
+@pytest.mark.parametrize("pitch", [pytest.param("0 deg", marks=pytest.mark.slow), "3 deg"])
 @pytest.mark.usefixtures("without_lines", "unplaced")
 def test_the_glass_covers_all_beyond_the_wall(
     in_tube: Callable[..., Flow], plane: str, offset: float, pitch: str

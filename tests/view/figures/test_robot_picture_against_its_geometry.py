@@ -13,7 +13,7 @@ from spirillum.view.annotate import Annotator
 from spirillum.view.figures.robot import robot_figure, robot_words
 from spirillum.view.figures.scene import PHASE
 from spirillum.view.figures.solids import crests
-from spirillum.view.figures.style import save
+from spirillum.view.figures.style import save_as
 
 
 def test_body_outline_encloses_the_bodys_volume() -> None:
@@ -101,7 +101,8 @@ def test_any_robot_can_be_drawn(fields: dict[str, str], tmp_path: Path) -> None:
     robot = sp.load("biorob2012-wide", **fields)
     figure = robot_figure(robot)
     assert figure.get_size_inches()[1] < 20
-    png, _ = save(figure, tmp_path / "robot")
+    png = tmp_path / "robot.png"
+    save_as(figure, png)
     assert png.stat().st_size > 10_000
     assert "not a photograph" in robot_words(robot)
 
