@@ -94,9 +94,13 @@ def observed_figure(found: Calibrated, channel: int) -> Figure:
         label = "synthetic" if experiment.synthetic else "observed"
         handles = [
             Line2D([], [], color=look.colour, linestyle=look.line, marker=look.marker, label=label_of_model(model)),
-            Line2D([], [], color=_OBSERVED, **HOLLOW, label=f"{label}, 95 % interval of the mean"),
+            Line2D([], [], color=_OBSERVED, **HOLLOW, label=f"{label}, 95 % interval at the mean rate"),
         ]
-        notes = [_fit_words(found, channel)]
+        notes = [
+            _fit_words(found, channel),
+            "Bars are those of the observed ratios to the rate, at its mean: how the rate varies between trials is not "
+            "in them.",
+        ]
         if any(np.any(np.isfinite(row["low"])) for row in rows):
             notes.append("Shades: 95 % of a tail's own mean as the fit expects it, the model's discrepancy included.")
         if found.friction:

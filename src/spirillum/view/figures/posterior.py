@@ -145,6 +145,9 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     """Least misfit against each number, all others fitted anew; the dotted line cuts out the 95 % interval."""
     columns = min(len(profiles), 4)
     rows = -(-len(profiles) // columns)
+    assert found.least_squares is not None  # noqa: S101 - profiles are those of a fit by least squares
+    shares = found.least_squares.discrepancy.items()
+    held = " and ".join(f"{100.0 * share:.2g} % of the {name.replace('_', ' ')}" for name, share in shares)
     synthetic = " (synthetic)" if found.experiment.synthetic else ""
     with styled():
         sheet = Sheet(
@@ -156,8 +159,8 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             columns=columns,
             notes=[
                 "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
-                "no limit there. The model's discrepancy is held at its fitted value here; in the table's intervals it "
-                "varies.",
+                f"no limit there. The model's discrepancy is held at {held}, which the moments of the residuals give; "
+                "the table's intervals let it vary, and are wider where it may be larger.",
             ],
         )
         every = list(sheet.panels.flat)
