@@ -152,8 +152,9 @@ def rank_models(
     from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
+    fields = set_fields(overrides_from(settings))
     for name, fitted in free_by_model(model, free).items():
-        check_not_set(set_fields(overrides_from(settings)), fitted, name)
+        check_not_set(fields, fitted, name)
     names = robot or PAPER_ROBOTS
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(

@@ -95,20 +95,17 @@ class Fitted:
         replaced = self.file is not None and self.file.calibration
         instead = "it is answered without factors" if replaced else "the robot's own numbers are used"
         idle = [model for model in models if not any(self.serves(robot, model, friction=friction) for robot in robots)]
-        elsewhere = "" if replaced or self.in_channel_of(robots) else self._fitted_elsewhere(robots)
-        found = []
-        for model in idle:
-            whom = elsewhere if elsewhere and model.name == self.model else f"model '{model.name}'"
-            found.append(f"nothing in {self.name or 'the calibration'} is for {whom}: {instead}")
-        return found
+        return [
+            f"nothing in {self.name or 'the calibration'} is for {self._not_for(robots, model)}: {instead}"
+            for model in idle
+        ]
 
-    def in_channel_of(self, robots: Sequence[Robot]) -> bool:
-        """Whether one of some robots is in a channel in which it was fitted, or that is not known."""
+    def _not_for(self, robots: Sequence[Robot], model: SwimmerModel) -> str:
+        """Whom nothing of it is for: robots in another channel than the fitted ones, or the model."""
         own = [robot.channel.diameter for robot in robots if robot.channel is not None]
-        return not self.channels or any(np.isclose(one, self.channels, rtol=1e-6, atol=0.0).any() for one in own)
-
-    def _fitted_elsewhere(self, robots: Sequence[Robot]) -> str:
-        """The robots, and in which channels it was fitted instead."""
+        inside = any(np.isclose(diameter, self.channels, rtol=1e-6, atol=0.0).any() for diameter in own)
+        if model.name != self.model or not self.channels or inside or (self.file is not None and self.file.calibration):
+            return f"model '{model.name}'"
         fitted = " and ".join(show(diameter, "mm") for diameter in self.channels)
         which = "this robot" if len(robots) == 1 else "these robots"
         return f"the channel of {which} (it was fitted in {fitted})"
@@ -126,8 +123,8 @@ class Fitted:
         """
         if posterior.acts_on(robot, walls=model.placed, friction=friction):
             return []
-        what = self._fitted_elsewhere([robot]) if self.channels else "this robot"
-        return [f"nothing in {self.name} is for {what}: the robot's own numbers and the band over places are used"]
+        whom = self._not_for([robot], model)
+        return [f"nothing in {self.name} is for {whom}: the robot's own numbers and the band over places are used"]
 
     def origin_warnings(
         self, robots: Sequence[Robot], models: Sequence[SwimmerModel], *, friction: bool = True

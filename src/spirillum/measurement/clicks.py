@@ -12,6 +12,7 @@ from spirillum.errors import InputError, clipped
 from spirillum.measurement.depth import apparent_distance
 from spirillum.robot.parts import StripeColour
 from spirillum.vision.camera.ruler import Lines
+from spirillum.vision.setup import INDICES
 from spirillum.vision.track.colours import colours_named
 
 __all__ = ["across", "length_per_pixel_between", "nose_side", "spacing_between", "stripe_names", "stripes_in_order"]
@@ -87,7 +88,7 @@ def length_per_pixel_between(
         heights: of the marks and of the robot's axis, m.
         camera: height of the lens, m.
         surface: height of the oil's surface, m; None: nothing refracts.
-        index: refractive index below it, from 1 to 3.
+        index: refractive index below it, within `INDICES`.
 
     Raises:
         InputError: if the clicks are too close to each other, for another index, or what lies above the lens.
@@ -95,8 +96,9 @@ def length_per_pixel_between(
     pixels = float(np.hypot(other[0] - one[0], other[1] - one[1]))
     if pixels < _SHORTEST:
         raise InputError(f"the clicks are {pixels:.0f} pixels apart; allowed: at least {_SHORTEST:.0f}")
-    if not 1.0 <= index <= 3.0:
-        raise InputError(f"tank.index = {index:g}; allowed: from 1 to 3")
+    least, largest = INDICES
+    if not least <= index <= largest:
+        raise InputError(f"tank.index = {index:g}; allowed: from {least:g} to {largest:g}")
     above = max(*heights, 0.0 if surface is None else surface)
     if not above < camera:
         raise InputError(

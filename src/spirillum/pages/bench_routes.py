@@ -63,11 +63,10 @@ class _Doors:
         return JSONResponse({"said": said, **await asyncio.to_thread(self._bench.state)})
 
     def _robot_of_swim(self, message: Mapping[str, Any]) -> None:
-        lane: Any = message.get("lane")
-        numbered = isinstance(lane, int) and not isinstance(lane, bool)
-        found = self._theatre.recording(lane) if numbered and lane in (0, 1) else None
+        lane = self._theatre.lane_number(message.get("lane"))
+        found = self._theatre.recording(lane)
         if found is None:
-            raise InputError(f"lane = {str(lane)[:20]}; allowed: a robot that is there")
+            raise InputError(f"lane = {lane}; allowed: a robot that is there")
         self._bench.desk.take_robot(found[0].predicted())
 
     def _fields(self, message: Mapping[str, Any]) -> None:

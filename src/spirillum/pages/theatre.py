@@ -108,6 +108,16 @@ class Theatre:
             lanes = [{"generation": lane.generation, **lane.recording.past()} for lane in self._lanes]
         return json.dumps({"t": "past", "lanes": lanes})
 
+    def lane_number(self, asked: Any) -> int:
+        """The number of a robot that is there.
+
+        Raises:
+            InputError: if it is none.
+        """
+        if isinstance(asked, bool) or not isinstance(asked, int) or not 0 <= asked < len(self._lanes):
+            raise InputError(f"lane = {str(asked)[:20]}; allowed: 0 to {len(self._lanes) - 1}")
+        return asked
+
     def recording(self, index: int) -> tuple[Lane, dict[str, Any]] | None:
         """A robot and its run so far; None if there is no such robot or no run."""
         with self._lock:
@@ -190,10 +200,7 @@ class Theatre:
 
     def _do(self, command: Mapping[str, Any]) -> None:
         what = command.get("do")
-        index = command.get("lane", 0)
-        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(self._lanes):
-            raise InputError(f"lane = {str(index)[:20]}; allowed: 0 to {len(self._lanes) - 1}")
-        lane = self._lanes[index]
+        lane = self._lanes[self.lane_number(command.get("lane", 0))]
         action = _ACTIONS.get(str(what))
         if action is None:
             raise InputError(f"do = {str(what)[:40]!r}; allowed: {', '.join(_ACTIONS)}")

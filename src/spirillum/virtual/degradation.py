@@ -60,16 +60,6 @@ class Degradation(Options):
             given = _PRESETS[name] | instead
         return super().of(given)
 
-    def with_glare_to_fix(self) -> Self:
-        """The degradation itself.
-
-        Raises:
-            InputError: for a glare that stands still where there is none.
-        """
-        if not (self.glare_moves or self.glare):
-            raise InputError("glare_moves = False (--glare-fixed) without glare; allowed: with a glare above 0")
-        return self
-
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "clean": {},

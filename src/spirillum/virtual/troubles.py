@@ -85,19 +85,19 @@ def with_troubles(
         InputError: for an unknown name, a value out of range, or a glare that stands still where there is none.
     """
     stated = Degradation.of(degradation)
-    if not isinstance(value, str):
-        return Troubles.of(value), stated.with_glare_to_fix()
     chosen: dict[str, Any] = {}
     disturbed: dict[str, Any] = {}
-    for word in (part.strip() for part in value.split(",")):
+    for word in (part.strip() for part in value.split(",")) if isinstance(value, str) else ():
         if word not in NAMES:
             raise InputError(f"trouble {word[:40]!r}{did_you_mean(word[:40], NAMES)}; allowed: {', '.join(NAMES)}")
         chosen |= _USUAL.get(word, {})
         disturbed |= _DISTURBANCES.get(word, {})
     given = degradation.model_dump(exclude_unset=True) if isinstance(degradation, Degradation) else degradation
     fields = given if isinstance(given, Mapping) else {}
-    disturbed = {name: size for name, size in disturbed.items() if fields.get(name) is None}
-    return Troubles.of(chosen), stated.model_copy(update=disturbed).with_glare_to_fix()
+    found = stated.model_copy(update={name: size for name, size in disturbed.items() if fields.get(name) is None})
+    if not (found.glare_moves or found.glare):
+        raise InputError("glare_moves = False (--glare-fixed) without glare; allowed: with a glare above 0")
+    return Troubles.of(chosen if isinstance(value, str) else value), found
 
 
 def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -16,6 +16,7 @@ from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
 
 __all__ = [
+    "INDICES",
     "CameraSetup",
     "Checkerboard",
     "Markers",
@@ -60,6 +61,10 @@ class CameraSetup(Section):
     """Calibration of the lens; without it the lens is taken as free of distortion, beyond what the markers show."""
 
 
+INDICES = (1.0, 3.0)
+"""Least and largest refractive index."""
+
+
 class TankSetup(Section):
     """What the camera looks through."""
 
@@ -67,7 +72,7 @@ class TankSetup(Section):
     """Height of the flat surface between air and oil (`side`: of the tank's near wall); unset: nothing refracts."""
     surface_uncertainty: LengthOrZero = 0.0
     """Standard uncertainty of that height."""
-    index: Annotated[float, Field(strict=True, ge=1.0, le=3.0, allow_inf_nan=False)] = 1.4
+    index: Annotated[float, Field(strict=True, ge=INDICES[0], le=INDICES[1], allow_inf_nan=False)] = 1.4
     """Refractive index of the oil."""
     index_uncertainty: Annotated[float, Field(strict=True, ge=0.0, le=0.5, allow_inf_nan=False)] = 0.0
     """Standard uncertainty of that index."""
