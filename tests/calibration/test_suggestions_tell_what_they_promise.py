@@ -193,7 +193,9 @@ def test_a_robot_without_channel_is_refused(fitted: Path, robot: str) -> None:
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from spirillum.fitted import posterior_file
 
-    assert len(sp.suggest(fitted / "posterior.nc").candidates) == 50
+    found = sp.suggest(fitted / "posterior.nc")
+    assert len(found.candidates) == 50
+    assert "biorob2012-wide and biorob2012-narrow, are taken" in found.warnings[0]
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):
         monkeypatch.setattr("spirillum.calibration.suggest.read_posterior", lambda path, one=changed: one)

@@ -67,6 +67,8 @@ def test_a_film_is_of_a_robot_that_is_named_or_of_a_run(run: Run, tmp_path: Path
         (("-o", "a.mp4", "--preset", "awful"), "allowed: clean, degraded"),
         (("-o", "a.mp4", "--tilt", "2"), "has no unit"),
         (("-o", "a.mp4", "--crf", "99"), "crf = 99"),
+        (("-o", "frames", "--crf", "30"), "crf = 30 (of --crf or --trouble compression) for a folder of PNG files"),
+        (("-o", "frames", "--trouble", "compression"), "allowed: with a video (.mp4)"),
         (("-o", "a.mp4", "--distortion", "nan"), "distortion = nan; allowed: -0.5 to 0.5"),
         (("-o", "a.mp4", "--distortion", "inf"), "distortion = inf"),
         (("-o", "a.mp4", "--distortion=-100"), "distortion = -100"),

@@ -140,6 +140,7 @@ def test_pngs_hold_their_numbers_and_the_setup_their_pace(tmp_path: Path) -> Non
     with xr.open_dataset(tmp_path / "frames.truth.nc") as truth:
         assert names == [f"{number:05d}.png" for number in truth["frame"].values]
     assert load_setup(found.setup)[0].camera.frames_per_second == 30.0
+    assert json.loads(found.truth.read_text())["degradation"]["crf"] == 0
 
 
 def test_a_run_is_filmed_where_it_says(tmp_path: Path) -> None:

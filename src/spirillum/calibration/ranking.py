@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from spirillum.calibration.posterior_tree import posterior_tree
 from spirillum.calibration.problem import Progress
 from spirillum.errors import InputError
 from spirillum.fluid.registry import find_swimmer_model
-from spirillum.robot.load import PAPER_ROBOTS
+from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.shown import Shown, counted
 
 __all__ = ["Ranked", "Ranking", "free_by_model", "rank_models", "ranked_fits"]
@@ -168,7 +168,7 @@ class Ranking(Shown):
 
 def rank_models(
     observations: str | Path,
-    robots: RobotSource | Sequence[RobotSource] = PAPER_ROBOTS,
+    robots: RobotSource | Sequence[RobotSource] | None = None,
     *,
     models: Sequence[str] | None = None,
     free: str | Sequence[str] | None = None,
@@ -180,7 +180,7 @@ def rank_models(
 
     Args:
         observations: observations file.
-        robots: a robot for each channel; without them the paper's.
+        robots: a robot for each channel; None: the paper's two.
         models: hydrodynamic models; None: `sbt` and `rft`, the paper's own question.
         free: free parameters of every model; None: two for each channel, body drag and rotation, or gap and pitch for
             `tube`.
@@ -200,7 +200,7 @@ def rank_models(
     for name, names in wanted.items():
         fits[name] = fit_model(
             observations,
-            robots,
+            PAPER_ROBOTS if robots is None else robots,
             model=name,
             free=names,
             method="posterior",
@@ -208,7 +208,8 @@ def rank_models(
             prepare=prepare and name == "tube",
             progress=progress,
         )
-    return ranked_fits(fits)
+    found = ranked_fits(fits)
+    return found if robots is not None else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
 
 
 def free_by_model(models: Sequence[str] | None, free: str | Sequence[str] | None) -> dict[str, tuple[str, ...]]:

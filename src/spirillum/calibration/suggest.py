@@ -37,7 +37,7 @@ from spirillum.fluid.tube.tabled import TabledTube, tabled
 from spirillum.formats.tables import check_present, read_table
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import broken
-from spirillum.robot.load import PAPER_ROBOTS
+from spirillum.robot.load import PAPER_ROBOTS, PAPER_ROBOTS_TAKEN
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.shown import Shown
@@ -160,7 +160,7 @@ def suggest(
         known,
         trials,
         _ranked(found),
-        (*_cautions(known, loaded), *left_out),
+        (*((PAPER_ROBOTS_TAKEN,) if robots is None else ()), *_cautions(known, loaded), *left_out),
     )
 
 

@@ -155,11 +155,11 @@ def rank_models(
     fields = set_fields(overrides_from(settings))
     for name, fitted in free_by_model(model, free).items():
         check_not_set(fields, fitted, name)
-    names = robot or PAPER_ROBOTS
+    names = robot or (PAPER_ROBOTS if settings else ())
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
-            [loaded_robot(name, settings) for name in names],
+            [loaded_robot(name, settings) for name in names] or None,
             models=model,
             free=free,
             sampling=Sampling(seed=seed),

@@ -141,7 +141,9 @@ def export(
         held = held_model(robot, model=model or AUTO, friction=friction, calibration=calibration, placement=placement)
         return _unit_of(held, target)
     if any(given is not None for given in of_held):
-        raise InputError(f"friction, calibration or placement with {target.suffix}; allowed: only with .fmu")
+        raise InputError(
+            f"friction, calibration or a placement (gap, pitch, flow) with {target.suffix}; allowed: only with .fmu"
+        )
     wanted = target.suffix in _DESCRIPTIONS if sidecar is None else sidecar
     if unit is not None and (unit not in STL_UNITS or target.suffix != ".stl"):
         raise InputError(f"unit = {unit!r} for {target.suffix}; allowed: mm or m, only for .stl (the others are in m)")

@@ -19,6 +19,7 @@ from spirillum.robot.robot import Robot
 
 __all__ = [
     "PAPER_ROBOTS",
+    "PAPER_ROBOTS_TAKEN",
     "load",
     "new_robot_file",
     "parse_setting",
@@ -43,6 +44,7 @@ _MOST_LAYERS = 8
 """Robot files that lie over each other."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
+PAPER_ROBOTS_TAKEN = f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are taken"
 """Presets of the paper's robot, one for each of its channels."""
 
 

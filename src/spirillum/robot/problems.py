@@ -20,6 +20,8 @@ _OTHERWISE = {
     "tail.pitch_angle": "tail.wavelength and tail.amplitude give the pitch angle",
 }
 """What gives a field that a robot file has not, though the field's words know it."""
+_IN_ITS_RANGE = {"drive.duty": "0 to 1; motor.polarity = 'reverse' turns the tail the other way"}
+"""What is allowed where a number out of its range means something that another field says."""
 _LONGEST_FIELD = 200
 """Characters of a field's name in a sentence, so that what is allowed has room."""
 _MOST_NAMED = 6
@@ -128,6 +130,8 @@ def _allowed(problem: Mapping[str, Any], field: str) -> str:
     }
     if kind in words:
         return words[kind]
+    if kind in ("greater_than_equal", "less_than_equal") and field in _IN_ITS_RANGE:
+        return _IN_ITS_RANGE[field]
     own = {"literal_error": "expected", "value_error": "error"}
     return str(context[own[kind]]) if kind in own else str(problem["msg"]).removeprefix("Input should be ")
 

@@ -60,6 +60,19 @@ class Degradation(Options):
             given = _PRESETS[name] | instead
         return super().of(given)
 
+    def uncompressed(self) -> Self:
+        """The degradation of frames that are written as PNG files, which lose nothing.
+
+        Raises:
+            InputError: if it has a compression of its own, which no preset has.
+        """
+        if self.crf not in {self.of(name).crf for name in _PRESETS}:
+            raise InputError(
+                f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which lose nothing; "
+                "allowed: with a video (.mp4)"
+            )
+        return self.model_copy(update={"crf": 0})
+
 
 _PRESETS: dict[str, dict[str, Any]] = {
     "clean": {},

@@ -150,6 +150,7 @@ def render(
         target = video_target(path)
     motion, trial, camera = MotionOptions.of(motion), TrialOptions.of(trial), CameraOptions.of(camera)
     troubles, degradation = with_troubles(troubles, degradation)
+    degradation = degradation if target.suffix == ".mp4" else degradation.uncompressed()
     seed, setup_errors = Seeded.of({"seed": seed}).seed, SetupErrors.of(setup_errors)
     from spirillum.dynamics.run_file import open_run, robot_of
 

@@ -27,7 +27,7 @@ __all__ = [
 
 
 Answer = Mapping[str, Any]
-_NUMBERS = ("value", "low", "high", "SI", "while on", "while steady")
+_NUMBERS = ("value", "low", "high", "SI", "last 2/3", "while on", "while steady")
 """Columns of numbers."""
 
 
@@ -35,7 +35,7 @@ def grid(title: str, *columns: str) -> Table:
     """An empty table in the look of all answers."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", header_style="bold", show_edge=False)
     for column in columns:
-        table.add_column(column, justify="right" if column in _NUMBERS else "left")
+        table.add_column(column, justify="right" if column in _NUMBERS else "left", overflow="fold")
     return table
 
 
@@ -79,23 +79,25 @@ def show_unsteady(answer: Answer, console: Console) -> None:
 
 def show_lying(lying: Answer, console: Console) -> None:
     """Where a free robot comes to lie."""
-    said = [_STATES[lying["state"]]]
+    said = []
     for name, item in lying.items():
-        if isinstance(item, Mapping) and item["value"] not in (None, 0.0):
-            words = _TIMES.get(name, name.replace("_", " "))
-            said.append(f"{words} {' '.join(friendly(item['value'], item['unit']))}{_range_words(item)}".rstrip())
-    console.print(f"laid down there and followed: {', '.join(said)}", highlight=False, soft_wrap=True)
+        if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
+            value = " ".join(friendly(item["value"], item["unit"]))
+            said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {value}{_range_words(item)}".rstrip())
+    time = " ".join(friendly(lying["followed_time"]["value"], lying["followed_time"]["unit"]))
+    words = f"laid down there and followed for {time}, {_STATES[lying['state']]}: {', '.join(said)}"
+    console.print(words, highlight=False, soft_wrap=True)
 
 
-_TIMES = {
-    "followed_time": "simulated for",
+_WORDS = {
     "approach_time": "approached with a time constant of",
+    "contact_force": "borne by asperities with a contact force of",
 }
 _STATES = {
-    "steady": "steady",
-    "orbits": "orbits the tube's axis",
-    "goes around": "goes around the tube",
-    "changing": "still changing",
+    "steady": "from where its steady motion was solved for",
+    "orbits": "from where its orbit around the tube's axis was solved for",
+    "goes around": "until it had gone around the tube",
+    "changing": "and still changing",
 }
 
 

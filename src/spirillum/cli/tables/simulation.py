@@ -29,10 +29,10 @@ __all__ = ["table"]
 def table(answer: Answer, console: Console) -> None:
     """Table of `simulate`."""
     title = f"{answer['robot']}: model {answer['model']}, friction {answer['friction']}, {answer['motion']} motion"
-    rows = grid(title, "quantity", "value", "unit", "SI")
+    console.print(_averages(title, answer))
+    rows = grid("", "quantity", "value", "unit", "SI")
     add_quantities(rows, dict(_rows(answer)))
     console.print(rows)
-    console.print(_averages(answer))
     if "draws" in answer:
         bands = grid("", "mean", "value", "low", "high", "unit")
         add_bands(bands, {name: item for name, item in answer.items() if isinstance(item, Mapping) and "low" in item})
@@ -58,7 +58,7 @@ def table(answer: Answer, console: Console) -> None:
     for words in _events(answer["events"]):
         console.print(escape(words), highlight=False)
     show_error(answer["error_estimate"], console)
-    console.print("means are over the last two thirds of the run", highlight=False)
+    console.print("last 2/3: over the last two thirds of the run, on or off", highlight=False)
     console.print(f"steady: {answer['steady']}", highlight=False, soft_wrap=True)
     for name in ("plot", "movie"):
         if name in answer:
@@ -66,19 +66,20 @@ def table(answer: Answer, console: Console) -> None:
     console.print(f"trajectory in {escape(answer['file'])}", highlight=False, soft_wrap=True)
 
 
-def _averages(answer: Answer) -> Table:
-    """Means while the drive is on, and while the motion is steady."""
-    table = grid("", "mean", "while on", "while steady", "unit")
-    for name, item in answer.items():
-        if not name.endswith("_on"):
-            continue
-        steady = answer[name.removesuffix("_on") + "_steady"]
-        sized = steady["value"] if item["value"] is None else item["value"]
-        unit = display_unit(sized, item["unit"])
-        values = [in_unit(one["value"], one["unit"], unit) for one in (item, steady)]
-        words = name.removesuffix("_on").removeprefix("mean_").replace("_", " ")
-        table.add_row(words, *values, unit)
+def _averages(title: str, answer: Answer) -> Table:
+    """Means over the last two thirds, while the drive is on, and while the motion is steady."""
+    table = grid(title, "mean", "last 2/3", "while on", "while steady", "unit")
+    for name in (name.removesuffix("_on") for name in answer if name.endswith("_on")):
+        items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
+        sized = next((item for item in items if item["value"] is not None), items[1])
+        unit = display_unit(sized["value"], sized["unit"])
+        values = [in_unit(item["value"], sized["unit"], unit) for item in items]
+        table.add_row(name.removeprefix("mean_").replace("_", " "), *values, unit)
     return table
+
+
+_NONE: Answer = {"value": None}
+"""Of the time, which has no mean."""
 
 
 def _events(events: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -94,12 +95,8 @@ def _rows(answer: Answer) -> list[tuple[str, Any]]:
     """Quantities of the answer, vectors by their parts."""
     found: list[tuple[str, Any]] = []
     for name, item in answer.items():
-        if (
-            name == "error_estimate"
-            or name.endswith(("_on", "_steady"))
-            or not isinstance(item, Mapping)
-            or "unit" not in item
-        ):
+        averaged = name.endswith(("_on", "_steady")) or f"{name}_on" in answer
+        if name == "error_estimate" or averaged or not isinstance(item, Mapping) or "unit" not in item:
             continue
         if isinstance(item["value"], list):
             parts = zip("xyz", item["value"], strict=True)
