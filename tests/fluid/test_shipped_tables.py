@@ -26,14 +26,14 @@ from spirillum.robot.seat import Seat
 from spirillum.studies.loading import load_study
 
 LARGEST = {
-    "forward_velocity": 0.015,
-    "body_rotation_rate": 0.006,
-    "sideways_force": 0.025,
-    "pitching_torque": 0.06,
-    "yawing_torque": 0.041,
-    "normal_resistance": 0.027,
+    "forward_velocity": 0.011,
+    "body_rotation_rate": 0.007,
+    "sideways_force": 0.023,
+    "pitching_torque": 0.033,
+    "yawing_torque": 0.031,
+    "normal_resistance": 0.026,
 }
-"""Above the largest stated errors: of speeds those of an amplitude of 1.5 mm, of torques those of 10 and 15 mm."""
+"""Above the largest stated errors, which are those of different tails."""
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 

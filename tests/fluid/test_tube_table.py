@@ -18,7 +18,7 @@ from spirillum.fluid.tube import library, tube
 from spirillum.fluid.tube.building import _powers
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import YAW_SHARES, Places, rings_of
+from spirillum.fluid.tube.places import Places, rings_of
 from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
 from spirillum.fluid.tube.rest import (
     HARMONICS,
@@ -130,7 +130,9 @@ def test_polynomials_are_reproduced_between_the_nodes(places: Places, film: np.n
 
 def test_positive_definite_and_symmetric_everywhere(places: Places, film: np.ndarray) -> None:
     """Also where the interpolated factor is wild, below the first node, and outside the range."""
-    table = packed(places, film, lambda t, f: 3.0 * np.sin(9.0 * smooth(t, f)), lambda t, f: np.ones((4, 5, 36)))
+    table = packed(
+        places, film, lambda t, f: 3.0 * np.sin(9.0 * smooth(t, f)), lambda t, f: np.ones((kernel.YAW_ORDERS, 5, 36))
+    )
     draw = np.random.default_rng(1)
     for _ in range(300):
         matrix, _ = at(table, draw.uniform(0, 0.01099), draw.uniform(-0.02, 0.02), draw.uniform(-0.1, 0.1), 1.0)
@@ -155,7 +157,7 @@ def test_the_rest_goes_on_linearly_below_the_first_node(places: Places, film: np
 def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
     table = packed(places, film, smooth)
     assert at(table, 0.0, 0.5)[1] == kernel.TOO_FAR_PITCHED
-    turned = packed(places, film, smooth, lambda t, f: np.zeros((4, 5, 36)))
+    turned = packed(places, film, smooth, lambda t, f: np.zeros((kernel.YAW_ORDERS, 5, 36)))
     most = kernel.largest_yaw(turned, 0.0, 0.0)
     assert most == pytest.approx(places.largest_yaw(1.0, 0.0))
     assert at(turned, 0.0, 0.0, 1.02 * kernel.YAW_SLACK * most)[1] == kernel.TOO_FAR_YAWED
@@ -163,8 +165,8 @@ def test_leaving_the_range_is_told(places: Places, film: np.ndarray) -> None:
 
 
 def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndarray) -> None:
-    powers = np.array([0.5, -2.0, 0.3, 0.7])
-    slope = np.broadcast_to(powers[:, None, None], (4, 5, 36))
+    powers = np.array([0.5, -2.0, 0.3, 0.7, -0.4, 0.2])
+    slope = np.broadcast_to(powers[:, None, None], (kernel.YAW_ORDERS, 5, 36))
     table, straight = packed(places, film, smooth, lambda t, f: slope), packed(places, film, smooth)
     yaw, e = 0.03, 0.006
     turned, level = at(table, e, 0.0, yaw)[0], at(straight, e, 0.0)[0]
@@ -175,8 +177,28 @@ def test_yaw_enters_as_powers_of_the_stretched_one(places: Places, film: np.ndar
     turned[:6, :6] -= w * thin[0]
     level[:6, :6] -= w * thin[1]
     s = kernel.stretched_yaw(yaw / kernel.largest_yaw(table, e, 0.0))
-    more = 3.0 * float(powers @ s ** np.arange(1, 5))  # coefficients 1, cos and cos 2 at phase 0
+    more = 3.0 * float(powers @ s ** np.arange(1, 7))  # coefficients 1, cos and cos 2 at phase 0
     assert np.log(turned[0, 0] / level[0, 0]) == pytest.approx(2.0 * more, rel=1e-9)
+
+
+def test_beyond_the_last_node_the_yaw_goes_on_by_its_tangent(places: Places, film: np.ndarray) -> None:
+    """To either side, without a kink: the logarithm of the first entry of the rest is linear in the stretched yaw."""
+    draw = np.random.default_rng(3).normal(size=(kernel.YAW_ORDERS, 5, 36))
+    table = packed(places, film, smooth, lambda t, f: draw)
+    most = kernel.largest_yaw(table, 0.0, 0.0)  # on the axis, where no film is added
+    last = kernel.YAW_SHARES[-1]
+
+    def logarithm(share: float) -> float:
+        return float(np.log(at(table, 0.0, 0.0, share * most)[0][0, 0]))
+
+    for side in (-1.0, 1.0):
+        inside, node, beyond, far = (side * share for share in (last - 1e-4, last, 1.03, 1.09))
+        slopes = [
+            (logarithm(b) - logarithm(a)) / (kernel.stretched_yaw(b) - kernel.stretched_yaw(a))
+            for a, b in ((inside, node), (node, beyond), (beyond, far))
+        ]
+        assert slopes[1] == pytest.approx(slopes[2], rel=1e-9)
+        assert slopes[0] == pytest.approx(slopes[1], rel=2e-2)
 
 
 @pytest.mark.parametrize("pitch", [-0.1, 0.0, 0.05])
@@ -262,12 +284,12 @@ def test_a_node_gives_its_matrix_back_at_every_phase() -> None:
 def test_yawed_nodes_are_met() -> None:
     """What is solved for at a node with yaw comes back to either side."""
     draw = np.random.default_rng(9)
-    middle, sides = draw.normal(size=(5, 36)), draw.normal(size=(2, 2, 5, 36))
+    middle, sides = draw.normal(size=(5, 36)), draw.normal(size=(len(kernel.YAW_SHARES), 2, 5, 36))
     powers = _powers(middle, sides)
-    for share, (left, right) in zip(YAW_SHARES, sides, strict=True):
+    for share, (left, right) in zip(kernel.YAW_SHARES, sides, strict=True):
         for sign, expected in ((1.0, left), (-1.0, right)):
             s = kernel.stretched_yaw(sign * share)
-            found = middle + np.tensordot(s ** np.arange(1, 5), powers, axes=1)
+            found = middle + np.tensordot(s ** np.arange(1, 7), powers, axes=1)
             np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
@@ -370,7 +392,9 @@ def test_another_robot_or_tube_has_another_key(geometry: RobotGeometry) -> None:
 
 
 def test_the_mirror_image_of_a_table_is_the_mirror_image_of_its_answers(places: Places, film: np.ndarray) -> None:
-    table = packed(places, film, smooth, lambda t, f: np.stack([k * smooth(t, f) - k**2 for k in range(4)]))
+    table = packed(
+        places, film, smooth, lambda t, f: np.stack([k * smooth(t, f) - k**2 for k in range(kernel.YAW_ORDERS)])
+    )
     image = kernel.mirror_image(table)
     for e, pitch, yaw, phase in ((0.009, 0.02, 0.05, 0.3), (0.004, -0.04, -0.1, 2.0), (0.0, 0.01, 0.0, 5.0)):
         found = at(image, e, pitch, yaw, phase)[0]

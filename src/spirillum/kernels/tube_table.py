@@ -11,8 +11,8 @@ The end of a tail of length L is off the axis by L sin(psi) across the plane of 
 so that sin(psi_c)^2 is a quadratic polynomial of sin(p) and e.
 
 Its Cholesky factor, logarithms on the diagonal, is a polynomial in sqrt(t) and in log(1.3 - |f|) between the nodes, one
-nose up and one nose down, linear in t below the first, quartic in artanh(g/1.2), and a Fourier sum in the phase: the
-rest is positive definite everywhere.
+nose up and one nose down, linear in t below the first, a polynomial of degree six in artanh(g/1.2), linear beyond the
+last node, and a Fourier sum in the phase: the rest is positive definite everywhere.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ __all__ = [
     "TOO_FAR_PITCHED",
     "TOO_FAR_YAWED",
     "YAW_ORDERS",
+    "YAW_SHARES",
     "YAW_SLACK",
     "Parts",
     "Range",
@@ -68,9 +69,13 @@ STEEPEST = (math.radians(12.0), math.radians(8.0))
 _PITCH_SLACK = 1.1  # of the largest pitch: where the glass sets it, the tail's tip touches a little beyond it
 _ROUNDING = 1e-9  # of angles given in degrees
 _BEYOND = 1.3  # beyond the largest pitch, so that the logarithm stays finite at contact
+_BEYOND_YAWED = 2.5  # of what a yaw adds: its largest one is less at such pitches, so that the tail is no nearer there
 YAW_SLACK = 1.1  # of the largest yaw: the tail touches the glass a little beyond it
-YAW_ORDERS = 4
+YAW_SHARES = (0.6, 0.8, 0.95)
+"""Yaws of yawed nodes, to both sides, over the largest one at their place."""
+YAW_ORDERS = 2 * len(YAW_SHARES)
 """Powers of the stretched yaw, from the first."""
+_LAST_YAW = YAW_SHARES[-1]
 _BEYOND_YAW = 1.2  # beyond the largest yaw, so that the inverse tangent stays finite at contact
 
 # Header of a packed table: radius of the tube, rows, and the lengths of what follows.
@@ -226,15 +231,15 @@ def cut_of_film(t: float) -> float:
 
 
 @compiled
-def _steep(data: Samples, start: int, count: int, f: float, out: Samples) -> None:
-    """Lagrange weights in log(1.3 - f): what nears the glass varies as the logarithm of its clearance."""
-    at = math.log(_BEYOND - f)
+def _steep(data: Samples, start: int, count: int, f: float, beyond: float, out: Samples) -> None:
+    """Lagrange weights in log(beyond - f): what nears the glass varies as the logarithm of its clearance."""
+    at = math.log(beyond - f)
     for j in range(count):
         weight = 1.0
         for m in range(count):
             if m != j:
-                other = math.log(_BEYOND - data[start + m])
-                weight *= (at - other) / (math.log(_BEYOND - data[start + j]) - other)
+                other = math.log(beyond - data[start + m])
+                weight *= (at - other) / (math.log(beyond - data[start + j]) - other)
         out[j] = weight
 
 
@@ -303,7 +308,7 @@ def _coefficients(table: Samples, e: float, pitch: float, yaw: float, out: Sampl
     left = INSIDE if within else TOO_FAR_PITCHED
     lowered = pitch < 0.0
     pitches = down if lowered else up
-    _steep(table, at_up + up if lowered else at_up, pitches, abs(f), of_pitch)
+    _steep(table, at_up + up if lowered else at_up, pitches, abs(f), _BEYOND, of_pitch)
     flat = out.ravel()
     for n in range(block):
         flat[n] = 0.0
@@ -363,6 +368,18 @@ def stretched_yaw(share: float) -> float:
 
 
 @compiled
+def _stretched_powers(share: float, out: Samples) -> None:
+    """Fill the powers of the stretched yaw from the first; beyond the last node their tangents there."""
+    s, last = stretched_yaw(share), stretched_yaw(math.copysign(_LAST_YAW, share))
+    beyond = s - last if abs(share) > _LAST_YAW else 0.0
+    s -= beyond
+    power = 1.0
+    for n in range(out.size):
+        out[n] = power * (s + beyond * (n + 1))
+        power *= s
+
+
+@compiled
 def _add_yaw(table: Samples, t: float, f: float, share: float, out: Samples) -> bool:
     """Add what a share of the largest yaw makes of the coefficients; whether it is within the range."""
     gaps, pitches = int(table[_YAW_GAPS]), int(table[_YAW_PITCHES])
@@ -376,17 +393,17 @@ def _add_yaw(table: Samples, t: float, f: float, share: float, out: Samples) -> 
     count = level + 1 if f < 0.0 else pitches - level
     for j in range(count):
         nodes[j] = abs(table[start + gaps + level + step * j])
-    _steep(nodes, 0, count, abs(f), of_pitch)
+    _steep(nodes, 0, count, abs(f), _BEYOND_YAWED, of_pitch)
     within = abs(share) <= YAW_SLACK
-    s = stretched_yaw(share if within else math.copysign(YAW_SLACK, share))
+    powers = np.empty(YAW_ORDERS)
+    _stretched_powers(share if within else math.copysign(YAW_SLACK, share), powers)
     at_yawed = film_start(table) - gaps * pitches * YAW_ORDERS * out.size
     for i in range(gaps):
         for j in range(count):
             here = at_yawed + (i * pitches + level + step * j) * YAW_ORDERS * out.size
             weight = of_gap[i] * of_pitch[j]
-            for _ in range(YAW_ORDERS):
-                weight *= s
-                _add(weight, table[here : here + out.size], out)
+            for order in range(YAW_ORDERS):
+                _add(weight * powers[order], table[here : here + out.size], out)
                 here += out.size
     return within
 

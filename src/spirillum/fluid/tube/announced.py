@@ -6,7 +6,7 @@ __all__ = ["ANNOUNCED", "OF_A_RUN", "TABLE_TAKES", "TILTED", "announcement"]
 
 ANNOUNCED = "no table of this tube yet"
 """How a progress message begins that is to be read, not passed over: a command prints it as a line of its own."""
-TABLE_TAKES = "10 to 15 minutes of one core"
+TABLE_TAKES = "12 to 18 minutes of one core"
 """What it takes to make the table of one robot; estimated from what four tails at once took."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
 OF_A_RUN = "the flow at a moment of a run: solved for in about a minute of one core"

@@ -17,7 +17,7 @@ from spirillum.arrays import Samples
 from spirillum.fluid.tube.announced import announcement
 from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
-from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, YAW_SHARES, Places
+from spirillum.fluid.tube.places import CHECKED_FROM, LARGEST_YAW, Places
 from spirillum.fluid.tube.responses import RESPONSES, response_errors
 from spirillum.fluid.tube.rest import (
     PHASES,
@@ -44,9 +44,9 @@ __all__ = ["built_tables"]
 _TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
 """How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
 _NEAR_GLASS = 0.9
-"""Share of the largest pitch, or yaw, from which all harmonics of the tail's phase matter."""
-_FAR, _YAWED = 5, 7
-"""Phases at nodes further from the glass, without yaw and with it."""
+"""Share of the largest pitch from which all harmonics of the tail's phase matter."""
+_FAR, _LITTLE_YAWED = 5, 7
+"""Phases at nodes further from the glass: without yaw, and at the least yaw."""
 _HELD_OUT = 6
 _SEED = 20121
 
@@ -141,12 +141,12 @@ def _yawed(places: Places) -> list[_Place]:
             float(t),
             float(f),
             places.seat(float(t), float(f), share * float(most)),
-            PHASES if share > _NEAR_GLASS else _YAWED,
+            PHASES if share > kernel.YAW_SHARES[0] else _LITTLE_YAWED,
         )
         for t, row in zip(places.yaw_gaps, places.most_yaw, strict=True)
         if t < 1.0
         for f, most in zip(places.yaw_pitches, row, strict=True)
-        for share in YAW_SHARES
+        for share in kernel.YAW_SHARES
     ]
 
 
@@ -169,10 +169,10 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
     sides = [_both_sides(film, place, *answers) for place, answers in zip(_yawed(places), yawed, strict=True)]
     for f, yaw in zip(places.yaw_pitches, places.most_yaw[-1], strict=True):
         pitch = float(f * (most[0] if f >= 0 else most[1]))
-        for share in YAW_SHARES:
+        for share in kernel.YAW_SHARES:
             here = share * float(yaw)
             sides.append((on_axis.coefficients(pitch, here), on_axis.coefficients(pitch, -here)))
-    of_node = np.reshape(sides, (-1, len(YAW_SHARES), *np.shape(sides)[1:]))
+    of_node = np.reshape(sides, (-1, len(kernel.YAW_SHARES), *np.shape(sides)[1:]))
     seats = _yawed_seats(places)
     middles = [_interpolated(straight, seat, of_node.shape[-2]) for seat in seats]
     turned = np.stack([_powers(middle, node) for middle, node in zip(middles, of_node, strict=True)])
@@ -181,16 +181,17 @@ def _assembled(places: Places, film: Samples, level: Sequence[Samples], yawed: S
 
 
 def _powers(middle: Samples, sides: Samples) -> Samples:
-    """Coefficients of the powers of the stretched yaw from the values at `YAW_SHARES`, (4, phases, 36).
+    """Coefficients of the powers of the stretched yaw from the values at `YAW_SHARES`, (`YAW_ORDERS`, phases, 36).
 
     Args:
         middle: values without yaw, (phases, 36).
         sides: values to the left and to the right, (shares, 2, phases, 36).
     """
-    s = np.array([kernel.stretched_yaw(share) for share in YAW_SHARES])[:, None, None]
-    odd, even = 0.5 * (sides[:, 0] - sides[:, 1]) / s, (0.5 * (sides[:, 0] + sides[:, 1]) - middle) / s**2
-    high_odd, high_even = (np.diff(part, axis=0)[0] / (s[1] ** 2 - s[0] ** 2) for part in (odd, even))
-    return np.stack([odd[0] - s[0] ** 2 * high_odd, even[0] - s[0] ** 2 * high_even, high_odd, high_even])
+    s = np.array([kernel.stretched_yaw(share) for share in kernel.YAW_SHARES])
+    odd = 0.5 * (sides[:, 0] - sides[:, 1]) / s[:, None, None]
+    even = (0.5 * (sides[:, 0] + sides[:, 1]) - middle) / s[:, None, None] ** 2
+    of_values = np.linalg.inv(np.vander(s**2, increasing=True))
+    return np.stack([np.tensordot(row, part, axes=1) for row in of_values for part in (odd, even)])
 
 
 def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> tuple[Samples, Samples]:

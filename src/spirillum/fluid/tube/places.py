@@ -22,7 +22,7 @@ from spirillum.robot.outline import Arc, Outline
 from spirillum.robot.seat import Seat, last_clear
 from spirillum.units import show
 
-__all__ = ["CHECKED_FROM", "LARGEST_YAW", "YAW_SHARES", "Places", "rings_of"]
+__all__ = ["CHECKED_FROM", "LARGEST_YAW", "Places", "rings_of"]
 
 _THINNEST_REST = 0.08
 """Gap of the first nodes over the body's radius: what is left without the film is smooth below it."""
@@ -40,8 +40,6 @@ _UP = (0.0, 0.28, 0.55, 0.78, 0.92, 1.0)
 _DOWN = (0.0, 0.28, 0.55, 0.8, 1.0)
 LARGEST_YAW = float(np.radians(11.0))
 """Largest yaw of a table, rad: at most places the glass holds the tail before."""
-YAW_SHARES = (0.6, 0.95)
-"""Yaws of yawed places over the largest one there."""
 _YAW_PITCHES = (-0.9, -0.5, 0.0, 0.5, 0.9)
 _SWEPT = 121
 """Points along the tail between which it is asked how near it comes to the glass."""

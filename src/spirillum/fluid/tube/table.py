@@ -26,7 +26,7 @@ from spirillum.kernels import tube_table as kernel
 
 __all__ = ["TubeTable", "key_of", "least_checked_gap"]
 
-_FORMAT = "spirillum.tube-table/5"
+_FORMAT = "spirillum.tube-table/6"
 _LARGEST_FILE = 2**21  # bytes
 
 

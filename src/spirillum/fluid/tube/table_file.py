@@ -7,7 +7,7 @@ resistance is then off by less than 1e-4 of the roots of its diagonal: a hundred
 
 from __future__ import annotations
 
-import zlib
+import lzma
 
 import numpy as np
 
@@ -21,7 +21,9 @@ __all__ = ["packed_from", "to_bytes"]
 _REST = 3e-6
 _FILM = np.where(np.arange(film_table.ENTRIES) < len(film_table.ORDER), 2e-5, 1e-6)
 """What numbers are multiples of."""
-_LARGEST = 2**23  # bytes, not compressed
+_FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
+"""Single bytes, whose place in a word says nothing: those of a plane follow each other."""
+_LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
 
 
 def to_bytes(head: bytes, table: Samples) -> bytes:
@@ -37,8 +39,9 @@ def to_bytes(head: bytes, table: Samples) -> bytes:
     counts = np.array([parts.nodes.size, rows.size], dtype="<f8")
     exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows, film_head))
     steps = _steps(rows)
-    coded = _coded(parts.rest / steps) + _coded(parts.yawed / steps) + _coded(film / _FILM)
-    return sealed(zlib.compress(head + b"\n" + exact + coded, 9))
+    yawed = _times(_parts_at_nodes(), parts.yawed)
+    coded = _coded(parts.rest / steps) + _coded(yawed / steps) + _coded(film / _FILM)
+    return sealed(lzma.compress(head + b"\n" + exact + coded, filters=[_FILTER]))
 
 
 def packed_from(stored: bytes) -> tuple[bytes, Samples]:
@@ -51,9 +54,10 @@ def packed_from(stored: bytes) -> tuple[bytes, Samples]:
     if content is None:
         raise ValueError("damaged")
     try:
-        head, _, rest = zlib.decompressobj().decompress(content, _LARGEST).partition(b"\n")
-    except zlib.error as error:
+        opened = lzma.LZMADecompressor(memlimit=_MOST_MEMORY).decompress(content, _LARGEST)
+    except lzma.LZMAError as error:
         raise ValueError("no table") from error
+    head, _, rest = opened.partition(b"\n")
     return head, _Reader(rest).table()
 
 
@@ -70,6 +74,7 @@ class _Reader:
         head = self._exact(film_table.HEAD)
         shapes = kernel.shapes_of(nodes)
         rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
+        yawed = _times(np.asarray(np.linalg.inv(_parts_at_nodes()), dtype=np.float64), yawed)
         film = (self._whole(_film_shape(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
         return kernel.Parts(nodes, rest, yawed, packed).packed()
@@ -111,8 +116,26 @@ def _rows_of(rest: Samples) -> Samples:
     return found
 
 
+def _parts_at_nodes() -> Samples:
+    """Odd and even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders).
+
+    Powers of so high a degree cancel each other, and would need more digits.
+    """
+    s = np.array([kernel.stretched_yaw(share) for share in kernel.YAW_SHARES])[:, None]
+    order = np.arange(1, kernel.YAW_ORDERS + 1)
+    odd = order % 2 == 1
+    found: Samples = np.concatenate([np.where(odd, s**order, 0.0), np.where(odd, 0.0, s**order)])
+    return found
+
+
+def _times(matrix: Samples, yawed: Samples) -> Samples:
+    """A matrix over the orders times (yaw gaps, yaw pitches, orders, phases, 36)."""
+    found: Samples = np.moveaxis(np.tensordot(matrix, yawed, axes=(1, 2)), 0, 2)
+    return found
+
+
 def _steps(rows: Samples) -> Samples:
-    """Steps of the rest and of its powers in the stretched yaw, which is about 1 at most, (36,)."""
+    """Steps of the rest and of what a yaw adds to it at its nodes, (36,)."""
     row, column = np.tril_indices(kernel.MOTIONS)
     found: Samples = _REST * np.where(row == column, 1.0, rows[row])
     return found
