@@ -27,6 +27,14 @@ def answer() -> Any:
     return sp.predict(WIDE, tail_rate="1.2 Hz")
 
 
+def test_an_answer_nearer_to_the_glass_than_its_table_was_checked_says_so() -> None:
+    near, far = (sp.predict(WIDE, placement={"gap": gap, "pitch": "0 deg"}) for gap in ("0.05 mm", "0.3 mm"))
+    assert any(
+        words.startswith("gap = 0.05 mm; allowed: at least 0.288 mm, because the table") for words in near.warnings
+    )
+    assert not any("the table was checked" in words for words in far.warnings)
+
+
 def test_a_robot_in_a_channel_is_predicted_in_it_and_another_without(answer: Any) -> None:
     said = answer.to_dict(others=False)
     assert (said["model"], said["form"], said["calibrated"]) == ("tube", "table", False)

@@ -112,6 +112,7 @@ def test_presets_and_wrong_values() -> None:
     degraded = Degradation.of("degraded")
     assert degraded.noise == 8.0
     assert degraded.dropped == 0.05
+    assert [Degradation(crf=crf).uncompressed().crf for crf in (0, 18)] == [0, 0]
     changed = Degradation.of({"preset": "degraded", "noise": None, "crf": 20})
     assert changed == degraded.model_copy(update={"crf": 20})
     for wrong in ({"noise": -1.0}, {"crf": 60}, {"dropped": 1.0}, {"tilt": 1.0}, {"glare": 2.0}, {"bubbles": 1.5}):

@@ -85,7 +85,10 @@ _Lamp = Annotated[
 ]
 _Crf = Annotated[
     int | None,
-    typer.Option(help="Compression (H.264): 0, none lost, to 51; clean 18, degraded 33.", rich_help_panel=_DISTURBED),
+    typer.Option(
+        help="Compression of a video (H.264): 0, none lost, to 51; clean 18, degraded 33. PNG files lose none.",
+        rich_help_panel=_DISTURBED,
+    ),
 ]
 _Model = Annotated[
     str,

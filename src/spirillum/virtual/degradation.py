@@ -66,7 +66,7 @@ class Degradation(Options):
         Raises:
             InputError: if it has a compression of its own, which no preset has.
         """
-        if self.crf not in {self.of(name).crf for name in _PRESETS}:
+        if self.crf and self.crf not in {self.of(name).crf for name in _PRESETS}:
             raise InputError(
                 f"crf = {self.crf} (of --crf or --trouble compression) for a folder of PNG files, which lose nothing; "
                 "allowed: with a video (.mp4)"

@@ -39,7 +39,7 @@ from spirillum.kernels.film_table import film_at
 from spirillum.robot.outline import Outline
 from spirillum.robot.seat import Seat
 
-__all__ = ["built_tables"]
+__all__ = ["HELD_OUT", "built_tables"]
 
 _TOLERANCE, _LEVEL_TOLERANCE = 0.01, 0.002
 """How finely the flow is resolved at the places of a table; finer where that costs little, without pitch and yaw."""
@@ -47,7 +47,8 @@ _NEAR_GLASS = 0.9
 """Share of the largest pitch from which all harmonics of the tail's phase matter."""
 _FAR, _LITTLE_YAWED = 5, 7
 """Phases at nodes further from the glass: without yaw, and at the least yaw."""
-_HELD_OUT = 6
+HELD_OUT = 6
+"""Places without yaw, and with it, from which a table's errors are stated."""
 _SEED = 20121
 
 
@@ -217,7 +218,7 @@ def _held_out(places: Places, *, yawed: bool = True) -> list[Solution]:
     """Random places of a table that are no nodes, each with a random phase of the tail."""
     draw = np.random.default_rng(_SEED)
     chosen: list[Solution] = []
-    while len(chosen) < _HELD_OUT:
+    while len(chosen) < HELD_OUT:
         t = float(np.exp(draw.uniform(np.log(0.5 * places.gaps[0]), 0.0)))
         f, yaw = float(draw.uniform(-0.8, 1.0)), float(draw.uniform(-1.0, 1.0)) * float(places.most_yaw.max())
         seat, phase = places.seat_between(t, f, yaw if yawed else 0.0), float(draw.uniform(0.0, 2.0 * np.pi))

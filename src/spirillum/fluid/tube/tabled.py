@@ -13,9 +13,10 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
+from spirillum.fluid.tube.building import HELD_OUT
 from spirillum.fluid.tube.domain import seat_limits, seat_of, tube_radius
 from spirillum.fluid.tube.library import find_table
-from spirillum.fluid.tube.table import TubeTable, key_of
+from spirillum.fluid.tube.table import TubeTable, key_of, least_checked_gap
 from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
@@ -74,7 +75,7 @@ class TabledTube(Tube):
     """The model `tube` for robots that have tables."""
 
     form = "table"
-    error_against = "solutions at places between the nodes of its table"
+    error_against = f"solutions, the largest of {HELD_OUT} places between the nodes of its table"
 
     def __init__(self, tables: Mapping[str, TubeTable]) -> None:
         """Answer from tables.
@@ -96,6 +97,16 @@ class TabledTube(Tube):
     def stated_speed_error(self, batch: RobotBatch) -> float:
         """See `SwimmerModel.stated_speed_error`."""
         return self.table_of(batch).error_at(seat_of(batch, 0).yaw)["forward_velocity"]
+
+    def cautions(self, batch: RobotBatch) -> list[Limit]:
+        """No nearer to the glass than the places are from which the table's errors are known."""
+        gaps, least = np.full((2, batch.size), np.nan)
+        for index in range(batch.size):
+            table = self.table_of(batch, index)
+            gaps[index] = seat_of(batch, index).clearance(table.geometry.body)
+            least[index] = least_checked_gap(table.packed)
+        why = "the table was checked at such gaps, and the error estimate is that of these"
+        return [*super().cautions(batch), Limit.of("gap", gaps, "at least", least, "mm", why, "near-glass")]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
