@@ -1,8 +1,10 @@
 """`suggest`: no information from certainty, more trials tell more, and the promised narrowing comes true."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,6 +190,26 @@ def test_trials_have_to_be_some(fitted: Path) -> None:
 def test_a_robot_without_channel_is_refused(fitted: Path, robot: str) -> None:
     with pytest.raises(InputError, match="has no channel; allowed: robots with a channel"):
         sp.suggest(fitted / "posterior.nc", robot)
+
+
+def test_two_robots_of_one_channel_are_refused(fitted: Path) -> None:
+    with pytest.raises(InputError, match=r"channel\.diameter = 40 mm of two robots, the second biorob2012-wide"):
+        sp.suggest(fitted / "posterior.nc", [WIDE, WIDE])
+
+
+@pytest.mark.parametrize("field", ["tail.wavelength", "tail.amplitude"])
+def test_a_set_tail_is_refused_for_every_candidate_has_its_own(
+    fitted: Path, run: Callable[..., Any], field: str
+) -> None:
+    refused = run("suggest", str(fitted / "posterior.nc"), WIDE, "--set", f"{field}=4mm")
+    said = f"spirillum: {field} is set, and every candidate has its own; allowed: other fields, or --candidates\n"
+    assert (refused.code, refused.out, refused.err) == (2, "", said)
+
+
+def test_a_set_field_of_robots_that_nobody_named_says_whose_they_are(fitted: Path, run: Callable[..., Any]) -> None:
+    found = run("suggest", str(fitted / "posterior.nc"), "--set", "motor.resistance=5 ohm", "--json")
+    assert found.code == 0
+    assert "biorob2012-wide and biorob2012-narrow, are taken" in json.loads(found.out)["warnings"][0]
 
 
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:

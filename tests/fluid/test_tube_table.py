@@ -496,7 +496,15 @@ def test_on_the_axis_every_tilt_is_a_pitch() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"radius": -0.02}, {"radius": "x"}, {"error_without_yaw": {"forward_velocity": "NaN"}}]
+    "change",
+    [
+        {"radius": -0.02},
+        {"radius": 0.021},
+        {"radius": "x"},
+        {"error": {}},
+        {"error": dict.fromkeys(RESPONSES, -5.0)},
+        {"error_without_yaw": {"forward_velocity": "NaN"}},
+    ],
 )
 def test_a_table_whose_head_is_wrong_is_none(change: dict[str, Any], tmp_path: Path) -> None:
     path = next((Path(library.__file__).parent / "tables").glob("*.table"))
@@ -504,6 +512,27 @@ def test_a_table_whose_head_is_wrong_is_none(change: dict[str, Any], tmp_path: P
     (tmp_path / "a.table").write_bytes(to_bytes(json.dumps(json.loads(head) | change).encode(), packed))
     with pytest.raises(InputError, match="no table"):
         TubeTable.read(tmp_path / "a.table")
+
+
+@pytest.mark.parametrize("count", [-1.0, 0.0, 0.5, 5.0, 13.0, 1e9, np.nan])
+@pytest.mark.parametrize("column", ["_RINGS", "_GAPS", "_UP", "_DOWN", "_PHASES", "_YAW_GAPS", "_YAW_PITCHES"])
+def test_a_packed_table_with_a_wrong_count_is_not_whole(column: str, count: float) -> None:
+    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    assert kernel.is_whole(table.packed, table.radius)
+    changed = table.packed.copy()
+    own = changed[getattr(kernel, column)]
+    changed[getattr(kernel, column)] = count
+    assert kernel.is_whole(changed, table.radius) == (count == own)
+
+
+@pytest.mark.parametrize(("column", "value"), [(0, 0.03), (1, np.nan), (1, 0.03), (9, 14.0), (12, -1.0), (14, -3.0)])
+def test_a_packed_table_with_a_wrong_film_is_not_whole(column: int, value: float) -> None:
+    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    changed = table.packed.copy()
+    changed[kernel.film_start(changed) + column] = value
+    assert not kernel.is_whole(changed, table.radius)
+    assert not kernel.is_whole(table.packed, 1.001 * table.radius)
+    assert not any(kernel.is_whole(table.packed[:size], table.radius) for size in (0, 5, 60, table.packed.size - 1))
 
 
 def test_a_table_with_an_even_number_of_phases_is_none(tmp_path: Path) -> None:

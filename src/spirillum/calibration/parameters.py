@@ -20,6 +20,7 @@ from spirillum.robot.options import CALIBRATED
 __all__ = [
     "ASSUMABLE",
     "DEFAULT_FREE",
+    "OBSERVED",
     "PARAMETERS",
     "Coordinate",
     "LogNormal",
@@ -335,7 +336,7 @@ def free_names(free: str | Sequence[str] | None, model: str) -> tuple[str, ...]:
     return names
 
 
-_OBSERVED = ("tail.wavelength", "tail.amplitude")
+OBSERVED = ("tail.wavelength", "tail.amplitude")
 """Fields whose values stand in the observations."""
 _IN_PLACE_OF = {
     "body_drag": "calibration.{model}.body_drag",
@@ -358,7 +359,7 @@ def check_not_set(fields: Iterable[str], free: str | Sequence[str] | None, model
         InputError: for such a field, or wrong names.
     """
     asked, known = set(fields), find_swimmer_model(model).name
-    observed = [field for field in _OBSERVED if field in asked]
+    observed = [field for field in OBSERVED if field in asked]
     if observed:
         raise InputError(
             f"{observed[0]} is set, and the observations say the {observed[0].partition('.')[2]} of each tail; "

@@ -44,6 +44,7 @@ from spirillum.shown import Shown
 from spirillum.swimming.cautions import calibration_warnings
 from spirillum.swimming.intervals import drawn_kinematics
 from spirillum.swimming.steady import requirements
+from spirillum.units import show
 
 __all__ = ["Candidate", "Suggestion", "suggest"]
 
@@ -139,8 +140,7 @@ def suggest(
         raise InputError(f"trials = {trials}; allowed: 1 to 1000000")
     known = read_posterior(posterior)
     given = _papers_robots(known) if robots is None else given_robots(robots)
-    for robot in given:
-        _check_channel(robot)
+    _check_channels(given)
     loaded = [known.central(robot) for robot in given]
     listed = _default(loaded) if candidates is None else _listed(Path(candidates), loaded)
     found: list[tuple[Candidate, Samples]] = []
@@ -196,11 +196,22 @@ def _outside(known: PosteriorFile, robot: Robot) -> str:
     return outside[0].sentence() if outside else ""
 
 
-def _check_channel(robot: Robot) -> None:
-    if robot.channel is None:
-        raise InputError(
-            f"robot {robot.name} has no channel; allowed: robots with a channel, in which one more tail may be measured"
-        )
+def _check_channels(robots: Sequence[Robot]) -> None:
+    """One robot for each channel: candidates are named by channel and tail."""
+    seen: set[float] = set()
+    for robot in robots:
+        if robot.channel is None:
+            raise InputError(
+                f"robot {robot.name} has no channel; allowed: robots with a channel, in which one more tail may be "
+                "measured"
+            )
+        diameter = round(robot.channel.diameter, 9)
+        if diameter in seen:
+            raise InputError(
+                f"channel.diameter = {show(robot.channel.diameter, 'mm')} of two robots, the second {robot.name}; "
+                "allowed: one robot for each channel"
+            )
+        seen.add(diameter)
 
 
 def _cautions(known: PosteriorFile, robots: Sequence[Robot]) -> list[str]:

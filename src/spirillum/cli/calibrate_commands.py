@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -13,6 +14,10 @@ from spirillum.cli.inputs import given_options, loaded_robot, overrides_from
 from spirillum.cli.options import Json, NamedModel, Settings, complete_models, complete_robots, starting
 from spirillum.errors import InputError
 from spirillum.fluid.tube.announced import TABLE_TAKES
+
+if TYPE_CHECKING:
+    from spirillum.calibration.ranking import Ranking
+    from spirillum.calibration.suggest import Suggestion
 
 __all__ = ["calibrate", "rank_models", "suggest"]
 
@@ -114,6 +119,16 @@ def _stated(given: Sequence[str]) -> dict[str, str]:
     return found
 
 
+_A = TypeVar("_A", "Ranking", "Suggestion")
+
+
+def _saying_whose(found: _A, robot: Sequence[str] | None, settings: Sequence[str] | None) -> _A:
+    """An answer that says whose robots were taken, where fields were set and none was named."""
+    from spirillum.robot.load import PAPER_ROBOTS_TAKEN
+
+    return found if robot or not settings else replace(found, warnings=(PAPER_ROBOTS_TAKEN, *found.warnings))
+
+
 def rank_models(
     observations: _Observations,
     robot: Annotated[
@@ -166,7 +181,7 @@ def rank_models(
             prepare=prepare,
             progress=progress,
         )
-    renderer.show(found.to_dict(), json=json)
+    renderer.show(_saying_whose(found, robot, settings).to_dict(), json=json)
     if not all(item.fit.converged for item in found.ranked):
         raise typer.Exit(1)
 
@@ -189,13 +204,17 @@ def suggest(
 
     Example: `spirillum suggest my-calibration/posterior.nc --candidates tails.csv`
     """
+    from spirillum.calibration.parameters import OBSERVED
     from spirillum.calibration.suggest import suggest as answer
     from spirillum.cli import renderer
+    from spirillum.fitted.replaced import set_fields
     from spirillum.robot.load import PAPER_ROBOTS
 
     if rows < 1:
         raise InputError(f"rows = {rows}; allowed: at least 1")
+    if own := [field for field in OBSERVED if field in set_fields(overrides_from(settings))]:
+        raise InputError(f"{own[0]} is set, and every candidate has its own; allowed: other fields, or --candidates")
     names = robot or (PAPER_ROBOTS if settings else ())
     robots = [loaded_robot(name, settings, posterior=posterior) for name in names] or None
-    found = answer(posterior, robots, candidates=candidates, trials=trials)
+    found = _saying_whose(answer(posterior, robots, candidates=candidates, trials=trials), robot, settings)
     renderer.show(found.to_dict(), json=json, rows=rows)

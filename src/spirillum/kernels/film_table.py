@@ -18,7 +18,16 @@ import numpy as np
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
 
-__all__ = ["clearance", "film_at", "film_coordinates", "smallest_gap", "spline_weights", "stretched", "yaw_scale"]
+__all__ = [
+    "clearance",
+    "film_at",
+    "film_coordinates",
+    "film_is_whole",
+    "smallest_gap",
+    "spline_weights",
+    "stretched",
+    "yaw_scale",
+]
 
 # Columns of the head of a packed table.
 TUBE, BODY, HALF = 0, 1, 2  # R, a and a spheroid's half-length (0: a straight side), m
@@ -31,8 +40,26 @@ HEAD = 15
 ORDER = (2, 4, 0, 1, 5, 3)
 """Order of the motions (U, Omega) in the factors: those that the film resists most come first, even ones before odd."""
 ENTRIES = 21
+_MANY = 99  # intervals of a coordinate, and polynomials
 _ODD = 3
 """Motions of the order from here on change their sign with the mirror."""
+
+
+def film_is_whole(film: Samples, radius: float) -> bool:
+    """Whether an array is a packed film in a tube of this radius: the loops below check no index.
+
+    Args:
+        film: of any numbers.
+        radius: R of the tube, m.
+    """
+    if film.size < HEAD or not np.isfinite(film[:HEAD]).all() or not math.isclose(film[TUBE], radius):
+        return False
+    counts = film[[INTERVALS, SECOND_INTERVALS, YAWS]]
+    if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MANY or not 0.0 < film[BODY] < radius:
+        return False
+    first, second, yaws = counts.astype(int)
+    values = film[HEAD:].view(np.float32)
+    return values.size - (first + 3) * (second + 3) * yaws * ENTRIES in (0, 1) and bool(np.isfinite(values).all())
 
 
 @compiled

@@ -24,7 +24,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.film_table import film_at
+from spirillum.kernels.film_table import film_at, film_is_whole
 
 __all__ = [
     "INSIDE",
@@ -43,6 +43,7 @@ __all__ = [
     "contact_offset_of",
     "cut_of_film",
     "film_start",
+    "is_whole",
     "largest_yaw",
     "limited_yaw",
     "mean_resistance_at",
@@ -81,7 +82,7 @@ _BEYOND_YAW = 1.2  # beyond the largest yaw, so that the inverse tangent stays f
 # Header of a packed table: radius of the tube, rows, and the lengths of what follows.
 _RADIUS, _RINGS, _GAPS, _UP, _DOWN, _PHASES, _YAW_GAPS, _YAW_PITCHES = 0, 1, 2, 3, 4, 5, 6, 7
 _HEADER = 8
-_MOST = 12  # nodes in one direction
+_MOST, _MANY = 12, 99  # nodes in one direction; rings, and Fourier coefficients
 _YAW_LIMIT = 7  # numbers of `largest_yaw`
 _LEAST_YAW = 1e-3  # rad, where the tail nearly touches the glass without a yaw
 
@@ -120,6 +121,27 @@ def packed(
     header = [radius, len(rings), gaps.size, up.size, down.size, rest.shape[2], yaw_gaps.size, yaw_pitches.size]
     nodes = (np.array(header, dtype=float), rings, gaps, up, down, most, yaw_gaps, yaw_pitches, yaw_limit)
     return np.concatenate([np.ravel(part) for part in (*nodes, rest, yawed, film)])
+
+
+def is_whole(table: Samples, radius: float) -> bool:
+    """Whether an array is a packed table of a tube of this radius: the loops below check no index.
+
+    Args:
+        table: of any numbers.
+        radius: R of the tube, m.
+    """
+    if table.size < _HEADER or not np.isfinite(table[:_HEADER]).all() or not math.isclose(table[_RADIUS], radius):
+        return False
+    rings, gaps, up, down, phases, yaw_gaps, yaw_pitches = table[1:_HEADER]
+    counts = np.array([rings, gaps, up, down, phases])
+    turned = np.array([yaw_gaps, yaw_pitches])
+    sizes = np.append(counts, turned)
+    if np.any(sizes % 1.0) or counts.min() < 1 or max(gaps, up, down, *turned) > _MOST or max(rings, phases) > _MANY:
+        return False
+    if phases % 2.0 == 0.0 or (turned.min() < 1 and turned.max() != 0):
+        return False
+    start = film_start(table)
+    return start < table.size and bool(np.isfinite(table[:start]).all()) and film_is_whole(table[start:], radius)
 
 
 class Range(NamedTuple):

@@ -20,6 +20,7 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError
 from spirillum.files import read_bytes, whole_file
 from spirillum.fluid.tube.places import CHECKED_FROM
+from spirillum.fluid.tube.responses import RESPONSES
 from spirillum.fluid.tube.table_file import packed_from, to_bytes
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels import tube_table as kernel
@@ -121,16 +122,17 @@ def _read(path: Path) -> TubeTable | None:
 
 
 def _checked(table: TubeTable) -> TubeTable:
-    """A table whose numbers are finite, of an odd number of phases and a tube that has a radius.
+    """A table that is whole, with errors that are numbers.
 
     Raises:
         ValueError: if it is not.
     """
-    stated = (table.radius, table.seconds, table.places, *table.error.values(), *table.error_without_yaw.values())
-    parts = kernel.parts_of(table.packed)
-    finite = all(map(math.isfinite, stated)) and all(np.isfinite(part).all() for part in parts[:3])
-    if not finite or table.radius <= 0.0 or parts.rest.shape[2] % 2 == 0:
+    stated = [mapping[name] for mapping in (table.error, table.error_without_yaw) for name in RESPONSES]
+    numbers = (table.radius, table.seconds, table.places, *stated)
+    if not all(math.isfinite(number) and number >= 0.0 for number in numbers) or table.radius <= 0.0:
         raise ValueError("not the numbers of a table")
+    if not kernel.is_whole(table.packed, table.radius):
+        raise ValueError("not the nodes of a table")
     return table
 
 
