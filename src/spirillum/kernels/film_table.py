@@ -23,6 +23,8 @@ __all__ = [
     "film_at",
     "film_coordinates",
     "film_is_whole",
+    "has_head",
+    "shape_of",
     "smallest_gap",
     "spline_weights",
     "stretched",
@@ -45,6 +47,16 @@ _ODD = 3
 """Motions of the order from here on change their sign with the mirror."""
 
 
+def has_head(table: Samples, size: int, radius: float) -> bool:
+    """Whether an array begins with that many finite numbers, the first of them the radius of a tube, m."""
+    return table.size >= size and bool(np.isfinite(table[:size]).all()) and math.isclose(table[0], radius)
+
+
+def shape_of(film: Samples) -> tuple[int, int, int, int]:
+    """Shape of the coefficients of a film from its head, or from all of it: both coordinates, yaws, entries."""
+    return int(film[INTERVALS]) + 3, int(film[SECOND_INTERVALS]) + 3, int(film[YAWS]), ENTRIES
+
+
 def film_is_whole(film: Samples, radius: float) -> bool:
     """Whether an array is a packed film in a tube of this radius: the loops below check no index.
 
@@ -52,14 +64,13 @@ def film_is_whole(film: Samples, radius: float) -> bool:
         film: of any numbers.
         radius: R of the tube, m.
     """
-    if film.size < HEAD or not np.isfinite(film[:HEAD]).all() or not math.isclose(film[TUBE], radius):
+    if not has_head(film, HEAD, radius):
         return False
     counts = film[[INTERVALS, SECOND_INTERVALS, YAWS]]
     if np.any(counts % 1.0) or counts.min() < 1 or counts.max() > _MANY or not 0.0 < film[BODY] < radius:
         return False
-    first, second, yaws = counts.astype(int)
-    values = film[HEAD:].view(np.float32)
-    return values.size - (first + 3) * (second + 3) * yaws * ENTRIES in (0, 1) and bool(np.isfinite(values).all())
+    values = film[HEAD:].view(np.float32)  # one more where their number is odd
+    return values.size - math.prod(shape_of(film)) in (0, 1) and bool(np.isfinite(values).all())
 
 
 @compiled

@@ -24,7 +24,7 @@ import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.kernels.compiled import compiled
-from spirillum.kernels.film_table import film_at, film_is_whole
+from spirillum.kernels.film_table import film_at, film_is_whole, has_head
 
 __all__ = [
     "INSIDE",
@@ -56,6 +56,7 @@ __all__ = [
     "shapes_of",
     "stretched_yaw",
     "yaw_limit_of",
+    "yaw_parts_at_nodes",
 ]
 
 MOTIONS = 8
@@ -130,7 +131,7 @@ def is_whole(table: Samples, radius: float) -> bool:
         table: of any numbers.
         radius: R of the tube, m.
     """
-    if table.size < _HEADER or not np.isfinite(table[:_HEADER]).all() or not math.isclose(table[_RADIUS], radius):
+    if not has_head(table, _HEADER, radius):
         return False
     rings, gaps, up, down, phases, yaw_gaps, yaw_pitches = table[1:_HEADER]
     counts = np.array([rings, gaps, up, down, phases])
@@ -387,6 +388,18 @@ def stretched_yaw(share: float) -> float:
         share: g, the yaw over the largest one.
     """
     return math.atanh(share / _BEYOND_YAW)
+
+
+def yaw_parts_at_nodes() -> Samples:
+    """Odd and then even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders).
+
+    The parts have the size of what is added; coefficients of so high powers cancel each other, and need more digits.
+    """
+    s = np.array([stretched_yaw(share) for share in YAW_SHARES])[:, None]
+    order = np.arange(1, YAW_ORDERS + 1)
+    odd = order % 2 == 1
+    found: Samples = np.concatenate([np.where(odd, s**order, 0.0), np.where(odd, 0.0, s**order)])
+    return found
 
 
 @compiled

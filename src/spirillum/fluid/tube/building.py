@@ -188,11 +188,9 @@ def _powers(middle: Samples, sides: Samples) -> Samples:
         middle: values without yaw, (phases, 36).
         sides: values to the left and to the right, (shares, 2, phases, 36).
     """
-    s = np.array([kernel.stretched_yaw(share) for share in kernel.YAW_SHARES])
-    odd = 0.5 * (sides[:, 0] - sides[:, 1]) / s[:, None, None]
-    even = (0.5 * (sides[:, 0] + sides[:, 1]) - middle) / s[:, None, None] ** 2
-    of_values = np.linalg.inv(np.vander(s**2, increasing=True))
-    return np.stack([np.tensordot(row, part, axes=1) for row in of_values for part in (odd, even)])
+    odd, even = 0.5 * (sides[:, 0] - sides[:, 1]), 0.5 * (sides[:, 0] + sides[:, 1]) - middle
+    found: Samples = np.tensordot(np.linalg.inv(kernel.yaw_parts_at_nodes()), np.concatenate([odd, even]), axes=1)
+    return found
 
 
 def _both_sides(film: Samples, place: _Place, own: Samples, image: Samples) -> tuple[Samples, Samples]:

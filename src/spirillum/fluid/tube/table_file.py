@@ -39,7 +39,7 @@ def to_bytes(head: bytes, table: Samples) -> bytes:
     counts = np.array([parts.nodes.size, rows.size], dtype="<f8")
     exact = b"".join(part.astype("<f8").tobytes() for part in (counts, parts.nodes, rows, film_head))
     steps = _steps(rows)
-    yawed = _times(_parts_at_nodes(), parts.yawed)
+    yawed = _times(kernel.yaw_parts_at_nodes(), parts.yawed)
     coded = _coded(parts.rest / steps) + _coded(yawed / steps) + _coded(film / _FILM)
     return sealed(lzma.compress(head + b"\n" + exact + coded, filters=[_FILTER]))
 
@@ -74,8 +74,8 @@ class _Reader:
         head = self._exact(film_table.HEAD)
         shapes = kernel.shapes_of(nodes)
         rest, yawed = (self._whole(shape) * _steps(rows) for shape in shapes)
-        yawed = _times(np.asarray(np.linalg.inv(_parts_at_nodes()), dtype=np.float64), yawed)
-        film = (self._whole(_film_shape(head)) * _FILM).astype(np.float32).ravel()
+        yawed = _times(np.asarray(np.linalg.inv(kernel.yaw_parts_at_nodes()), dtype=np.float64), yawed)
+        film = (self._whole(film_table.shape_of(head)) * _FILM).astype(np.float32).ravel()
         packed = np.concatenate([head, np.pad(film, (0, film.size % 2)).view(np.float64)])
         return kernel.Parts(nodes, rest, yawed, packed).packed()
 
@@ -116,18 +116,6 @@ def _rows_of(rest: Samples) -> Samples:
     return found
 
 
-def _parts_at_nodes() -> Samples:
-    """Odd and even part of what a yaw adds at its nodes, from the coefficients of its powers, (orders, orders).
-
-    Powers of so high a degree cancel each other, and would need more digits.
-    """
-    s = np.array([kernel.stretched_yaw(share) for share in kernel.YAW_SHARES])[:, None]
-    order = np.arange(1, kernel.YAW_ORDERS + 1)
-    odd = order % 2 == 1
-    found: Samples = np.concatenate([np.where(odd, s**order, 0.0), np.where(odd, 0.0, s**order)])
-    return found
-
-
 def _times(matrix: Samples, yawed: Samples) -> Samples:
     """A matrix over the orders times (yaw gaps, yaw pitches, orders, phases, 36)."""
     found: Samples = np.moveaxis(np.tensordot(matrix, yawed, axes=(1, 2)), 0, 2)
@@ -141,13 +129,8 @@ def _steps(rows: Samples) -> Samples:
     return found
 
 
-def _film_shape(head: Samples) -> tuple[int, ...]:
-    first, second = (int(head[place]) + 3 for place in (film_table.INTERVALS, film_table.SECOND_INTERVALS))
-    return first, second, int(head[film_table.YAWS]), film_table.ENTRIES
-
-
 def _film_of(film: Samples) -> tuple[Samples, Samples]:
     """Head and coefficients of a packed film."""
-    head, shape = film[: film_table.HEAD], _film_shape(film)
+    head, shape = film[: film_table.HEAD], film_table.shape_of(film)
     values = film[film_table.HEAD :].copy().view(np.float32)[: int(np.prod(shape))]
     return head, values.reshape(shape).astype(np.float64)
