@@ -43,6 +43,15 @@ def test_a_film_gives_a_line_for_every_frame_and_one_for_all(filmed, capsys):
         assert last[name]["low"] < true < last[name]["high"]
 
 
+@pytest.mark.parametrize("pace", ["real", "fast"])
+def test_what_is_proposed_for_a_film_too_short_to_learn_from_would_help(monkeypatch, filmed, pace):
+    monkeypatch.setattr(session, "at_own_pace", lambda frames: frames)
+    found = track(filmed, setup_of(filmed), pace=pace, learn=30.0)
+    assert found.trial is None
+    assert "a robot in view for longer than 30 s; a shorter --learn needs less of it" in found.stopped
+    assert "--pace" not in found.stopped
+
+
 def test_lines_go_out_as_datagrams_to_this_computer(filmed):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))

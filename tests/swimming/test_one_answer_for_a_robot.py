@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 import spirillum as sp
+from spirillum.errors import InputError
 from spirillum.fluid.tube import library
 from spirillum.papers.biorob2012.study import paper_study
 from spirillum.robot.placement import Placement
@@ -33,6 +34,18 @@ def test_an_answer_nearer_to_the_glass_than_its_table_was_checked_says_so() -> N
         words.startswith("gap = 0.05 mm; allowed: at least 0.288 mm, because the table") for words in near.warnings
     )
     assert not any("the table was checked" in words for words in far.warnings)
+
+
+def test_an_answer_beyond_the_yaws_at_which_its_table_was_checked_says_so_and_has_no_error() -> None:
+    """There the tail is nearer to the glass than the flow can be solved for, and touches it at a yaw of 7.2 degrees."""
+    near, far = (
+        sp.predict(NARROW, placement={"gap": "0.3 mm", "pitch": "0 deg", "yaw": yaw}) for yaw in ("7.1 deg", "6 deg")
+    )
+    assert any(words.startswith("yaw = 7.1 deg; allowed: at most 6.8") for words in near.warnings)
+    assert not any(words.startswith("yaw") for words in far.warnings)
+    assert near.to_dict(others=False).get("error_estimate", {}).get("value") is None
+    with pytest.raises(InputError, match="clearance of tail and glass .* allowed: at least 0"):
+        sp.predict(NARROW, placement={"gap": "0.3 mm", "pitch": "0 deg", "yaw": "7.3 deg"})
 
 
 def test_a_robot_in_a_channel_is_predicted_in_it_and_another_without(answer: Any) -> None:

@@ -164,7 +164,7 @@ def test_options_of_the_tube() -> None:
     ("options", "words"),
     [
         ((WIDE, "--gap", "0.0001mm"), "placement.gap = 0.0001 mm; allowed: at least 0.00018 mm"),
-        (("biorob2012-narrow", "--pitch", "30deg"), "there is no more room in the channel at placement.pitch = 30 deg"),
+        (("biorob2012-narrow", "--pitch", "30deg"), "there is no more room in the channel (placement.pitch = 30 deg)"),
     ],
 )
 def test_a_gap_outside_a_table_gets_one_limit(

@@ -130,6 +130,7 @@ class _Log:
     dropped: int = 0
     learnt: float = math.nan
     start: float = 0.0
+    span: float = 0.0
     stopped: str = ""
     interrupted: bool = False
     latencies: list[float] = field(default_factory=list)
@@ -165,6 +166,7 @@ class _Log:
         known = self.tracker.learnt
         if self._first is None:
             self._first, self.start = (frame.time, frame.clock), frame.time
+        self.span = frame.time - self.start
         observation = self.tracker.update(frame.image, frame.time)
         latency = None if self.pace == "fast" else time.perf_counter() - frame.clock
         self.frames += 1
@@ -191,8 +193,10 @@ class _Log:
 
     def _hint(self) -> str:
         """What helps a film that has ended while the robot was still learnt."""
-        if self.source.kind != "film" or self.pace == "fast":
+        if self.source.kind != "film" or self.length is not None:
             return ""
+        if self.pace == "fast" or self.span <= self.tracker.learning:
+            return "; a shorter --learn needs less of it, and `spirillum measure` looks at a film as a whole"
         return "; a film this short is tracked with --pace fast, which waits for the learning"
 
     def answer(self) -> Tracked:

@@ -85,6 +85,11 @@ class LiveTracker:
             self._begin(film, samples_of(film, self.setup.start, self.setup.end))
 
     @property
+    def learning(self) -> float:
+        """Time from which the robot's appearance is learnt, s."""
+        return self._learn
+
+    @property
     def learnt(self) -> bool:
         """Whether the robot is known."""
         return self._following is not None

@@ -81,15 +81,21 @@ class _Films(NamedTuple):
     """Where the last tail comes closest."""
 
 
-def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GAP) -> list[Limit]:
+def seat_limits(
+    batch: RobotBatch, part: str, *, thinnest_gap: float = _THINNEST_GAP, wire_film: float = WIRE_FILM
+) -> list[Limit]:
     """Requirements on the seat in the tube for one of `PIECES`; robots that cannot be built are left out.
 
     Args:
         batch: the robots.
         part: one of `PIECES`.
         thinnest_gap: least gap under the body, over its diameter.
+        wire_film: least film between wire and wall, over the wire's radius.
     """
+    through = "the tail would pass through the wall (placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude)"
+    resolved = f"the film under the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, thinnest_gap)
+    turned = _turned(batch)
     open_ended = batch.placement.ends == "open"
     thinnest = thinnest_gap * batch.body_diameter
     return [
@@ -121,6 +127,15 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             "gap-too-thin",
         ),
         Limit.of(
+            f"largest gap of the body{turned}",
+            films.largest,
+            "more than",
+            0.0,
+            "mm",
+            "else it cuts into the wall; a smaller placement.pitch or placement.yaw leaves more room",
+            "gap-too-wide",
+        ),
+        Limit.of(
             "placement.gap", films.asked, "at least", thinnest, "mm", "thinner films are not resolved", "gap-too-thin"
         ),
         Limit.of(
@@ -129,7 +144,7 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             "at most",
             films.largest,
             "mm",
-            f"there is no more room in the channel{_pitched(batch.placement.pitch)}",
+            f"there is no more room in the channel{turned}",
             "gap-too-wide",
         ),
         Limit.of(
@@ -145,17 +160,18 @@ def seat_limits(batch: RobotBatch, part: str, thinnest_gap: float = _THINNEST_GA
             f"clearance of tail and glass{films.where}",
             films.tail,
             "at least",
-            WIRE_FILM * 0.5 * batch.wire_diameter,
+            wire_film * 0.5 * batch.wire_diameter,
             "mm",
-            f"the film under the wire is resolved down to {WIRE_FILM:g} of its radius, and below 0 the tail would "
-            "pass through the wall (placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude)",
+            f"{resolved if wire_film else ''}{through}",
             "tail-in-wall",
         ),
     ]
 
 
-def _pitched(pitch: float | None) -> str:
-    return f" at placement.pitch = {show(pitch, 'deg')}" if pitch else ""
+def _turned(batch: RobotBatch) -> str:
+    angles = {"pitch": batch.placement.pitch, "yaw": batch.placement.yaw}
+    said = [f"placement.{name} = {show(angle, 'deg')}" for name, angle in angles.items() if angle]
+    return f" ({', '.join(said)})" if said else ""
 
 
 def _films(batch: RobotBatch, part: str, thinnest_gap: float) -> _Films:

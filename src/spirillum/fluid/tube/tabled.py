@@ -21,7 +21,7 @@ from spirillum.fluid.tube.tube import Tube
 from spirillum.fluid.wire.robot_geometry import RobotGeometry, number_of
 from spirillum.fluid.wire.slender import Slender
 from spirillum.kernels.tube_places import PHASES, mean_resistances
-from spirillum.kernels.tube_table import INSIDE, MOTIONS, mean_resistance_at
+from spirillum.kernels.tube_table import INSIDE, MOTIONS, largest_yaw, mean_resistance_at
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.limits import Limit, within
 from spirillum.robot.options import ModelOptions
@@ -95,22 +95,29 @@ class TabledTube(Tube):
         return None
 
     def stated_speed_error(self, batch: RobotBatch) -> float:
-        """See `SwimmerModel.stated_speed_error`."""
-        return self.table_of(batch).error_at(seat_of(batch, 0).yaw)["forward_velocity"]
+        """See `SwimmerModel.stated_speed_error`; none beyond the yaws at which the table was checked."""
+        seat, table = seat_of(batch, 0), self.table_of(batch)
+        known = abs(seat.yaw) <= largest_yaw(table.packed, seat.offset, seat.pitch)
+        return table.error_at(seat.yaw)["forward_velocity"] if known else float("nan")
 
     def cautions(self, batch: RobotBatch) -> list[Limit]:
-        """No nearer to the glass than the places are from which the table's errors are known."""
-        gaps, least = np.full((2, batch.size), np.nan)
+        """No nearer to the glass, and no further to the side, than where the table's errors are known."""
+        gaps, least, yaws, most = np.full((4, batch.size), np.nan)
         for index in range(batch.size):
-            table = self.table_of(batch, index)
-            gaps[index] = seat_of(batch, index).clearance(table.geometry.body)
-            least[index] = least_checked_gap(table.packed)
-        why = "the table was checked at such gaps, and the error estimate is that of these"
-        return [*super().cautions(batch), Limit.of("gap", gaps, "at least", least, "mm", why, "near-glass")]
+            table, seat = self.table_of(batch, index), seat_of(batch, index)
+            gaps[index], least[index] = seat.clearance(table.geometry.body), least_checked_gap(table.packed)
+            yaws[index], most[index] = abs(seat.yaw), largest_yaw(table.packed, seat.offset, seat.pitch)
+        near = "the table was checked at such gaps, and the error estimate is that of these"
+        aside = "the table was checked at such yaws, and there is no error estimate beyond"
+        return [
+            *super().cautions(batch),
+            Limit.of("gap", gaps, "at least", least, "mm", near, "near-glass"),
+            Limit.of("yaw", yaws, "at most", most, "deg", aside, "beyond-checked-yaw"),
+        ]
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        return [*Slender().part_domain(batch, part), *seat_limits(batch, part, _THINNEST_GAP)]
+        return [*Slender().part_domain(batch, part), *seat_limits(batch, part, thinnest_gap=_THINNEST_GAP, wire_film=0.0)]
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
