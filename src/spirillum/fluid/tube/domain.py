@@ -92,7 +92,8 @@ def seat_limits(
         thinnest_gap: least gap under the body, over its diameter.
         wire_film: least film between wire and wall, over the wire's radius.
     """
-    through = "the tail would pass through the wall (placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude)"
+    fields = "placement.pitch, placement.yaw, placement.tail_drop, tail.amplitude"
+    through = f"the tail would pass through the wall ({fields})"
     resolved = f"the film under the wire is resolved down to {wire_film:g} of its radius, and below 0 "
     films = _films(batch, part, thinnest_gap)
     turned = _turned(batch)

@@ -117,7 +117,8 @@ class TabledTube(Tube):
 
     def part_domain(self, batch: RobotBatch, part: str) -> list[Limit]:
         """See `ResistanceModel.part_domain`."""
-        return [*Slender().part_domain(batch, part), *seat_limits(batch, part, thinnest_gap=_THINNEST_GAP, wire_film=0.0)]
+        seats = seat_limits(batch, part, thinnest_gap=_THINNEST_GAP, wire_film=0.0)
+        return [*Slender().part_domain(batch, part), *seats]
 
     def _axial(self, batch: RobotBatch) -> tuple[Samples, Samples]:
         found = np.full((batch.size, 5, 5), np.nan)
