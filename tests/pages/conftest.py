@@ -1,4 +1,4 @@
-"""One server and one browser for all tests of the page."""
+"""One server and one browser for each file of tests; left open they would go on drawing beside all other tests."""
 
 import os
 import re
@@ -42,14 +42,14 @@ class Served:
             return self.process.wait(timeout=20)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def served(cache_of_its_own: None) -> Iterator[Served]:
     page = Served()
     yield page
     assert page.ended(SIGINT) == 0
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     try:
         from playwright import sync_api
@@ -90,7 +90,7 @@ class Tab:
     def value(self, script: str) -> Any:
         return self.page.evaluate(script)
 
-    def until(self, script: str, longest: float = 60.0) -> None:
+    def until(self, script: str, longest: float = 300.0) -> None:
         """Wait for something; its policy forbids the page to evaluate text, so that it is asked from outside."""
         end = time.monotonic() + longest
         while not self.value(f"Boolean({script})"):
@@ -101,7 +101,7 @@ class Tab:
         self.page.evaluate("what => spirillum.socket.send(JSON.stringify(what))", what)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def tab(served: Served, browser: Any) -> Iterator[Tab]:
     """The page in a small window, swimming."""
     context = browser.new_context(viewport={"width": 800, "height": 480})
