@@ -58,6 +58,41 @@ def test_whole_films_keep_their_times(stray: float, noise: float) -> None:
     assert found.time is time
 
 
+def repeating(steps: list[int]) -> tuple[np.ndarray, np.ndarray, tuple[Reading, ...]]:
+    """Even and true times, and readings, of a film that goes on by so many pictures on each frame."""
+    rng = np.random.default_rng(11)
+    true = np.cumsum([0, *steps]) / FPS
+    x = 1e-3 * true + 0.05 * PIXEL * rng.normal(size=true.size)
+    body = -2 * np.pi * 0.12 * true + 0.006 * rng.normal(size=true.size)
+    tail = 2 * np.pi * 1.2 * true + 0.03 * rng.normal(size=true.size)
+    readings = (
+        Reading(tail % (2 * np.pi), 2 * np.pi, 0.009),
+        Reading(body % np.pi, np.pi, 0.002),
+        Reading(x, np.inf, 0.02 * PIXEL),
+    )
+    return np.arange(true.size) / FPS, true, readings
+
+
+@pytest.mark.parametrize("every", [150, 40, 10])
+def test_repeated_frames_leave_the_length_of_the_film_open(every: int) -> None:
+    """Stored twice, or converted from a lower frame rate: both are inside twice the stated error."""
+    time, true, readings = repeating([0 if k % every == 3 else 1 for k in range(300)])
+    found, names = restored(time, readings)
+    assert names == ["repeated-frames"]
+    assert found.time is time
+    too_long = (time[-1] - true[-1]) / true[-1]
+    assert 0.5 * too_long < found.relative_error < too_long
+
+
+def test_a_repeated_frame_that_makes_up_for_a_lost_one_and_a_robot_that_stands_are_none() -> None:
+    made_up = [1] * 300
+    for place in (40, 90, 200, 270):
+        made_up[place : place + 2] = [0, 2]
+    assert "repeated-frames" not in restored(*repeating(made_up)[::2])[1]
+    stands = [0 if 120 <= k < 150 else 1 for k in range(300)]
+    assert "repeated-frames" not in restored(*repeating(stands)[::2])[1]
+
+
 def test_true_gaps_are_no_loss() -> None:
     _, true, readings = film(21, 3)
     assert restored(true, readings)[1] == []

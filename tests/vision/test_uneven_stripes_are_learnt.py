@@ -45,6 +45,40 @@ def test_the_rate_is_that_of_the_body(rate):
     assert (found.error > 0.004).all()
 
 
+def with_widths(*widths):
+    """Edges' places of stripes of such widths, over even ones."""
+    return np.cumsum([0.0, *(np.array(widths[:-1]) - 1.0)]) * EVEN
+
+
+@pytest.mark.parametrize(
+    ("rate", "places"),
+    [
+        (-0.25, with_widths(1.2, 1.2, 1.2, 1.2, 1.2, 1.2, 1.2, -0.4)),  # a wrong scale, or another number of stripes
+        (0.08, with_widths(0.8, 0.82, 0.79, 2.4, 0.81, 0.8, 0.78, 0.8)),
+        (-0.25, with_widths(1.0, 1.0, 1.35, 0.9, 1.0, 0.9, 0.95, 0.9)),
+    ],
+)
+def test_widths_that_no_painter_leaves_are_not_believed(rate, places):
+    angle, read, edges, _ = planted(rate, noise=np.radians(0.3), places=places)
+    edges[np.abs(edges) > np.radians(14.0)] = np.nan  # farther away no edge is looked for
+    found = evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD)
+    assert [flag.name for flag in found.flags] == ["stripes-do-not-fit"]
+    assert found.flags[0].spoils == ("body_rotation_rate",)
+    assert found.angle is angle
+
+
+def test_stripes_by_hand_that_turn_by_a_part_of_a_turn_are_believed():
+    """Widths evenly spread up to a fifth; by chance some are all to one side, one film in fifty."""
+    doubted = 0
+    for seed in range(60):
+        widths = 1.0 + 0.2 * np.random.default_rng(seed).uniform(-1.0, 1.0, COUNT)
+        places = with_widths(*(widths * COUNT / widths.sum()))
+        angle, read, edges, _ = planted(0.05 + 0.004 * seed, noise=np.radians(0.3), places=places - places.mean())
+        found = evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD)
+        doubted += "stripes-do-not-fit" in [flag.name for flag in found.flags]
+    assert doubted <= 4
+
+
 def test_even_stripes_are_left_as_they_are():
     angle, read, edges, _ = planted(-0.25, noise=np.radians(0.3), places=np.zeros(COUNT))
     found = evened(angle, read, np.full(angle.size, 0.004), edges, PERIOD)

@@ -303,14 +303,14 @@ def _drifts(track: Track, name: str) -> list[float]:
 
 
 def _velocity(rate: Rate, track: Track, tilt: float) -> Measured:
-    """The forward velocity; its interval includes the uncertainty of the scale, and that by a tilt, m/s."""
+    """The forward velocity; its interval includes the uncertainty of scale and time, and that by a tilt, m/s."""
     pixel = track.scale.length_per_pixel if math.isfinite(track.scale.length_per_pixel) else 0.0
     scale = track.scale.relative_uncertainty * abs(rate.value)
     bare = any(flag.name in ("no-stripes", "stripes-do-not-fit") for flag in track.flags)  # no edges at the seal
     least = (DRIFT_BARE if bare else DRIFT_PIXELS) * pixel
     read = any(flag.name in (BY_HAND, IMPORTED) for flag in track.flags)
     drift = _drift(track, least if read else max(least, _wander(rate)))
-    return _with_errors(rate, "m/s", drift, scale, tilt, track.drift)
+    return _with_errors(rate, "m/s", drift, scale, tilt, track.drift, _timing(rate, track))
 
 
 def _wander(rate: Rate) -> float:

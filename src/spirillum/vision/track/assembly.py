@@ -19,7 +19,7 @@ from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
 from spirillum.vision.track.motion import Motion
-from spirillum.vision.track.size import checked_scale
+from spirillum.vision.track.size import LENGTHS, checked_scale
 from spirillum.vision.track.steps import Record
 from spirillum.vision.track.sway import Swayed, swayed_by
 from spirillum.vision.track.track import Track
@@ -35,6 +35,13 @@ _DOUBTFUL_STRIPES = Flag(
     "the stripes seem uneven on a body that is not as large as it should be: the wrong scale may be the reason; the "
     "body's rotation is not given: correct spacing, heights or robot file first",
     ("body_rotation_rate",),
+)
+
+_DOUBTFUL_SCALE = Flag(
+    "scale-does-not-fit",
+    "neither the body's size nor the widths of its stripes are as they should be at this scale: another outline may be "
+    "taken for the body's, and no length is given; correct spacing, heights or robot file first",
+    LENGTHS,
 )
 
 
@@ -84,6 +91,8 @@ def track_of(
     scale, size_flags = checked_scale(sight.scale, body, known.size, setup.markers.spacing)
     if even.flags and any(flag.spoils for flag in size_flags):
         roll_flags = (*roll_flags, _DOUBTFUL_STRIPES)
+    elif size_flags and any(flag.spoils for flag in even.flags):
+        roll_flags = (*roll_flags, _DOUBTFUL_SCALE)
     hand = known.wire.handedness()
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))

@@ -9,7 +9,7 @@ compiled loops (`spirillum.kernels`) keep theirs as compile-time constants, beca
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import radians, sqrt
 
 __all__ = [
     "COLOURS",
@@ -406,6 +406,12 @@ class WidthConstants:
     On six degraded films even stripes reached 7.5, on two others stripes uneven by a fifth 17 and 43."""
     left: float = 0.05
     """Share of that range that is left as an error of each angle. Assumed."""
+    widest: float = 0.24
+    """Largest difference of a stripe's width from an even one, over that: by hand they differ by up to a fifth."""
+    painted: float = 0.2 / sqrt(3.0)
+    """Standard deviation of the widths of stripes by hand, over an even one: evenly spread up to a fifth."""
+    together: float = 2.5
+    """Mean difference of the widths that are known over its standard deviation from which on it is not of paint."""
 
 
 @dataclass(frozen=True)
@@ -553,6 +559,14 @@ class LostFramesConstants:
     """Least standard error of a step of the place, pixels."""
     half: float = 0.5
     """Standard error of a loss that one series alone tells, over the loss."""
+    repeats: float = 16.0
+    """Chi-square by which a step of no motion has to fit better than any other for a repeated frame."""
+    repeats_power: float = 25.0
+    """Chi-square of the loss of one frame below which noise looks like repeated frames."""
+    stands: int = 5
+    """Most repeated frames within as many steps to both sides; beyond it, the robot stands."""
+    repeats_error: float = 0.75
+    """Standard error of the film's length by each repeated frame, frames: 0 or 1 is too much, and some are not seen."""
 
 
 @dataclass(frozen=True)

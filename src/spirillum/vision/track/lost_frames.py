@@ -3,6 +3,10 @@
 A simple recording script states even times, or a constant rate, whatever the camera delivered. Where k frames are
 lost, all of the motion goes on by 1 + k steps on one frame. In steady motion each step gives its own estimate of k:
 sum of squares over the three series, each step modulo the period of its angle, weighted by the scatter of its steps.
+
+A frame that is repeated is a step of no motion between usual ones. Either the recorder stored a picture twice, and what
+follows comes a frame too late; or the film was converted from a lower frame rate, and its times are right. Both look
+alike, so that times are kept, and their uncertainty holds both.
 """
 
 from __future__ import annotations
@@ -82,8 +86,26 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
             lost += more
             if not more.any():
                 break
-    if not lost.any():
-        return none
+    found = _put_back(time, readings, lost, odd) if lost.any() else none
+    if any(flag.spoils for flag in found.flags):
+        return found
+    repeats = _repeated(found.time, readings, frame)
+    if not repeats:
+        return found
+    doubt = LOST_FRAMES.repeats_error * repeats * frame / float(found.time[-1] - found.time[0])
+    return Restored(found.time, found.relative_error + doubt, (*found.flags, _repeats(repeats, lost.size)))
+
+
+def _put_back(time: Samples, readings: tuple[Reading, ...], lost: np.ndarray, odd: np.ndarray) -> Restored:
+    """Times with the losses that were found put back, or why nothing is given.
+
+    Args:
+        time: times, s, (n,).
+        readings: the series.
+        lost: frames lost at each step, (n - 1,).
+        odd: mask of steps that stand out without being whole frames, (n - 1,).
+    """
+    none, frame = Restored(time, 0.0, ()), float(np.median(np.diff(time)))
     after = _all_jumps(_later(time, lost, frame), readings, frame, LOST_FRAMES.windows[-1])
     many = np.count_nonzero(lost) > LOST_FRAMES.largest_share * lost.size
     power = sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in after)
@@ -101,6 +123,24 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     doubt = (LOST_FRAMES.half * float(np.sqrt(np.sum(lost**2))) if alone else 0.0) + stray
     length = float(corrected[-1] - corrected[0])
     return Restored(corrected, doubt * frame / length, (_corrected(lost, doubtful=doubt > 0),))
+
+
+def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int:
+    """Number of frames that show no motion between frames that do.
+
+    Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
+    """
+    series = _all_jumps(time, readings, frame, 1)
+    if not series:
+        return 0
+    if sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series) < LOST_FRAMES.repeats_power:
+        return 0
+    misfit = np.asarray(sum(_misfit(one, np.arange(-1, LOST_FRAMES.most + 1)) for one in series))
+    fit = misfit < LOST_FRAMES.fits * len(series)
+    still = fit[:, 0] & (misfit[:, 1:].min(axis=1) - misfit[:, 0] > LOST_FRAMES.repeats)
+    twice = fit[:, 2] & (misfit[:, 1] - misfit[:, 2] > LOST_FRAMES.apart)
+    stands = np.convolve(still, np.ones(2 * LOST_FRAMES.stands + 1), "same") > LOST_FRAMES.stands
+    return int(np.sum(still & ~stands & ~np.append(twice[1:], False)))
 
 
 def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
@@ -245,6 +285,17 @@ def _corrected(lost: np.ndarray, *, doubtful: bool) -> Flag:
     if doubtful:
         words += "; not all of the series show it, so that all intervals are wider"
     return Flag("lost-frames", words + " (record with the camera's own time stamps)")
+
+
+def _repeats(count: int, steps: int) -> Flag:
+    frames = "1 frame repeats the one before" if count == 1 else f"{count} frames repeat the one before"
+    low = 100.0 * count / (steps - count)
+    sentence = (
+        f"{frames}: nothing moves there, and the next step is a usual one; if the recorder stored pictures twice, all "
+        f"rates are {low:.2g} % too low, if the film was converted from a lower frame rate, they are right: the "
+        "intervals hold both (record with the camera's own time stamps, at its own frame rate)"
+    )
+    return Flag("repeated-frames", sentence)
 
 
 def _uneven(count: int) -> Flag:

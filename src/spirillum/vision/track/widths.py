@@ -93,6 +93,8 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
     off = float(np.ptp(places[seen])) if seen.any() else 0.0
     if off < max(WIDTHS.uneven, WIDTHS.clear * scatter):
         return untouched
+    if (wide := _not_of_paint(places)) is not None:
+        return Evened(angle, error, (wide,))
     weight = (np.isfinite(shifts) & seen).astype(float)
     total = np.maximum(weight.sum(axis=1), 1e-9)
     own = np.sum(weight * np.nan_to_num(shifts - places), axis=1) / total
@@ -106,6 +108,34 @@ def evened(angle: Samples, read: Samples, error: Samples, edges: Samples, period
         "and used"
     )
     return Evened(better, surer, (Flag("uneven-stripes", sentence),))
+
+
+def _not_of_paint(places: Samples) -> Flag | None:
+    """A flag if widths differ as no painter's do: by too much, or, of those that are known, all to the same side.
+
+    All widths add up to a whole turn. Of n that are drawn by chance and scaled so, the mean of k has the standard
+    deviation s sqrt((n - k)/(k (n - 1))).
+
+    Args:
+        places: shift of each edge, rad, (stripes,); NaN where unknown.
+    """
+    count = places.size
+    off = np.diff(np.append(places, places[0])) * count / (2.0 * np.pi)
+    off = off[np.isfinite(off)]
+    if not off.size:
+        return None
+    scatter = WIDTHS.painted * np.sqrt(max(count - off.size, 0) / (off.size * (count - 1)))
+    to_one_side = off.size < count and abs(off.mean()) > WIDTHS.together * scatter
+    if np.abs(off).max() <= WIDTHS.widest and not to_one_side:
+        return None
+    most = off[np.argmax(np.abs(off))]
+    far = f"{100.0 * abs(most):.0f} % {'wider' if most > 0 else 'narrower'}"
+    sentence = (
+        f"the stripes look up to {far} than even ones, and not as paint is: their number or order, the body's "
+        "diameter, the scale, or pixels that are not square may be the reason; the body's rotation is not given: count "
+        "the stripes, and compare the ruler's spacing"
+    )
+    return Flag("stripes-do-not-fit", sentence, ("body_rotation_rate",))
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:
