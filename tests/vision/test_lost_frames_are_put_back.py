@@ -93,6 +93,16 @@ def test_a_repeated_frame_that_makes_up_for_a_lost_one_and_a_robot_that_stands_a
     assert "repeated-frames" not in restored(*repeating(stands)[::2])[1]
 
 
+def test_a_robot_that_stops_is_said_to_stand() -> None:
+    time, _, readings = repeating([1 if k < 150 else 0 for k in range(300)])
+    found, names = restored(time, readings)
+    assert names in ([], ["stands-for-a-while"])
+    time, _, readings = repeating([1 if k < 60 or k >= 90 else 0 for k in range(150)])
+    found, names = restored(time, readings)
+    assert names == ["stands-for-a-while"]
+    assert "stands from 2.0" in found.flags[0].sentence
+
+
 def test_true_gaps_are_no_loss() -> None:
     _, true, readings = film(21, 3)
     assert restored(true, readings)[1] == []

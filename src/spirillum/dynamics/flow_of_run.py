@@ -46,6 +46,8 @@ _NEEDED = ("time", *_SCALARS, *_VECTORS, "attitude")
 _OWN_NAMES = {"gap": "wall_gap", "pitch": "wall_pitch", "yaw": "wall_yaw", "flow": "mean_flow"}
 """Variables of a run by the fields of a placement that they become."""
 
+_SAME_TIME = 1e-3
+"""Share of the time between two samples within which a moment is that of a sample."""
 _TOLERANCE = 0.03
 _THINNEST = 0.02
 """Thinnest film that is drawn, in diameters of the body: thinner ones of a yawed robot take many minutes."""
@@ -94,7 +96,7 @@ def flow_of_run(
         )
     now = _sample(dataset, int(np.argmin(np.abs(times - moment))))
     nearest = float(now["time"])
-    if abs(nearest - moment) > 1e-9:
+    if abs(nearest - moment) > _SAME_TIME * float(np.min(np.diff(times), initial=np.inf)):
         said = (
             f"the run has no sample at {show(moment, 's')}: the flow is that at the nearest one, {show(nearest, 's')}"
         )

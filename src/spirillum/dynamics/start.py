@@ -52,11 +52,14 @@ def start_phase(robot: Robot) -> float:
 
 def _check(robot: Robot, placement: Placement) -> None:
     unset = Placement()
-    for name in ("yaw", "tail_drop", "ends", "flow"):
-        if getattr(placement, name) != getattr(unset, name):
+    kinds = {"yaw": "deg", "tail_drop": "mm", "ends": "", "flow": "mm/s"}
+    for name, unit in kinds.items():
+        value = getattr(placement, name)
+        if value != getattr(unset, name):
+            said = show(value, unit) if unit else f"'{value}'"
             raise InputError(
-                f"placement.{name} = {getattr(placement, name)} is nothing that a free run knows; allowed: gap or "
-                "eccentricity, and pitch"
+                f"placement.{name} = {said} is nothing that a free run knows by a model without walls; allowed: gap or "
+                "eccentricity, and pitch, or model 'tube'"
             )
     if robot.channel is None and (placement.gap is not None or placement.eccentricity is not None):
         name = "gap" if placement.gap is not None else "eccentricity"

@@ -330,8 +330,8 @@ def _floating(robot: Robot) -> tuple[str, ...]:
     if weight is None or weight.value > 0:
         return ()
     return (
-        f"the robot floats: its submerged weight is {weight.value:.3g} N, while axial motion rests on a robot that "
-        "its weight keeps on the channel's floor",
+        f"the robot floats: its submerged weight is {weight.value:.3g} N; held motions rest on a robot that its "
+        "weight keeps on the channel's floor, and a free one rises",
     )
 
 

@@ -71,13 +71,19 @@ def _averages(title: str, answer: Answer) -> Table:
     table = grid(title, "mean", "last 2/3", "while on", "while steady", "unit")
     for name in (name.removesuffix("_on") for name in answer if name.endswith("_on")):
         items = [answer.get(name, _NONE), answer[f"{name}_on"], answer[f"{name}_steady"]]
-        sized = next((item for item in items if item["value"] is not None), items[1])
-        unit = display_unit(sized["value"], sized["unit"])
-        values = [in_unit(item["value"], sized["unit"], unit) for item in items]
+        most = max((abs(item["value"]) for item in items if item["value"] is not None), default=None)
+        unit = display_unit(most, items[1]["unit"])
+        values = [in_unit(_rounded(item["value"], most), items[1]["unit"], unit) for item in items]
         table.add_row(name.removeprefix("mean_").replace("_", " "), *values, unit)
     return table
 
 
+def _rounded(value: float | None, most: float | None) -> float | None:
+    """A value without what is rounding error beside the largest one: a robot at rest has no speed of 1e-19 m/s."""
+    return 0.0 if value is not None and most is not None and abs(value) <= _ROUNDING * most else value
+
+
+_ROUNDING = 1e-12
 _NONE: Answer = {"value": None}
 """Of the time, which has no mean."""
 

@@ -87,9 +87,12 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
             if not more.any():
                 break
     found = _put_back(time, readings, lost, odd) if lost.any() else none
-    if any(flag.spoils for flag in found.flags):
-        return found
-    repeats = _repeated(found.time, readings, frame)
+    uneven = any(flag.spoils for flag in found.flags)
+    repeats = 0 if uneven else _repeated(found.time, readings, frame)
+    if uneven or repeats:
+        still = _standing(time, readings)
+        if still is not None:
+            return none._replace(flags=(_stands(*still),))
     if not repeats:
         return found
     doubt = LOST_FRAMES.repeats_error * repeats * frame / float(found.time[-1] - found.time[0])
@@ -141,6 +144,27 @@ def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int
     twice = fit[:, 2] & (misfit[:, 1] - misfit[:, 2] > LOST_FRAMES.apart)
     stands = np.convolve(still, np.ones(2 * LOST_FRAMES.stands + 1), "same") > LOST_FRAMES.stands
     return int(np.sum(still & ~stands & ~np.append(twice[1:], False)))
+
+
+def _standing(time: Samples, readings: tuple[Reading, ...]) -> tuple[float, float] | None:
+    """First and last time at which nothing moves, s, in a film in which much moves at other times; else None."""
+    steps = []
+    for reading in readings:
+        known = np.flatnonzero(np.isfinite(reading.values))
+        if known.size > 2 * LOST_FRAMES.standing:
+            off = _wrapped(np.diff(reading.values[known]), reading.period) / np.diff(known)
+            every = np.interp(np.arange(time.size), known[1:], off)
+            few = LOST_FRAMES.standing // 3
+            means = np.abs(sliding_window_view(every, few).mean(axis=1))
+            usual = float(np.quantile(means, 0.9))
+            if usual > LOST_FRAMES.told * float(mad_scale(np.diff(off))) / few:  # errors of steps cancel in a row
+                steps.append(sliding_window_view(means, LOST_FRAMES.standing - few + 1).max(axis=1) / usual)
+    if len(steps) < 2:
+        return None
+    still = np.flatnonzero(np.max(steps, axis=0) < LOST_FRAMES.still)
+    if not still.size:
+        return None
+    return float(time[still[0]]), float(time[still[-1] + LOST_FRAMES.standing - 1])
 
 
 def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
@@ -298,9 +322,18 @@ def _repeats(count: int, steps: int) -> Flag:
     return Flag("repeated-frames", sentence)
 
 
-def _uneven(count: int) -> Flag:
+def _stands(first: float, last: float) -> Flag:
     sentence = (
-        f"on {count} frames the motion goes on by more than a step while the times go on evenly, but not clearly by "
+        f"the robot stands from {first:.2f} s to {last:.2f} s, its tail too, and moves at other times; nothing is "
+        "given: choose the part in which it moves (start and end of the setup)"
+    )
+    return Flag("stands-for-a-while", sentence, EVERYTHING)
+
+
+def _uneven(count: int) -> Flag:
+    frames = "1 frame" if count == 1 else f"{count} frames"
+    sentence = (
+        f"on {frames} the motion goes on by more than a step while the times go on evenly, but not clearly by "
         "whole frames: frames were lost, strong compression of the video holds motion back, or the motor stutters; "
         "nothing is given: record with the camera's own time stamps, and compress less"
     )
