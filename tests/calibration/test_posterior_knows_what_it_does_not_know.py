@@ -53,7 +53,7 @@ def test_chains_that_have_not_mixed_are_refused_loudly(
 
     from spirillum.cli import main
 
-    monkeypatch.setattr("spirillum.calibration.posterior.Sampling", lambda seed: hasty)
+    monkeypatch.setattr("spirillum.calibration.posterior.Sampling", lambda **_: hasty)
     with pytest.raises(SystemExit) as stopped:
         main(["calibrate", str(made()), WIDE, "biorob2012-narrow", "-o", str(tmp_path), "--no-figures"])
     assert stopped.value.code == 1

@@ -26,7 +26,7 @@ LARGEST_RHAT = 1.01
 FEWEST_EFFECTIVE = 400.0
 """Smallest effective sample size, of bulk and tails."""
 ENSEMBLES = 4
-_DOUBLINGS = 3
+_MOST_DOUBLINGS = 10
 
 
 @dataclass(frozen=True)
@@ -43,13 +43,16 @@ class Sampling:
     kept: int = 100
     """Draws of each walker that stay in the answer."""
     seed: int = 1
-    doublings: int = _DOUBLINGS
+    doublings: int = 3
+    """How often sampling goes on for twice as long, as long as the chains have not mixed."""
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             check_kind(name, value, "int")
         if self.seed < 0:
             raise InputError(f"seed = {self.seed}; allowed: a whole number from 0")
+        if not 0 <= self.doublings <= _MOST_DOUBLINGS:
+            raise InputError(f"doublings = {self.doublings}; allowed: a whole number from 0 to {_MOST_DOUBLINGS}")
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ class Posterior:
             found.append(f"the chains have not mixed: R-hat above {LARGEST_RHAT:g} for {', '.join(bad)}")
         if few:
             found.append(f"too few effective draws: below {FEWEST_EFFECTIVE:g} for {', '.join(few)}")
-        return found
+        return [f"{sentence}; more doublings sample for longer" for sentence in found]
 
     @property
     def flat(self) -> Samples:

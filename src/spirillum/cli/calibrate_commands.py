@@ -67,6 +67,9 @@ def calibrate(
         bool, typer.Option("--no-figures", help="Draw no figures, which takes some seconds.")
     ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 1,
+    doublings: Annotated[
+        int, typer.Option(help="How often sampling may go on for twice as long, until the chains have mixed.")
+    ] = 3,
     settings: Settings = None,
     json: Json = False,
 ) -> None:
@@ -82,8 +85,11 @@ def calibrate(
 
     robots = [loaded_robot(name, settings) for name in robot]
     check_not_set(set_fields(overrides_from(settings)), free, model)
-    if method in METHODS and method != "posterior" and given_options(context, "seed"):
-        raise InputError(f"--seed with method '{method}', which samples no posterior; allowed: with method posterior")
+    sampler = given_options(context, "seed", "doublings")
+    if method in METHODS and method != "posterior" and sampler:
+        raise InputError(
+            f"{sampler[0]} with method '{method}', which samples no posterior; allowed: with method posterior"
+        )
     with renderer.progress_bar(quiet=json) as progress:
         found = answer(
             observations,
@@ -94,7 +100,7 @@ def calibrate(
             method=method,
             friction=friction,
             assume_uncertainty=_stated(assume_uncertainty or ()),
-            sampling=Sampling(seed=seed),
+            sampling=Sampling(seed=seed, doublings=doublings),
             prepare=prepare,
             figures=not no_figures,
             progress=progress,
