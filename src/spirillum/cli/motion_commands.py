@@ -140,6 +140,15 @@ def simulate(
         str | None,
         typer.Option(metavar="TIME", help="Free, tube: lie with the motor off before the run.", rich_help_panel=_START),
     ] = None,
+    continued: Annotated[
+        Path | None,
+        typer.Option(
+            "--continue",
+            metavar="FILE",
+            help="Free, tube: a run that ended early or was interrupted; what comes behind it is written.",
+            rich_help_panel=_START,
+        ),
+    ] = None,
     field_yaw: Annotated[
         str | None,
         typer.Option(
@@ -233,6 +242,7 @@ def simulate(
                 "wait": wait,
                 "friction_coefficient": friction_coefficient,
                 "flow": flow if over_time else None,
+                "continued": continued,
             },
             field={"yaw": field_yaw, "pitch": field_pitch},
             progress=progress,

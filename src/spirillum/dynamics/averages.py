@@ -33,18 +33,19 @@ class Stretch(NamedTuple):
     """s."""
 
 
-def stretches_on(switches: Sequence[Switch], end: float) -> list[Stretch]:
+def stretches_on(switches: Sequence[Switch], end: float, begin: float = 0.0) -> list[Stretch]:
     """Times at constant duty in which the drive is on.
 
     Args:
         switches: every switching, the first at 0.
         end: end of the run, or of its drive, s.
+        begin: beginning of the run, s.
     """
     found: list[Stretch] = []
     before = 0.0
     ends = [*(switch.time for switch in switches[1:]), end]
-    for (start, duty), after in zip(switches, ends, strict=True):
-        stop = min(after, end)
+    for (switched, duty), after in zip(switches, ends, strict=True):
+        start, stop = max(switched, begin), min(after, end)
         if duty > 0 and stop > start:
             if found and before == duty and found[-1].end == start:
                 found[-1] = Stretch(found[-1].start, stop)
@@ -68,7 +69,7 @@ def run_averages(
     where there are none.
 
     Args:
-        time: sample times from 0 that contain the ends of all stretches, s, (n,).
+        time: sample times that contain the ends of all stretches, s, (n,).
         integrals: name of each average to the integral of its quantity at the samples, (n,), and the average's unit;
             `mean_forward_velocity` and `mean_tail_rotation_rate` among them.
         stretches: times at constant duty in which the drive is on.
@@ -76,7 +77,7 @@ def run_averages(
     """
     judged = [integrals[name][0] for name in ("mean_forward_velocity", "mean_tail_rotation_rate")]
     steady = [part for stretch in stretches if (part := _steady_part(time, judged, stretch, by_turn=by_turn))]
-    whole = [Stretch(float(time[-1]) / 3.0, float(time[-1]))]
+    whole = [Stretch(float(time[0] + (time[-1] - time[0]) / 3.0), float(time[-1]))]
     found: dict[str, tuple[Any, ...]] = {}
     for ending, over, note in (
         ("", whole, "average over the last two thirds of the run"),

@@ -95,8 +95,8 @@ def simulate(  # noqa: PLR0913 - the options of the command
             it is held.
         weight: let weight and buoyancy act on the free robot, if its masses are known.
         roughness: of the wall under the free robot, with its unit or a float in m; None: 1e-4 of the body's radius.
-        in_tube: with a free robot and `tube`: `azimuth`, `wait`, `friction_coefficient` and `flow` over time, see
-            `InTube`; its placement may have yaw, ends and a constant flow, too.
+        in_tube: with a free robot and `tube`: `azimuth`, `wait`, `friction_coefficient`, `flow` over time and
+            `continued`, see `InTube`; its placement may have yaw, ends and a constant flow, too.
         field: `yaw` and `pitch` of the axis about which the field turns a free robot with a magnet, with their units or
             floats in rad, up to 45 degrees; None: along +x.
         progress: told what is being computed, how much is done, and of how much.
@@ -135,7 +135,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
         _check_held(placed if fixed is None else Placement(), roughness, contact, str(source), weight=weight)
     elif not walled:
         check_full(find_swimmer_model(model))
-    _check_in_tube(asked, model, walled=walled)
+    _check_in_tube(asked, model, walled=walled, drawn=known is not None)
     if walled:
         check_not_resolved(own, resolution)
 
@@ -237,8 +237,8 @@ def _free_run(
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
 
 
-def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
-    """Refuse settings of a free run in a tube for any other.
+def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:
+    """Refuse settings of a free run in a tube for any other, and to continue one with draws of a posterior.
 
     Raises:
         InputError: if one is given.
@@ -247,6 +247,11 @@ def _check_in_tube(asked: InTube, model: str, *, walled: bool) -> None:
         name = next(name for name, value in asked.model_dump().items() if value != getattr(InTube(), name))
         raise InputError(
             f"in_tube.{name} is given with model '{model}'; allowed: only with model 'tube', motion 'free'"
+        )
+    if drawn and asked.continued is not None:
+        raise InputError(
+            "in_tube.continued is given together with a posterior, each draw of which moves in its own way; allowed: "
+            "one of them"
         )
 
 

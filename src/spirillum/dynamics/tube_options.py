@@ -34,6 +34,12 @@ def _file(value: Any) -> Any:
     return value
 
 
+def _run(value: Any) -> Any:
+    if not (value is None or isinstance(value, (str, Path))):
+        raise refusal(f"= {str(value)[:40]}; allowed: the file of a run in a tube, by `spirillum simulate`")
+    return value
+
+
 class InTube(Options):
     """Start, surroundings and contact of a run in a tube, beside its placement."""
 
@@ -48,6 +54,8 @@ class InTube(Options):
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
     flow: Annotated[str | Path | None, BeforeValidator(_file)] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
+    continued: Annotated[str | Path | None, BeforeValidator(_run)] = None
+    """File of a run of the robot that ended early, continued after its last sample as if it had not ended."""
 
 
 def with_contact(contact: FittedContact, roughness: float | None, asked: InTube) -> tuple[float | None, InTube]:

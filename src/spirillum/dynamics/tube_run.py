@@ -93,7 +93,7 @@ def tube_run(
         what = run.events[-1].what if run.events else "the equations have no next step"
         raise InputError(f"the run ends where it starts: {what}; allowed: another start, or a longer channel")
     driven = min((event.time for event in run.events if event.what == BATTERY_EMPTY), default=float(run.time[-1]))
-    on = stretches_on(times.switches, driven)
+    on = stretches_on(times.switches, driven, float(run.time[0]))
     ended = float(run.time[-1])
     said = [*steady.warnings]
     if ended < times.end:

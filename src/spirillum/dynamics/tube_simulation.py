@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Progress
+from spirillum.dynamics.run_file import open_run
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.table_check import held_against_check
 from spirillum.dynamics.timing import Timing
@@ -71,7 +72,8 @@ def run_in_tube(
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
     links = in_tilted_field(links, field)
     turn = links.turn
-    dataset = tube_run(steady, links, start, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
+    begun = start if asked.continued is None else _run_before(asked.continued, robot, table)
+    dataset = tube_run(steady, links, begun, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
@@ -152,8 +154,44 @@ def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: flo
             f"placement.tail_drop = {show(placed.tail_drop, 'mm')} is nothing that a free run knows; allowed: 0 mm"
         )
     _around(robot, placed, asked, roughness)
+    if asked.continued is not None:
+        _check_continued(placed, asked)
+        return
     if roughness is not None and robot.channel is not None:
         check_roughness(roughness, gap_of(placed, robot.body.diameter, 0.5 * robot.channel.diameter))
+
+
+def _check_continued(placed: Placement, asked: InTube) -> None:
+    """Refuse another start of a run that begins where another one ended.
+
+    Raises:
+        InputError: if there is one.
+    """
+    starts: dict[str, Any] = {
+        **{f"placement.{name}": getattr(placed, name) for name in ("gap", "eccentricity", "pitch", "yaw")},
+        "in_tube.azimuth": asked.azimuth,
+        "in_tube.wait": asked.wait,
+    }
+    for name, value in starts.items():
+        if value:
+            raise InputError(
+                f"{name} is given together with in_tube.continued, which begins where that run ended; allowed: one of "
+                "them"
+            )
+
+
+def _run_before(path: str | Path, robot: Robot, table: TubeTable) -> xr.Dataset:
+    """A run that is continued.
+
+    Raises:
+        InputError: if the file is none, or of another robot or tube.
+    """
+    found = open_run(path)
+    own, other = table.key, str(found.attrs.get("table", ""))
+    if other != own:
+        what = "no run in a tube" if not other else f"a run of another robot, tube or version than {robot.name}'s"
+        raise InputError(f"in_tube.continued = {str(path)[:80]}: {what}; allowed: an earlier run of this robot")
+    return found
 
 
 def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> Surroundings:

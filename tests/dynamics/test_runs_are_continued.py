@@ -1,0 +1,68 @@
+"""A run in the tube that is continued is one run: to rounding, with means of its own part."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import spirillum as sp
+from spirillum.errors import InputError
+
+WIDE = "biorob2012-wide"
+
+
+def run(duration: str, **more: Any) -> xr.Dataset:
+    return sp.simulate(WIDE, model="tube", timing={"duration": duration, "on": [("0.1 s", "0.5 s")]}, **more)
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("runs") / "early.nc"
+    run("0.3 s").to_netcdf(path)
+    return path
+
+
+def test_a_continued_run_is_the_run_that_had_not_ended(early: Path) -> None:
+    whole, rest = run("0.6 s"), run("0.6 s", in_tube={"continued": early})
+    begun = float(rest.time[0])
+    assert 0.0 < begun - float(xr.open_dataset(early).time[-1]) < 0.01
+    assert float(rest.time[-1]) == pytest.approx(float(whole.time[-1]))
+    same = whole.sel(time=rest.time.values, method="nearest")
+    assert np.allclose(same.time, rest.time, rtol=0.0, atol=1e-12)
+    for name in ("position", "velocity", "wall_gap", "azimuth", "tail_angle", "body_angle", "electrical_energy"):
+        assert np.allclose(same[name], rest[name], rtol=1e-9, atol=1e-9 * float(np.abs(whole[name]).max())), name
+    assert float(rest.time_on) == pytest.approx(0.5 - begun)
+    x = rest.position.values[:, 0]
+    first = float(np.interp(begun + (0.6 - begun) / 3.0, rest.time, x))
+    assert float(rest.mean_forward_velocity) == pytest.approx((x[-1] - first) / ((0.6 - begun) * 2.0 / 3.0), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"placement": {"gap": "1 mm"}}, "placement.gap is given together with in_tube.continued"),
+        ({"in_tube": {"wait": "1 s"}}, "in_tube.wait is given together with in_tube.continued"),
+        (
+            {"motion": "held"},
+            "in_tube.continued is given with model 'tube'; allowed: only with",
+        ),
+    ],
+    ids=str,
+)
+def test_a_continued_run_has_one_start(early: Path, more: dict[str, Any], words: str) -> None:
+    settings = {"continued": early, **more.pop("in_tube", {})}
+    with pytest.raises(InputError, match=words):
+        run("0.6 s", in_tube=settings, **more)
+
+
+def test_only_a_run_of_the_same_robot_is_continued(early: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="a run of another robot, tube or version than biorob2012-narrow's"):
+        sp.simulate("biorob2012-narrow", model="tube", timing={"duration": "1 s"}, in_tube={"continued": early})
+    held = tmp_path / "held.nc"
+    sp.simulate(WIDE, model="sbt", motion="held", timing={"duration": "0.1 s"}).to_netcdf(held)
+    with pytest.raises(InputError, match="no run in a tube; allowed: an earlier run of this robot"):
+        run("0.6 s", in_tube={"continued": held})
+    with pytest.raises(InputError, match="the run already ends at t = "):
+        run("0.2 s", in_tube={"continued": early})
