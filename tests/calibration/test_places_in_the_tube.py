@@ -84,6 +84,16 @@ def one_gap(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_a_gap_that_explains_nothing_is_not_said_to_matter_nowhere(tmp_path: Path) -> None:
+    """A robot ten times as slow as at any gap: the fit ends where the range does, and a gap is seen elsewhere."""
+    speed, tail, body = by_table(NARROW, 3e-4)
+    path = written(tmp_path / "slow.csv", {NARROW: (0.1 * speed, tail, 0.1 * body)})
+    with pytest.raises(
+        InputError, match=r"free = 'gap': the fit drives it to the end of its range, 0\.1 mm, and no value"
+    ):
+        sp.calibrate(path, [NARROW], model="tube", free="gap", method="least-squares")
+
+
 @pytest.mark.parametrize("ends", ["open", "closed"])
 @pytest.mark.parametrize(("gap", "pitch", "yaw"), [(3e-4, 0.0, 0.0), (3e-4, 0.03, 0.0), (8e-4, -0.01, 0.02)])
 def test_resistance_at_draws_is_that_of_the_model_at_each_place(

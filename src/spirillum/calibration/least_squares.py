@@ -18,6 +18,7 @@ from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.likelihood import DISCREPANCY_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
+from spirillum.units import display_unit, in_unit
 
 __all__ = [
     "FEWEST_LEFT",
@@ -177,16 +178,29 @@ def _check_count(problem: Problem) -> None:
 
 
 def _check_blind(problem: Problem, z: Samples) -> None:
-    """Refuse a free number on which nothing that was observed depends."""
-    columns = sensitivities(problem, z)
+    """Refuse a free number on which nothing that was observed depends, at all or where the fit drives it to."""
+    felt, at_start = _felt(problem, z), _felt(problem, problem.start)
     for place, item in enumerate(problem.coordinates):
-        felt = max(float(np.max(np.abs(s[problem.ratio(n).seen, place]))) for n, s in columns.items())
-        if felt < _BLIND:
+        if felt[place] < _BLIND <= at_start[place]:
+            value = problem.values_at(z)[item.label]
+            unit = display_unit(value, item.parameter.unit)
+            end = f"{in_unit(value, item.parameter.unit, unit)} {unit}".rstrip()
+            raise InputError(
+                f"free = '{item.label}': the fit drives it to the end of its range, {end}, and no value of it explains "
+                f"{problem.experiment.source}; allowed: another model, or other free parameters"
+            )
+        if felt[place] < _BLIND:
             need = "rotation rates of body and tail" if item.parameter.name == "body_rotation" else "other quantities"
             raise InputError(
                 f"free = '{item.label}': nothing observed in {problem.experiment.source} depends on it; allowed: "
                 f"observations of {need}, or without it"
             )
+
+
+def _felt(problem: Problem, z: Samples) -> Samples:
+    """Largest relative change of what was observed per unit of each coordinate, (free numbers,)."""
+    seen = [np.abs(s[problem.ratio(name).seen]).max(axis=0) for name, s in sensitivities(problem, z).items()]
+    return np.asarray(np.max(seen, axis=0))
 
 
 def weighted_residuals(
