@@ -179,22 +179,23 @@ def _check_count(problem: Problem) -> None:
 
 def _check_blind(problem: Problem, z: Samples) -> None:
     """Refuse a free number on which nothing that was observed depends, at all or where the fit drives it to."""
-    felt, at_start = _felt(problem, z), _felt(problem, problem.start)
-    for place, item in enumerate(problem.coordinates):
-        if felt[place] < _BLIND <= at_start[place]:
-            value = problem.values_at(z)[item.label]
-            unit = display_unit(value, item.parameter.unit)
-            end = f"{in_unit(value, item.parameter.unit, unit)} {unit}".rstrip()
-            raise InputError(
-                f"free = '{item.label}': the fit drives it to the end of its range, {end}, and no value of it explains "
-                f"{problem.experiment.source}; allowed: another model, or other free parameters"
-            )
-        if felt[place] < _BLIND:
-            need = "rotation rates of body and tail" if item.parameter.name == "body_rotation" else "other quantities"
-            raise InputError(
-                f"free = '{item.label}': nothing observed in {problem.experiment.source} depends on it; allowed: "
-                f"observations of {need}, or without it"
-            )
+    blind = np.flatnonzero(_felt(problem, z) < _BLIND)
+    if not blind.size:
+        return
+    item, source = problem.coordinates[blind[0]], problem.experiment.source
+    if _felt(problem, problem.start)[blind[0]] < _BLIND:
+        need = "rotation rates of body and tail" if item.parameter.name == "body_rotation" else "other quantities"
+        raise InputError(
+            f"free = '{item.label}': nothing observed in {source} depends on it; allowed: observations of {need}, or "
+            "without it"
+        )
+    value = problem.values_at(z)[item.label]
+    unit = display_unit(value, item.parameter.unit)
+    end = f"{in_unit(value, item.parameter.unit, unit)} {unit}".rstrip()
+    raise InputError(
+        f"free = '{item.label}': the fit drives it to the end of its range, {end}, and no value of it explains "
+        f"{source}; allowed: another model, or other free parameters"
+    )
 
 
 def _felt(problem: Problem, z: Samples) -> Samples:

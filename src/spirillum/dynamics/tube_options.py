@@ -28,16 +28,15 @@ _LARGEST = 64 << 20
 _LIMITS = ((0.0, 1e9), (-1e6, 1e6))
 
 
-def _file(value: Any) -> Any:
-    if not (value is None or isinstance(value, (str, Path))):
-        raise refusal(f"= {str(value)[:40]}; allowed: a flow file; a constant flow is placement.flow")
-    return value
+def _file(what: str) -> BeforeValidator:
+    """None, or the path of a file that is described in these words."""
 
+    def path(value: Any) -> Any:
+        if not (value is None or isinstance(value, (str, Path))):
+            raise refusal(f"= {str(value)[:40]}; allowed: {what}")
+        return value
 
-def _run(value: Any) -> Any:
-    if not (value is None or isinstance(value, (str, Path))):
-        raise refusal(f"= {str(value)[:40]}; allowed: the file of a run in a tube, by `spirillum simulate`")
-    return value
+    return BeforeValidator(path)
 
 
 class InTube(Options):
@@ -52,9 +51,9 @@ class InTube(Options):
     """Time for which the robot lies with its drive off before the run."""
     friction_coefficient: Annotated[float | None, BeforeValidator(in_range(0.0, 10.0))] = None
     """Coefficient of dry friction where asperities touch; None: 0.1, assumed; from 0 to about 0.3."""
-    flow: Annotated[str | Path | None, BeforeValidator(_file)] = None
+    flow: Annotated[str | Path | None, _file("a flow file; a constant flow is placement.flow")] = None
     """File of the mean flow over time, CSV with the columns `time_s`, `flow_mm_s`, instead of `placement.flow`."""
-    continued: Annotated[str | Path | None, BeforeValidator(_run)] = None
+    continued: Annotated[str | Path | None, _file("the file of a run in a tube, by `spirillum simulate`")] = None
     """File of a run of the robot that ended early, continued after its last sample as if it had not ended."""
 
 

@@ -86,7 +86,7 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
             lost += more
             if not more.any():
                 break
-    found = _put_back(time, readings, lost, odd) if lost.any() else none
+    found = _put_back(time, readings, frame, lost, odd) if lost.any() else none
     uneven = any(flag.spoils for flag in found.flags)
     repeats = 0 if uneven else _repeated(found.time, readings, frame)
     if uneven or repeats:
@@ -99,27 +99,28 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     return Restored(found.time, found.relative_error + doubt, (*found.flags, _repeats(repeats, lost.size)))
 
 
-def _put_back(time: Samples, readings: tuple[Reading, ...], lost: np.ndarray, odd: np.ndarray) -> Restored:
+def _put_back(
+    time: Samples, readings: tuple[Reading, ...], frame: float, lost: np.ndarray, odd: np.ndarray
+) -> Restored:
     """Times with the losses that were found put back, or why nothing is given.
 
     Args:
         time: times, s, (n,).
         readings: the series.
+        frame: usual time between two frames, s.
         lost: frames lost at each step, (n - 1,).
         odd: mask of steps that stand out without being whole frames, (n - 1,).
     """
-    none, frame = Restored(time, 0.0, ()), float(np.median(np.diff(time)))
     after = _all_jumps(_later(time, lost, frame), readings, frame, LOST_FRAMES.windows[-1])
     many = np.count_nonzero(lost) > LOST_FRAMES.largest_share * lost.size
-    power = sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in after)
     stray = int(np.sum(odd & ~(lost > 0)))
     if (
         many
-        or power < LOST_FRAMES.power
+        or _power(after) < LOST_FRAMES.power
         or stray > max(2.0, LOST_FRAMES.odd_share * lost.sum())
         or not all(_agrees(one, lost) for one in after)
     ):
-        return none._replace(flags=(_uneven(int(np.count_nonzero(lost)) + stray),))
+        return Restored(time, 0.0, (_uneven(int(np.count_nonzero(lost)) + stray),))
     corrected = _later(time, lost, frame)
     # A loss that one series alone tells is half believed.
     alone = sum(_sees(one, lost) for one in after) < 2
@@ -134,9 +135,7 @@ def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int
     Those that make up for a loss are none: the next step is twice as large. Nor is a robot that stands for a while.
     """
     series = _all_jumps(time, readings, frame, 1)
-    if not series:
-        return 0
-    if sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series) < LOST_FRAMES.repeats_power:
+    if _power(series) < LOST_FRAMES.repeats_power:
         return 0
     misfit = np.asarray(sum(_misfit(one, np.arange(-1, LOST_FRAMES.most + 1)) for one in series))
     fit = misfit < LOST_FRAMES.fits * len(series)
@@ -144,6 +143,11 @@ def _repeated(time: Samples, readings: tuple[Reading, ...], frame: float) -> int
     twice = fit[:, 2] & (misfit[:, 1] - misfit[:, 2] > LOST_FRAMES.apart)
     stands = np.convolve(still, np.ones(2 * LOST_FRAMES.stands + 1), "same") > LOST_FRAMES.stands
     return int(np.sum(still & ~stands & ~np.append(twice[1:], False)))
+
+
+def _power(series: list[_Jumps]) -> float:
+    """Chi-square by which the loss of one frame fits better than none; 0 without any series."""
+    return sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series)
 
 
 def _standing(time: Samples, readings: tuple[Reading, ...]) -> tuple[float, float] | None:
