@@ -12,6 +12,7 @@ import pytest
 
 import spirillum as sp
 from spirillum.dynamics import table_check, tube_integration
+from spirillum.dynamics.answer import run_answer
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_integration import integrate_in_tube, observed_at
 from spirillum.dynamics.tube_options import InTube, read_flow
@@ -467,6 +468,8 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     found = run_in_tube(steady, table, times, placed, asked, 1e-4, Field(), True, None)
     np.testing.assert_allclose(found["mean_flow"], np.interp(found["time"], [0, 1, 2], [0, 2e-3, -1e-3]), atol=1e-15)
     assert found.attrs["ends"] == "imposed flow"
+    assert run_answer(found)["in_tube"]["mean_flow"]["value"] == pytest.approx(0.75e-3, rel=1e-3)
+    assert "its last row" not in found.attrs["warnings"]
     assert found.attrs["wait"] == 2.0
     assert found.attrs["friction_coefficient"] == 0.2
     assert found.attrs["roughness"] == 1e-4
@@ -480,7 +483,11 @@ def test_what_a_user_asks_for_reaches_the_engine(made: Any, tmp_path: Any, monke
     file.write_text("time_s,flow_mm_s\n1,0\n2,1\n")
     late = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
     assert f"{file} begins at 1 s, and the run ends at 0.01 s" in late.attrs["warnings"]
+    file.write_text("time_s,flow_mm_s\n0,0\n0.005,1\n")
+    early = run_in_tube(steady, table, Timing(duration="0.01 s"), placed, InTube(flow=file), None, Field(), True, None)
+    assert f"{file} ends at 0.005 s, and the run at 0.01 s: from then on" in early.attrs["warnings"]
     open_ended = run_in_tube(steady, table, times, placed, InTube(), None, Field(), True, None)
+    assert "mean_flow" not in run_answer(open_ended)["in_tube"]
     assert open_ended.attrs["ends"] == "open"  # the channel has a length
     for text, words in (
         ("time_s,flow\n0,1\n", "columns"),

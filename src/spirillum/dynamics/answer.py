@@ -117,4 +117,14 @@ def _in_the_tube(dataset: xr.Dataset) -> dict[str, Any]:
             "friction_coefficient": quantity(float(attrs["friction_coefficient"]), "1"),
             "wait": quantity(float(attrs["wait"]), "s"),
         }
+        | _imposed_flow(dataset)
     }
+
+
+def _imposed_flow(dataset: xr.Dataset) -> dict[str, Any]:
+    """The mean velocity that is imposed on the fluid, over the run; nothing where ends are open or closed."""
+    if dataset.attrs["ends"] != "imposed flow":
+        return {}
+    time = dataset["time"].values
+    mean = float(dataset["mean_flow"].integrate("time")) / float(time[-1] - time[0])
+    return {"mean_flow": quantity(mean, "m/s", meaning="through the tube, over the run")}

@@ -128,13 +128,18 @@ def links_in_tube(
 
 
 def _flow_beyond(flow: Samples, end: float, source: str | Path) -> list[str]:
-    """A sentence on a flow file of several rows that begins after the run; none for any other."""
-    start = float(flow[0, 0])
-    if len(flow) == 1 or start < end:
+    """A sentence on a flow file of several rows whose times are not those of the run; none for any other."""
+    first, last = float(flow[0, 0]), float(flow[-1, 0])
+    if len(flow) == 1:
         return []
-    return [
-        f"{source} begins at {start:g} s, and the run ends at {end:.4g} s: the flow is that of its first row throughout"
-    ]
+    if first >= end:
+        return [
+            f"{source} begins at {first:g} s, and the run ends at {end:.4g} s: the flow is that of its first row "
+            "throughout"
+        ]
+    if last < end * (1.0 - 1e-9):
+        return [f"{source} ends at {last:g} s, and the run at {end:.4g} s: from then on the flow is its last row's"]
+    return []
 
 
 def check_in_tube(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> None:
