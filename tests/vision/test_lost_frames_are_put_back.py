@@ -93,14 +93,29 @@ def test_a_repeated_frame_that_makes_up_for_a_lost_one_and_a_robot_that_stands_a
     assert "repeated-frames" not in restored(*repeating(stands)[::2])[1]
 
 
-def test_a_robot_that_stops_is_said_to_stand() -> None:
-    time, _, readings = repeating([1 if k < 150 else 0 for k in range(300)])
-    found, names = restored(time, readings)
-    assert names in ([], ["stands-for-a-while"])
-    time, _, readings = repeating([1 if k < 60 or k >= 90 else 0 for k in range(150)])
+@pytest.mark.parametrize(("first", "last"), [(0, 90), (60, 90), (150, 240)])
+def test_a_robot_that_stands_for_a_while_is_said_to(first: int, last: int) -> None:
+    time, _, readings = repeating([0 if first <= k < last else 1 for k in range(240)])
     found, names = restored(time, readings)
     assert names == ["stands-for-a-while"]
-    assert "stands from 2.0" in found.flags[0].sentence
+    assert f"stands from {first / FPS:.1f}" in found.flags[0].sentence
+    assert found.time is time
+
+
+@pytest.mark.parametrize("there", [30, 60, 120])
+def test_a_robot_that_reverses_is_said_to(there: int) -> None:
+    """The same pictures back again: all three series change their sign."""
+    time, _, readings = repeating([1 if k < there else -1 for k in range(180)])
+    found, names = restored(time, readings)
+    assert names == ["reverses"]
+    assert f"reverses at about {there / FPS:.1f}" in found.flags[0].sentence
+    assert found.time is time
+
+
+@pytest.mark.parametrize(("noise", "seed"), [(1.0, 1), (3.0, 2), (10.0, 3), (30.0, 4)])
+def test_noise_is_no_change_of_motion(noise: float, seed: int) -> None:
+    time, _, readings = film(0, seed, noise=noise)
+    assert not {"stands-for-a-while", "reverses"} & set(restored(time, readings)[1])
 
 
 def test_true_gaps_are_no_loss() -> None:

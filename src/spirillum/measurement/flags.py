@@ -34,6 +34,9 @@ _FOLLOWING = {"stripes-unreadable", "tail-unreadable", "short-turn"}
 """Flags that follow from too few frames, or from another object than the robot."""
 _OF_STRIPES = {"uneven-stripes", "stripes-do-not-pass", "short-turn"}
 """Flags that say nothing where the stripes are not those of the robot file."""
+_CHANGES = {"stands-for-a-while", "reverses"}
+_OF_CHANGES = {"video-is-cut", "does-not-advance"}
+"""Flags that say nothing more where the robot does not move one way throughout."""
 _ONCE = {"stripes-unreadable", "tail-unreadable"}
 """Flags of which only the first is kept."""
 
@@ -60,6 +63,8 @@ def flags_of(fits: Mapping[str, Rate], track: Track, robot: Robot, elongation: E
             implied |= {f"{kind}-{name.replace('_', '-')}" for kind in ("not-steady", "stray-frames")}
     if "stripes-do-not-fit" in names:
         implied |= _OF_STRIPES
+    if _CHANGES & names:
+        implied |= _OF_CHANGES
     if "not-the-robot" in names:
         implied |= {*_FOLLOWING, "nothing-moves"}
     count = track.time.size

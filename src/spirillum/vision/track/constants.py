@@ -566,9 +566,9 @@ class LostFramesConstants:
     stands: int = 5
     """Most repeated frames within as many steps to both sides; beyond it, the robot stands."""
     standing: int = 12
-    """Frames over which nothing moves where the robot stands."""
+    """Frames over which nothing moves where the robot stands, or everything the other way where it has reversed."""
     still: float = 0.4
-    """Motion of a third of these frames over the usual one below which nothing moves."""
+    """Motion of a third of these frames over the usual one below which nothing moves, or which goes the other way."""
     repeats_error: float = 0.75
     """Standard error of the film's length by each repeated frame, frames: 0 or 1 is too much, and some are not seen."""
 

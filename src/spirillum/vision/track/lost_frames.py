@@ -48,6 +48,15 @@ class Restored(NamedTuple):
     """What was corrected, or why nothing is given."""
 
 
+class _Change(NamedTuple):
+    """A motion that does not go on one way throughout."""
+
+    name: str
+    """Name of its flag."""
+    sentence: str
+    advice: str
+
+
 class _Jumps(NamedTuple):
     """Jumps of one series at each step, against the straight line through its neighbourhood."""
 
@@ -89,10 +98,14 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
     found = _put_back(time, readings, frame, lost, odd) if lost.any() else none
     uneven = any(flag.spoils for flag in found.flags)
     repeats = 0 if uneven else _repeated(found.time, readings, frame)
-    if uneven or repeats:
-        still = _standing(time, readings)
-        if still is not None:
-            return none._replace(flags=(_stands(*still),))
+    change = _change_of_motion(time, readings)
+    if change and (uneven or repeats):
+        return none._replace(
+            flags=(Flag(change.name, f"{change.sentence}; nothing is given: {change.advice}", EVERYTHING),)
+        )
+    if change:
+        means = Flag(change.name, f"{change.sentence}; rates are means from end to end: {change.advice}")
+        return found._replace(flags=(*found.flags, means))
     if not repeats:
         return found
     doubt = LOST_FRAMES.repeats_error * repeats * frame / float(found.time[-1] - found.time[0])
@@ -150,25 +163,28 @@ def _power(series: list[_Jumps]) -> float:
     return sum(float(np.nanmedian(one.usual) / one.error) ** 2 for one in series)
 
 
-def _standing(time: Samples, readings: tuple[Reading, ...]) -> tuple[float, float] | None:
-    """First and last time at which nothing moves, s, in a film in which much moves at other times; else None."""
-    steps = []
+def _change_of_motion(time: Samples, readings: tuple[Reading, ...]) -> _Change | None:
+    """What changes in a film in which nothing moves for a while, or everything the other way; None of any other."""
+    few = LOST_FRAMES.standing // 3
+    means = []
     for reading in readings:
         known = np.flatnonzero(np.isfinite(reading.values))
         if known.size > 2 * LOST_FRAMES.standing:
             off = _wrapped(np.diff(reading.values[known]), reading.period) / np.diff(known)
             every = np.interp(np.arange(time.size), known[1:], off)
-            few = LOST_FRAMES.standing // 3
-            means = np.abs(sliding_window_view(every, few).mean(axis=1))
-            usual = float(np.quantile(means, 0.9))
+            mean = sliding_window_view(every, few).mean(axis=1)
+            usual = float(np.quantile(np.abs(mean), 0.9))
             if usual > LOST_FRAMES.told * float(mad_scale(np.diff(off))) / few:  # errors of steps cancel in a row
-                steps.append(sliding_window_view(means, LOST_FRAMES.standing - few + 1).max(axis=1) / usual)
-    if len(steps) < 2:
+                moving = mean[np.abs(mean) > LOST_FRAMES.still * usual]
+                means.append(mean / usual * np.sign(moving[0]))
+    if len(means) < 2:
         return None
-    still = np.flatnonzero(np.max(steps, axis=0) < LOST_FRAMES.still)
-    if not still.size:
-        return None
-    return float(time[still[0]]), float(time[still[-1] + LOST_FRAMES.standing - 1])
+    over = sliding_window_view(np.array(means), LOST_FRAMES.standing - few + 1, axis=1)
+    still = np.flatnonzero(np.abs(over).max(axis=(0, 2)) < LOST_FRAMES.still)
+    if still.size:
+        return _stands(float(time[still[0]]), float(time[still[-1] + LOST_FRAMES.standing - 1]))
+    back = np.flatnonzero(over.max(axis=(0, 2)) < -LOST_FRAMES.still)
+    return _reverses(float(time[back[0]])) if back.size else None
 
 
 def _later(time: Samples, lost: np.ndarray, frame: float) -> Samples:
@@ -326,12 +342,20 @@ def _repeats(count: int, steps: int) -> Flag:
     return Flag("repeated-frames", sentence)
 
 
-def _stands(first: float, last: float) -> Flag:
-    sentence = (
-        f"the robot stands from {first:.2f} s to {last:.2f} s, its tail too, and moves at other times; nothing is "
-        "given: choose the part in which it moves (start and end of the setup)"
+def _stands(first: float, last: float) -> _Change:
+    return _Change(
+        "stands-for-a-while",
+        f"the robot stands from {first:.2f} s to {last:.2f} s, its tail too, and moves at other times",
+        "choose the part in which it moves (start and end of the setup)",
     )
-    return Flag("stands-for-a-while", sentence, EVERYTHING)
+
+
+def _reverses(moment: float) -> _Change:
+    return _Change(
+        "reverses",
+        f"the robot reverses at about {moment:.2f} s, its tail too",
+        "choose a part in which it moves one way (start and end of the setup)",
+    )
 
 
 def _uneven(count: int) -> Flag:
