@@ -205,6 +205,14 @@ def render(
     exposure: Annotated[
         str, typer.Option(metavar="TIME", help="Of each frame; else 1/120 s.", rich_help_panel=_CAMERA)
     ] = "8.3333333ms",
+    field_of_view: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LENGTH",
+            help="Width of the picture, 1mm to 1m, such as 5mm of a microscope; else 166.8 mm.",
+            rich_help_panel=_CAMERA,
+        ),
+    ] = None,
     distortion: Annotated[
         float, typer.Option(help="Coefficient k1 of the lens's radial distortion.", rich_help_panel=_CAMERA)
     ] = -0.02,

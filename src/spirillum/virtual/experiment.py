@@ -150,7 +150,7 @@ def virtual_experiment(
             first, without a study the one of `predict`.
         spread: relative standard deviation of the motor's rate from trial to trial, 0 to 0.3.
         duration: of each trial, with its unit or a float in s; None: as long as the robot is in view, at most 20 s.
-        camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
+        camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         seed: of all random numbers.
         jobs: trials that are rendered at the same time, 1 to 64.

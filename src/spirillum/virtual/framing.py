@@ -10,7 +10,7 @@ from spirillum.errors import InputError
 from spirillum.robot.robot import Robot
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.options import CameraOptions
-from spirillum.virtual.tank import Tank, tank_of
+from spirillum.virtual.tank import Tank, tube_height
 from spirillum.virtual.trajectory import TrialTrajectory
 
 __all__ = ["check_size", "framed", "lens_of", "swimming_range"]
@@ -22,7 +22,7 @@ _EYE = _SURFACE + 150e-3
 _INDEX = 1.40
 """Refractive index of silicone oil."""
 _FOCAL = 740.0 / 640.0
-"""Focal length over the picture's width; assumed."""
+"""Focal length over the width of the usual picture; assumed."""
 _SHORTEST, _LONGEST = 24, 2.0
 """Shortest robot in pixels, longest in widths of the picture."""
 
@@ -39,7 +39,8 @@ def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> Lens:
 
 def _ideal_lens(camera: CameraOptions) -> Lens:
     """The lens without tilt and distortion."""
-    return Lens(_EYE, _SURFACE, _INDEX, _FOCAL * camera.size[0], camera.size, leftwards=camera.leftwards)
+    focal = _FOCAL * camera.size[0] / camera.shrunk
+    return Lens(_EYE, _SURFACE, _INDEX, focal, camera.size, leftwards=camera.leftwards)
 
 
 def check_size(robot: Robot, tank: Tank, lens: Lens) -> None:
@@ -68,7 +69,7 @@ def swimming_range(robot: Robot, camera: CameraOptions) -> tuple[float, float]:
         robot: a checked robot.
         camera: view, direction and size of the picture; distortion is left out.
     """
-    low, high = _visible(_ideal_lens(camera), tank_of(robot, camera.view).tube_height)
+    low, high = _visible(_ideal_lens(camera), tube_height(robot, camera.view))
     rear, nose = _extent(robot)
     return low - rear, high - nose
 

@@ -62,7 +62,8 @@ class VirtualCamera:
         Args:
             robot: a preset's name, a robot file, its tables, or a loaded robot.
             pose: where it is at first, in the lab.
-            camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
+            camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view,
+                distortion.
             degradation: `clean`, `degraded`, or `Degradation`; frames are lost by whoever takes none.
             seed: of all random numbers.
 
@@ -71,7 +72,7 @@ class VirtualCamera:
         """
         self.camera, self.degradation = CameraOptions.of(camera), Degradation.of(degradation)
         self.robot, seed = load(robot), Seeded.of({"seed": seed}).seed
-        self._tank = tank_of(self.robot, self.camera.view)
+        self._tank = tank_of(self.robot, self.camera.view, self.camera.shrunk)
         self._lens = lens_of(self.camera, tilt_of(self.degradation, seed))
         check_size(self.robot, self._tank, self._lens)
         self._disturbances = Disturbances.of_robot(

@@ -10,9 +10,13 @@ from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
-from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity
+from spirillum.robot.fields import Angle, Length, LengthOrZero, Rate, SignedLength, Time, Velocity
 
 __all__ = ["CameraOptions", "MotionOptions", "Seeded", "SetupErrors", "TrialOptions"]
+
+_USUAL_FIELD = (150e-3 + 60e-3 / 1.40) * 640.0 / 740.0
+"""Width of the usual picture at the reference plane, m: the lens 150 mm above 60 mm of oil, seen through its surface,
+and a focal length of 740 pixels for a width of 640; assumed."""
 
 
 def _read_size(value: Any) -> tuple[int, int]:
@@ -34,6 +38,13 @@ def _check_heading(angle: float) -> float:
     if abs(angle) > math.radians(most) * (1.0 + 1e-9):
         raise refusal(f"= {math.degrees(angle):.4g} deg; allowed: {-most:g} to {most:g} deg")
     return angle
+
+
+def _check_field(width: float) -> float:
+    low, high = 1e-3, 1.0
+    if not low * (1.0 - 1e-9) <= width <= high * (1.0 + 1e-9):
+        raise refusal(f"= {1e3 * width:.4g} mm; allowed: {1e3 * low:g} to {1e3 * high:g} mm")
+    return width
 
 
 def _read_frame_rate(value: Any) -> float:
@@ -97,6 +108,9 @@ class CameraOptions(Options):
     """Width and height in pixels, even numbers, or ``"640x480"``."""
     exposure: Time = 1.0 / 120.0
     """Of each frame."""
+    field_of_view: Annotated[Length, AfterValidator(_check_field)] | None = None
+    """Width of the picture at the reference plane, 1 mm to 1 m; None: 166.8 mm, about nine of the paper's bodies. In a
+    smaller field, as a microscope's, the ruler and the structure of the floor are finer."""
     distortion: Annotated[float, BeforeValidator(in_range(-0.5, 0.5))] = -0.02
     """Coefficient k1 of the lens's radial distortion; beyond 0.5 the corners of a wide picture fold inwards."""
 
@@ -106,6 +120,11 @@ class CameraOptions(Options):
             sentence = f"exposure = {self.exposure:.4g} s; allowed: at most the {1.0 / self.fps:.4g} s of a frame"
             raise PydanticCustomError("assembly", "{sentences}", {"sentences": sentence})
         return self
+
+    @property
+    def shrunk(self) -> float:
+        """Width of the picture over that of the usual one."""
+        return 1.0 if self.field_of_view is None else self.field_of_view / _USUAL_FIELD
 
     @property
     def leftwards(self) -> bool:

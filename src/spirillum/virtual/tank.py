@@ -16,7 +16,9 @@ from spirillum.virtual.solids import linear
 __all__ = ["Tank", "backdrop", "spots", "tank_of", "tint", "tube_height"]
 
 _SPACING = 2e-3
-"""From one line of the ruler to the next, m."""
+"""From one line of the ruler to the next in the usual picture, m."""
+_SPACINGS = tuple(digit * 10.0**power for power in range(-5, -1) for digit in (1.0, 2.0, 5.0))
+"""Those that rulers have, down to a stage micrometer's, m."""
 _SIDE_AXIS = 30e-3
 """Height of the tube's axis above the far wall in the view from the side, m; assumed."""
 _GLASS = 2.0e-3
@@ -50,7 +52,9 @@ class Tank:
     spacing: float
     """From one line of the ruler to the next."""
     ruler: float
-    """|y| at which the lines of both strips begin; they are 8 mm long."""
+    """|y| at which the lines of both strips begin; in the usual picture they are 8 mm long."""
+    shrunk: float = 1.0
+    """Width of the picture over that of the usual one: ruler and floor are as much finer."""
 
     @property
     def outside(self) -> float:
@@ -58,17 +62,20 @@ class Tank:
         return 0.0 if self.tube is None else self.tube + _GLASS
 
 
-def tank_of(robot: Robot, view: str) -> Tank:
+def tank_of(robot: Robot, view: str, shrunk: float = 1.0) -> Tank:
     """The tank of a robot: its tube lies on the floor; from the side it lies midway between the walls.
 
     Args:
         robot: a checked robot.
         view: `top` or `side`.
+        shrunk: width of the picture over that of the usual one.
     """
     tube, length = None, 0.0
     if robot.channel is not None:
         tube, length = 0.5 * robot.channel.diameter, robot.channel.length or 1.0
-    return Tank(view, tube, tube_height(robot, view), length, _SPACING, _reach(robot) + _RULER_DISTANCE)
+    spacing = min(one for one in _SPACINGS if one >= _SPACING * shrunk * (1.0 - 1e-9))
+    ruler = _reach(robot) + _RULER_DISTANCE * shrunk
+    return Tank(view, tube, tube_height(robot, view), length, spacing, ruler, shrunk)
 
 
 def tube_height(robot: Robot, view: str) -> float:
@@ -124,13 +131,13 @@ def backdrop(tank: Tank, lens: Lens) -> Backdrop:
     still = Backdrop(light, over, shine, floor)
     ground = (0.80, 0.81, 0.79) if tank.view == "top" else (0.74, 0.79, 0.83)
     colours = linear(np.array([ground, (0.90, 0.90, 0.88), (0.10, 0.10, 0.12)]))  # ground, paper, ink
-    end = tank.ruler + _LINE_LENGTH
+    end, paper = tank.ruler + _LINE_LENGTH * tank.shrunk, _PAPER * tank.shrunk
     line_width = min(_LINE_WIDTH, 0.25 * tank.spacing)
-    ruler = Ruler(tank.ruler - _PAPER, tank.ruler, end, end + _PAPER, tank.spacing, line_width)
+    ruler = Ruler(tank.ruler - paper, tank.ruler, end, end + paper, tank.spacing, line_width)
     half_length = -1.0 if tank.tube is None else 0.5 * tank.tube_length
     tube = Tube(tank.tube_height, tank.tube or 1.0, tank.outside or 1.0, half_length, _GLASS_ABSORPTION)
     azimuth, phase = np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (len(_MOTTLE), 2)).T
-    wavenumber = 2 * np.pi * np.array(_MOTTLE)
+    wavenumber = 2 * np.pi * np.array(_MOTTLE) / tank.shrunk
     amplitude = np.full(len(_MOTTLE), 0.012)
     waves = Waves(wavenumber * np.cos(azimuth), wavenumber * np.sin(azimuth), phase.copy(), amplitude)
     still_picture(lens.camera, lens.turn, spots(_FINE), colours, ruler, tube, waves, np.array(_OIL), still)

@@ -131,7 +131,7 @@ def render(
         motion: `MotionOptions`: the model of steady swimming, and prescribed rates.
         run: a run of `spirillum.simulate` instead, or its file.
         trial: `TrialOptions`: duration, and the robot's pose at the first frame.
-        camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, distortion.
+        camera: `CameraOptions`: view, direction, frame rate, size of the picture, exposure, field of view, distortion.
         degradation: `clean`, `degraded`, or `Degradation`: noise, compression, lost frames, ...
         setup_errors: `SetupErrors`: by how much the setup's height of the robot's axis is wrong on purpose.
         troubles: of a real bench: `Troubles`, or names such as ``"lost-frames,handheld,noise"``.
@@ -164,7 +164,7 @@ def render(
         _check_not_of_run(motion, trial)
         robot = robot_of(dataset) if robot is None else load(robot)
         shown = motion_of_run(robot, dataset, trial, camera)
-    tank, lens = tank_of(robot, camera.view), lens_of(camera, tilt_of(degradation, seed))
+    tank, lens = tank_of(robot, camera.view, camera.shrunk), lens_of(camera, tilt_of(degradation, seed))
     check_size(robot, tank, lens)
     trajectory = framed(shown.trajectory, robot, lens, trial.start)
     count = math.floor(trajectory.duration * camera.fps * (1.0 + 1e-12)) + 1

@@ -27,7 +27,7 @@ _LINE_ERROR = 0.1
 """Standard error of a line's position, pixels."""
 _CORRELATED = 12.0
 """Points of a ruler with correlated errors, as they share a window."""
-_FOCAL = (0.2, 20.0)
+_FOCAL = (0.2, 250.0)
 """Plausible focal lengths over the picture's width."""
 _MODEL = 3e-4
 """Relative standard uncertainty of lengths by the models of lens and body, with an exact setup.
