@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from typing import NamedTuple
 
 import pytest
 
@@ -33,27 +34,54 @@ HEAVY = (
 )
 
 
-def loaded_after(code: str) -> set[str]:
-    """Top-level modules that a fresh interpreter has loaded after running the code."""
-    script = f"import sys\ntry:\n    {code}\nexcept SystemExit:\n    pass\nprint('\\n' + ' '.join(sys.modules))"
+class Loaded(NamedTuple):
+    """Top-level modules that one fresh interpreter has loaded, the lightest of the steps first."""
+
+    imported: set[str]
+    helped: set[str]
+    closed: set[str]
+    tube: set[str]
+
+
+STEPS = (
+    "import spirillum",
+    "for said in (['--help'], ['predict', '--help'], ['page', '--help'], ['--version']): command(said)",
+    "command(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])",
+    "command(['predict', 'biorob2012-wide', '--json'])",
+)
+
+
+@pytest.fixture(scope="module")
+def loaded() -> Loaded:
+    """What is loaded after each of the steps."""
+    script = (
+        "import sys\n"
+        "def command(said):\n"
+        "    from spirillum.cli import main\n"
+        "    try:\n"
+        "        main(said)\n"
+        "    except SystemExit as left:\n"
+        "        assert not left.code\n"
+    )
+    for step in STEPS:
+        script += f"{step}\nprint('\\nloaded', *sys.modules)\n"
     found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    return {name.split(".")[0] for name in found.stdout.splitlines()[-1].split()}
+    lines = [line.split()[1:] for line in found.stdout.splitlines() if line.startswith("loaded ")]
+    return Loaded(*({name.split(".")[0] for name in line} for line in lines))
 
 
-def test_importing_the_package_loads_no_library() -> None:
-    assert not loaded_after("import spirillum") & {*HEAVY, "numpy", "pydantic", "typer", "rich"}
+def test_importing_the_package_loads_no_library(loaded: Loaded) -> None:
+    assert not loaded.imported & {*HEAVY, "numpy", "pydantic", "typer", "rich"}
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["predict", "--help"], ["page", "--help"], ["--version"]])
-def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
-    assert not loaded_after(f"from spirillum.cli import main; main({arguments!r})") & {*HEAVY, "numpy"}
+def test_help_loads_nothing_heavy(loaded: Loaded) -> None:
+    assert "typer" in loaded.helped
+    assert not loaded.helped & {*HEAVY, "numpy"}
 
 
-def test_one_prediction_draws_no_picture() -> None:
-    code = "from spirillum.cli import main; main(['predict', 'biorob2012-wide', '--json'])"
-    assert not loaded_after(code) & {"matplotlib", "xarray", "h5py", "jinja2", "pandas"}
+def test_model_in_closed_form_loads_nothing_compiled(loaded: Loaded) -> None:
+    assert "numba" not in loaded.closed
 
 
-def test_model_in_closed_form_loads_nothing_compiled() -> None:
-    code = "from spirillum.cli import main; main(['predict', 'biorob2012-wide', '--model', 'sbt', '--json'])"
-    assert "numba" not in loaded_after(code)
+def test_one_prediction_draws_no_picture(loaded: Loaded) -> None:
+    assert not loaded.tube & {"matplotlib", "xarray", "h5py", "jinja2", "pandas"}
