@@ -5,7 +5,9 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -27,14 +29,23 @@ def test_a_small_disk_is_said() -> None:
     assert faults.run("tmpfs", 1, 12) == []
 
 
-def limited(folder: Path, command: list[str], limit: int) -> subprocess.CompletedProcess[str]:
-    """A command whose files may not grow beyond a size, as on a full disk."""
-    script = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)\n"
-    script += "sys.dont_write_bytecode = True\n"  # else modules are kept cut off, and no other process can import them
-    script += "from spirillum.cli import main; sys.argv[:2] = ['spirillum']; main()"
-    return subprocess.run(
-        [sys.executable, "-c", script, str(limit), *command], cwd=folder, capture_output=True, text=True, check=False
-    )
+@pytest.fixture
+def limited(run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
+    """Run a command whose files may not grow beyond a size, as on a full disk."""
+
+    def command(arguments: list[str], limit: int) -> Any:
+        import resource
+
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)  # else modules are kept cut off, for all processes
+        before, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+        try:
+            return run(*arguments)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (before, most))
+
+    return command
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such limits")
@@ -46,31 +57,38 @@ def limited(folder: Path, command: list[str], limit: int) -> subprocess.Complete
         ["export", "biorob2012-wide", "out.stl"],
     ],
 )
-def test_a_full_disk_is_said_and_leaves_nothing(tmp_path: Path, command: list[str]) -> None:
-    found = limited(tmp_path, command, 1000)
-    assert (found.returncode, found.stdout) == (2, "")
+def test_a_full_disk_is_said_and_leaves_nothing(
+    limited: Callable[..., Any], tmp_path: Path, command: list[str]
+) -> None:
+    found = limited(command, 1000)
+    assert (found.code, found.out) == (2, "")
     # Loops that are compiled for the first time are kept, and may be what finds no space.
     target = "out.stl" if command[0] == "export" else "(out.nc|out.mp4|the output)"
-    assert re.fullmatch(rf"spirillum: no space is left for .*{target}; allowed: a place with space\n", found.stderr)
+    assert re.fullmatch(rf"spirillum: no space is left for .*{target}; allowed: a place with space\n", found.err)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such limits")
-def test_a_design_is_written_with_its_body_for_a_printer_or_not_at_all(tmp_path: Path) -> None:
+def test_a_design_is_written_with_its_body_for_a_printer_or_not_at_all(
+    limited: Callable[..., Any], run: Callable[..., Any], tmp_path: Path
+) -> None:
     search = ["--vary", "tail.wavelength=20mm:30mm", "--maximise", "forward_velocity"]
     files = ["-o", "best.toml", "--stl", "best.stl"]
-    found = limited(tmp_path, ["design", "biorob2012-wide", "--model", "rft", *search, *files], 30_000)
-    assert found.returncode == 2
-    assert found.stderr == "spirillum: no space is left for best.stl; allowed: a place with space\n"
+    command = ["design", "biorob2012-wide", "--model", "rft", *search, *files]
+    found = limited(command, 30_000)
+    assert found.code == 2
+    assert found.err == "spirillum: no space is left for best.stl; allowed: a place with space\n"
     assert list(tmp_path.iterdir()) == []
+    assert run(*command, "--plot", "best.png").code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["best.png", "best.stl", "best.toml"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such streams")
 @pytest.mark.parametrize(
     ("arguments", "streams", "code"),
     [
-        ("predict missing.toml", "2>&-", 2),
-        ("predict missing.toml", "2>/dev/full", 2),
+        pytest.param("predict missing.toml", "2>&-", 2, marks=pytest.mark.slow),
+        pytest.param("predict missing.toml", "2>/dev/full", 2, marks=pytest.mark.slow),
         ("robot show biorob2012-wide", ">&- 2>&-", 2),
         ("robot show biorob2012-wide --json", ">/dev/full 2>/dev/full", 2),
     ],
@@ -81,7 +99,7 @@ def test_a_stream_that_nobody_reads_changes_no_exit_code(arguments: str, streams
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such streams")
-@pytest.mark.parametrize("more", ["", " --json"])
+@pytest.mark.parametrize("more", ["", pytest.param(" --json", marks=pytest.mark.slow)])
 def test_an_answer_for_a_closed_stream_is_not_lost_without_a_word(more: str) -> None:
     command = f"{sys.executable} -m spirillum robot show biorob2012-wide{more} >&-"
     found = subprocess.run(command, shell=True, check=False, capture_output=True, text=True)
