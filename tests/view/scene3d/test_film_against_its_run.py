@@ -51,11 +51,11 @@ def test_frames_length_and_size_are_those_asked_for(
 
 
 def test_robot_moves_by_what_the_run_says(free_robot: Any, run_of: Callable[..., Any], tmp_path: Path) -> None:
-    run, path = run_of(free_robot, speed=0.03), tmp_path / "run.mp4"
+    run, path = run_of(free_robot, duration=0.5, speed=0.06), tmp_path / "run.mp4"
     sp.film(run, path, camera="fixed", **SMALL)
     first, *_, last = frames_of(path)
     solids, poses = DrawnRobot.of(free_robot), poses_of(run)
-    camera = fitted("side", np.concatenate([solids.corners(poses.at(time)) for time in (0.0, 1.0)]), SIZE)
+    camera = fitted("side", np.concatenate([solids.corners(poses.at(time)) for time in (0.0, 0.5)]), SIZE)
     tip = np.array([[-0.5 * 0.035 - 0.010 - 0.060, 0.0, 0.0]])
     for frame, moved in ((first, 0.0), (last, 0.03)):
         assert coloured(frame).min() == pytest.approx(camera.pixels(tip + np.array([moved, 0, 0]), SIZE)[0, 0], abs=2)
@@ -64,13 +64,13 @@ def test_robot_moves_by_what_the_run_says(free_robot: Any, run_of: Callable[...,
 def test_camera_goes_along_with_a_robot_that_swims_far(
     free_robot: Any, run_of: Callable[..., Any], tmp_path: Path
 ) -> None:
-    run, path = run_of(free_robot, speed=0.2), tmp_path / "run.mp4"
+    run, path = run_of(free_robot, duration=0.5, speed=0.4), tmp_path / "run.mp4"
     found = sp.film(run, path, **SMALL)
     first, *_, last = frames_of(path)
     assert found.follows
     assert coloured(last).min() == pytest.approx(coloured(first).min(), abs=2)
     assert np.abs(first - last).max(axis=2)[60:].max() > 40  # the body has turned
-    assert not sp.film(run_of(free_robot, speed=0.02), path, **SMALL).follows
+    assert not sp.film(run_of(free_robot, duration=0.2, speed=0.02), path, **SMALL).follows
 
 
 def test_time_stamp_and_nothing_else_changes_while_nothing_moves(
@@ -101,7 +101,7 @@ def test_gif_has_the_same_frames_and_length(free_robot: Any, run_of: Callable[..
 
 
 def test_too_few_frames_for_the_tail_are_warned_of(free_robot: Any, run_of: Callable[..., Any], tmp_path: Path) -> None:
-    run, path = run_of(free_robot, duration=0.4, tail=2 * np.pi * 4.0), tmp_path / "run.mp4"
+    run, path = run_of(free_robot, duration=0.2, tail=2 * np.pi * 4.0), tmp_path / "run.mp4"
     found = sp.film(run, path, speed=1.0, **SMALL)
     assert found.turn_per_frame == pytest.approx(0.4)
     assert "turns by up to 0.4 turns from frame to frame" in found.warnings[0]

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from spirillum.view.scene3d.scene import DrawnRobot, Scene, level_height, restin
 from spirillum.view.scene3d.show import glass_around, shown_points
 
 SIZE = (400, 226)
+SAID = "robot.png: biorob2012-wide, 160x90 pixels, view perspective\n"
 _TURN = np.array([0.96, 0.2, -0.12, 0.15])
 TILTED = Pose(np.array([0.02, -0.01, 0.03]), _TURN / np.linalg.norm(_TURN), 2.0)
 
@@ -32,12 +34,20 @@ def extent(mask: np.ndarray) -> np.ndarray:
     return np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1])
 
 
+@pytest.fixture(scope="module")
+def tilted(free_robot: Any) -> Iterator[Scene]:
+    """One scene for all views of a tilted robot: to make one takes longer than to look at it."""
+    with Scene(DrawnRobot.of(free_robot), SIZE) as scene:
+        scene.place(TILTED)
+        yield scene
+
+
 @pytest.mark.parametrize("view", VIEWS)
-def test_silhouette_is_where_the_mesh_projects_to(free_robot: Any, view: str) -> None:
-    solids = DrawnRobot.of(free_robot)
-    points = solids.points(TILTED)
+def test_silhouette_is_where_the_mesh_projects_to(free_robot: Any, tilted: Scene, view: str) -> None:
+    points = DrawnRobot.of(free_robot).points(TILTED)
     camera = fitted(checked_view(view), points, SIZE, Margins(0.1, 0.1, 0.1))
-    mask = np.any(drawn(solids, camera, TILTED) != 255, axis=2)
+    tilted.look(camera)
+    mask = np.any(tilted.image() != 255, axis=2)
     pixels = camera.pixels(points, SIZE)
     assert extent(mask) == pytest.approx(np.concatenate([pixels.min(axis=0), pixels.max(axis=0)]), abs=1.6)
 
@@ -74,27 +84,38 @@ def test_robots_of_metres_and_micrometres_look_the_same() -> None:
     assert np.any(pictures[0] < 200)
 
 
+ROLL, ROLLED_SIZE = 0.3, (960, 540)
+ROLLED = Pose(np.zeros(3), np.array([np.cos(0.5 * ROLL), np.sin(0.5 * ROLL), 0.0, 0.0]), 0.0)
+
+
+@pytest.fixture(scope="module")
+def rolled(free_robot: Any) -> Iterator[Scene]:
+    """One scene for all views of a robot that has rolled."""
+    with Scene(DrawnRobot.of(free_robot), ROLLED_SIZE) as scene:
+        scene.place(ROLLED)
+        yield scene
+
+
 @pytest.mark.parametrize("view", ["side", "top", "perspective"])
-def test_stripes_have_their_colours_in_order(free_robot: Any, view: str) -> None:
+def test_stripes_have_their_colours_in_order(free_robot: Any, rolled: Scene, view: str) -> None:
     from spirillum.robot.mesh import STRIPE_COLOURS
 
     solids = DrawnRobot.of(free_robot)
     stripes = free_robot.seal.stripes
     radius, x = 0.5 * free_robot.body.diameter, -0.5 * free_robot.body.length + 0.5 * free_robot.seal.length
-    roll = 0.3
-    pose = Pose(np.zeros(3), np.array([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0, 0.0]), 0.0)
-    camera = fitted(checked_view(view), solids.corners(pose), (960, 540))
-    image = drawn(solids, camera, pose, (960, 540)).astype(float)
+    camera = fitted(checked_view(view), solids.corners(ROLLED), ROLLED_SIZE)
+    rolled.look(camera)
+    image = rolled.image().astype(float)
     names = list(dict.fromkeys(stripes))
     known = np.array([STRIPE_COLOURS[name] for name in names])
     known = known / np.linalg.norm(known, axis=1, keepdims=True)
     seen = 0
     for number, colour in enumerate(stripes):
-        angle = 0.5 * np.pi + 2.0 * np.pi * number / len(stripes) + roll  # from +z on towards -y: positive about +x
+        angle = 0.5 * np.pi + 2.0 * np.pi * number / len(stripes) + ROLL  # from +z on towards -y: positive about +x
         outwards = np.array([0.0, np.cos(angle), np.sin(angle)])
         if outwards @ camera.sight > -0.55:
             continue
-        column, row = camera.pixels((np.array([x, 0, 0]) + radius * outwards)[None], (960, 540))[0]
+        column, row = camera.pixels((np.array([x, 0, 0]) + radius * outwards)[None], ROLLED_SIZE)[0]
         found = image[int(row), int(column)]
         assert names[int(np.argmax(known @ (found / np.linalg.norm(found))))] == colour
         seen += 1
@@ -156,13 +177,23 @@ def test_turning_the_tail_leaves_the_body(free_robot: Any) -> None:
     assert not changed[:, int(columns) + 2 :].any()
 
 
-def test_command_says_its_own_words_and_nothing_else(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "from spirillum.cli import main; main()", "show", "biorob2012-wide", "--size", "160x90"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "robot.png: biorob2012-wide, 160x90 pixels, view perspective\n"
+def test_command_says_its_own_words_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing of what the drawing libraries write past Python's streams is seen, either."""
+    from spirillum.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["show", "biorob2012-wide", "--size", "160x90"])
+    assert ended.value.code in (None, 0)
+    assert capfd.readouterr() == (SAID, "")
+
+
+@pytest.mark.slow
+def test_command_in_a_fresh_process_says_its_own_words_and_nothing_else(tmp_path: Path) -> None:
+    """What the drawing libraries say where they are loaded would be seen here."""
+    command = [sys.executable, "-c", "from spirillum.cli import main; main()"]
+    asked = ["show", "biorob2012-wide", "--size", "160x90"]
+    done = subprocess.run([*command, *asked], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, SAID, "")
