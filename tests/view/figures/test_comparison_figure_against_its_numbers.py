@@ -100,6 +100,7 @@ def test_a_model_without_an_answer_keeps_its_line_and_says_why() -> None:
          "tail.amplitude": "0.8 um", "tail.wire_diameter": "100 nm", "coupling.length": "0 mm", "channel": "none"},
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("unplaced")
 def test_any_robot_can_be_drawn(fields: dict[str, str], tmp_path: Path) -> None:
     found = sp.compare_models(sp.load(WIDE, **fields), models=["sbt", "rft"])
     figure = comparison_figure(found)

@@ -21,6 +21,7 @@ def bounded() -> sp.Design:
     )
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_what_breaks_a_condition_is_grey(bounded: sp.Design) -> None:
     figure = design_figure(bounded)
     for axes, profile in zip(figure.axes[1:3], bounded.profiles, strict=True):

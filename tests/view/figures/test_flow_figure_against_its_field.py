@@ -50,6 +50,7 @@ def _words(figure: Any) -> str:
     return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
+@pytest.mark.usefixtures("without_lines")
 @pytest.mark.parametrize(("plane", "offset"), [("xz", 0.0), ("xy", 0.004), ("yz", -0.05)])
 def test_panels_are_to_scale_and_show_the_field(around: Flow, plane: str, offset: float) -> None:
     data = around.plane(plane, offset=offset, resolution=60)
@@ -142,17 +143,27 @@ def test_the_coarsest_grids_are_drawn(around: Flow, resolution: int, plane: str,
     ("fields", "suffixes"),
     [
         ({"tail.handedness": "left", "drive.kind": "rate", "drive.rate": "-1 Hz"}, ("png",)),
-        ({"body.diameter": "2 um", "body.length": "4 um", "tail.length": "20 um", "tail.wavelength": "5 um",
-          "tail.amplitude": "0.8 um", "tail.wire_diameter": "100 nm", "coupling.length": "0 mm", "channel": "none"},
-         ("svg",)),
         ({"body.diameter": "0.9 m", "body.length": "1 m", "channel": "none"}, ("pdf",)),
     ],
-)  # fmt: skip
-@pytest.mark.usefixtures("unplaced")
+)
+@pytest.mark.usefixtures("without_lines", "unplaced")
 def test_any_robot_can_be_drawn(fields: dict[str, str], suffixes: tuple[str, ...], sphere: Any, tmp_path: Path) -> None:
     _drawn(fields, suffixes, sphere, tmp_path)
 
 
+@pytest.mark.usefixtures("unplaced")
+def test_a_robot_of_micrometres_has_its_streamlines(sphere: Any, tmp_path: Path) -> None:
+    body = {"body.diameter": "2 um", "body.length": "4 um", "coupling.length": "0 mm", "channel": "none"}
+    tail = {
+        "tail.length": "20 um",
+        "tail.wavelength": "5 um",
+        "tail.amplitude": "0.8 um",
+        "tail.wire_diameter": "100 nm",
+    }
+    _drawn(body | tail, ("svg",), sphere, tmp_path)
+
+
+@pytest.mark.usefixtures("without_lines")
 def test_a_very_long_name_finds_room(sphere: Any, tmp_path: Path) -> None:
     fields = {"name": "$x_{1}$ of a very long name " * 6, "channel": "none"}
     _drawn(fields, ("svg",), sphere, tmp_path)

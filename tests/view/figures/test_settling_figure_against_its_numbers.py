@@ -31,6 +31,7 @@ def settling(state: str) -> Any:
     )
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_panels_show_gap_azimuth_and_tilt() -> None:
     gap, azimuth, tilt = settling_figure(settling("steady")).axes
     assert gap.get_xlabel() == "time (s)"
@@ -43,6 +44,7 @@ def test_panels_show_gap_azimuth_and_tilt() -> None:
     assert azimuth.lines[1].get_ydata()[0] == pytest.approx(np.rad2deg(-0.1))
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_no_place_is_drawn_where_none_was_found() -> None:
     gap, azimuth, tilt = settling_figure(settling("changing")).axes
     assert [len(panel.lines) for panel in (gap, azimuth, tilt)] == [1, 1, 2]
