@@ -54,8 +54,8 @@ def test_comparison_and_resistance_print_their_numbers() -> None:
 
 
 def test_control_shows_its_verdict_and_the_scores_of_all_controllers() -> None:
-    task = {"kind": "stop-at", "at": "2 mm"}
-    found = sp.control("biorob2012-wide", task, plant={"model": "slender"}, seeds=1)
+    task = {"kind": "stop-at", "at": "0.2 mm", "tolerance": "0.1 mm"}
+    found = sp.control("biorob2012-wide", task, plant={"model": "rft"}, seeds=1)
     text = str(found)
     assert f"verdict: {'good enough' if found.score.good else 'not good enough'}" in text
     assert all(f"controllers: {name}" in text for name in ("feedback", "nothing", "open-loop", "knowing"))
@@ -98,6 +98,7 @@ def test_public_names_and_nothing_else() -> None:
     assert all(getattr(sp, name) is not None for name in ("predict", "plot", "study"))
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_plot_draws_by_the_kind_of_answer(tmp_path) -> None:
     drawn = sp.plot(sp.compare_models("biorob2012-wide", models=["sbt", "rft"]))
     assert drawn._repr_png_().startswith(b"\x89PNG")

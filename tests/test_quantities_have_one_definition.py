@@ -1,11 +1,14 @@
 """Every quantity has one definition: answers and datasets carry the registry's units."""
 
+import tomllib
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import spirillum as sp
+from spirillum.papers import biorob2012
 from spirillum.quantities import QUANTITIES
 from spirillum.swimming.answer import Swimming
 from spirillum.units import _registry, shown_in
@@ -57,7 +60,10 @@ def test_runs_carry_the_registrys_units() -> None:
 
 
 def test_studies_carry_the_registrys_units() -> None:
-    assert_registered(sp.study())
+    """One tail in each channel has all the quantities of the paper's study."""
+    study = tomllib.loads(Path(biorob2012.__file__).with_name("study.toml").read_text("utf-8"))
+    study["grid"] |= {"wavelengths": ["25 mm"], "amplitudes": ["2.5 mm"]}
+    assert_registered(sp.study(study))
 
 
 def test_answers_carry_the_registrys_units() -> None:

@@ -13,7 +13,7 @@ WIDE = "biorob2012-wide"
 QUICK = ("--set", "friction.effective=4.7e-6 N m s/rad", "--at", "2mm", "--tolerance", "0.3mm", "--duration", "4s")
 
 
-def test_table_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_path: Path) -> None:
+def test_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_path: Path) -> None:
     file, picture = tmp_path / "run.nc", tmp_path / "run.png"
     asked = ("control", WIDE, *QUICK, "--with", "pulse.start=1s", "--with", "camera.fps=20", "--learn")
     outcome = run(*asked, "--seeds", "1", "-o", str(file), "--plot", str(picture), "--json")
@@ -38,6 +38,11 @@ def test_table_json_run_and_picture_say_the_same(run: Callable[..., Any], tmp_pa
     assert set(controllers) == {"feedback", "nothing", "open-loop", "knowing"}
     first = next(one for one in answer["scores"]["runs"] if one["controller"] == "feedback" and one["seed"] == 0)
     assert first["error"]["value"] == answer["error"]["value"]  # the run that was asked for is the first that is scored
+
+
+def test_table_and_json_say_the_same(run: Callable[..., Any]) -> None:
+    asked = ("control", WIDE, "--model", "rft", "--at", "0.2mm", "--tolerance", "0.1mm", "--duration", "1s")
+    answer = json.loads(run(*asked, "--json").out)
     table = run(*asked)
     assert table.code == 0
     assert f"{1e3 * answer['error']['value']:.4g}" in table.out or "um" in table.out

@@ -84,7 +84,7 @@ def test_volume_of_the_printed_body_is_that_of_the_solids_and_what_joins_them() 
     from spirillum.exports.solid import united
 
     robot = sp.load(WIDE)
-    coarse, fine = (united(robot_mesh(robot, fineness=fineness)).volume for fineness in (2.0, 4.0))
+    coarse, fine = (united(robot_mesh(robot, fineness=fineness)).volume for fineness in (1.25, 2.5))
     smooth = fine + (fine - coarse) / 3
     solids = sum(solid.volume for solid in robot_solids(robot).values())
     gaps = np.pi * (0.4e-3**2 + 0.5e-3**2) * 0.5e-3

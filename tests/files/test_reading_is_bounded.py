@@ -255,26 +255,37 @@ def test_a_damaged_dataset_of_a_study_is_computed_anew(tmp_path: Path, monkeypat
     assert path.stat().st_mtime_ns == before  # what is whole is taken as it is
 
 
+@pytest.fixture(scope="module")
+def small_film(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A film of a few frames."""
+    path = tmp_path_factory.mktemp("film") / "a.mp4"
+    return sp.render(WIDE, path, trial={"duration": 0.3}, camera={"size": "64x64", "fps": 10.0}).path
+
+
 @pytest.mark.parametrize("name", ["12:30.mp4", "subfile,,start,0,end,100,,:a.mp4", "http:", "concat:a.mp4|b.mp4"])
-def test_names_of_films_are_names_and_no_protocols(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_names_of_films_are_names_and_no_protocols(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_film: Path, name: str
+) -> None:
     monkeypatch.chdir(tmp_path)
-    trial = sp.render(WIDE, tmp_path / "a.mp4", trial={"duration": 0.3}, camera={"size": "64x64", "fps": 10.0})
+    Path("a.mp4").write_bytes(small_film.read_bytes())
+    Path("b.mp4").write_bytes(small_film.read_bytes())
     from spirillum.vision.video.frames import open_video
 
     assert "does not exist" in sentence(lambda: open_video(name))
-    Path(name).write_bytes(trial.path.read_bytes())
+    Path(name).write_bytes(small_film.read_bytes())
     assert open_video(name).size == (64, 64)
 
 
-def test_a_playlist_opens_no_other_film(tmp_path: Path) -> None:
+def test_a_playlist_opens_no_other_film(tmp_path: Path, small_film: Path) -> None:
     from spirillum.vision.video.frames import open_video
 
-    trial = sp.render(WIDE, tmp_path / "a.mp4", trial={"duration": 0.3}, camera={"size": "64x64", "fps": 10.0})
+    film = tmp_path / "a.mp4"
+    film.write_bytes(small_film.read_bytes())
     head = "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n"
     for name, text in {
-        "list.m3u8": f"{head}{trial.path}\n#EXT-X-ENDLIST\n",
-        "list.mp4": f"{head}{trial.path}\n#EXT-X-ENDLIST\n",
-        "list.ffconcat": f"ffconcat version 1.0\nfile {trial.path.name}\n",
+        "list.m3u8": f"{head}{film}\n#EXT-X-ENDLIST\n",
+        "list.mp4": f"{head}{film}\n#EXT-X-ENDLIST\n",
+        "list.ffconcat": f"ffconcat version 1.0\nfile {film.name}\n",
     }.items():
         (tmp_path / name).write_text(text)
         assert "cannot be read as a film" in sentence(lambda name=name: open_video(tmp_path / name))

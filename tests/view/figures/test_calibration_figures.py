@@ -24,25 +24,33 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return sp.calibrate(path, WIDE, sampling=few)
 
 
+@pytest.fixture(scope="module")
+def drawn(found: Any) -> dict[str, Any]:
+    """Two of its figures, their panels and words where they are made, as with `unplaced`."""
+    from spirillum.view.figures.calibration import observed_figure, residual_figure
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)
+        return {"observed": observed_figure(found, 0), "residuals": residual_figure(found)}
+
+
 def _texts(figure: Any) -> str:
     return " ".join(text.get_text() for text in figure.findobj(Text))
 
 
 @pytest.mark.usefixtures("unplaced")
-def test_all_figures_are_written_and_say_that_the_data_are_synthetic(found: Any, tmp_path: Path) -> None:
+def test_all_figures_are_written_and_say_that_the_data_are_synthetic(
+    found: Any, drawn: dict[str, Any], tmp_path: Path
+) -> None:
     written = {Path(name).name for name in write_calibration(found, tmp_path).files}
     names = ("observed-40mm", "residuals", "posterior", "profiles")
     assert written >= {f"{name}.png" for name in names} | {"calibration.toml", "predictions.csv", "posterior.nc"}
-    from spirillum.view.figures.calibration import observed_figure, residual_figure
-
-    for figure in (observed_figure(found, 0), residual_figure(found)):
+    for figure in drawn.values():
         assert "synthetic, nothing is measured" in _texts(figure)
 
 
-def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
-    from spirillum.view.figures.calibration import observed_figure
-
-    figure = observed_figure(found, 0)
+def test_panels_draw_observed_and_predicted_speeds(found: Any, drawn: dict[str, Any]) -> None:
+    figure = drawn["observed"]
     first = figure.axes[0]
     model, seen = first.lines[0], first.containers[0].lines[0]
     experiment = found.experiment
@@ -57,25 +65,19 @@ def test_panels_draw_observed_and_predicted_speeds(found: Any) -> None:
     assert len(figure.axes) == 6
 
 
-def test_a_model_is_seen_through_the_mark_of_what_was_observed(found: Any) -> None:
-    from spirillum.view.figures.calibration import observed_figure
-
-    axes = observed_figure(found, 0).axes[0]
+def test_a_model_is_seen_through_the_mark_of_what_was_observed(drawn: dict[str, Any]) -> None:
+    axes = drawn["observed"].axes[0]
     model, seen = axes.lines[0], axes.containers[0].lines[0]
     assert seen.get_markerfacecolor() == "none"
     assert seen.get_markersize() > model.get_markersize()
 
 
-def test_residuals_name_the_channel(found: Any) -> None:
-    from spirillum.view.figures.calibration import residual_figure
-
-    assert "channel of 40 mm" in _texts(residual_figure(found))
+def test_residuals_name_the_channel(drawn: dict[str, Any]) -> None:
+    assert "channel of 40 mm" in _texts(drawn["residuals"])
 
 
-def test_residuals_are_observed_over_predicted(found: Any) -> None:
-    from spirillum.view.figures.calibration import residual_figure
-
-    axes = residual_figure(found).axes[0]
+def test_residuals_are_observed_over_predicted(found: Any, drawn: dict[str, Any]) -> None:
+    axes = drawn["residuals"].axes[0]
     drawn = np.sort(axes.containers[0].lines[0].get_ydata())
     expected = 100 * (found.experiment.advance.mean / found.predicted["advance"][0] - 1)
     assert drawn == pytest.approx(np.sort(expected))

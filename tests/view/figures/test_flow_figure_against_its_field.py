@@ -51,7 +51,9 @@ def _words(figure: Any) -> str:
 
 
 @pytest.mark.usefixtures("without_lines")
-@pytest.mark.parametrize(("plane", "offset"), [("xz", 0.0), ("xy", 0.004), ("yz", -0.05)])
+@pytest.mark.parametrize(
+    ("plane", "offset"), [("xz", 0.0), pytest.param("xy", 0.004, marks=pytest.mark.slow), ("yz", -0.05)]
+)
 def test_panels_are_to_scale_and_show_the_field(around: Flow, plane: str, offset: float) -> None:
     data = around.plane(plane, offset=offset, resolution=60)
     figure = flow_figure(around, data)

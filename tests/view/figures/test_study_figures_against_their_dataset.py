@@ -30,11 +30,21 @@ def curves(axes: Any, model: str) -> list[Any]:
     return [line for line in axes.get_lines() if line.get_color() == look_of_model(model).colour]
 
 
+def unplaced_figure(dataset: Any, name: str) -> Any:
+    """One figure of a study for many tests, its panels and words where they are made, as with `unplaced`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)
+        return figures_of(dataset)[name].figure()
+
+
 @pytest.fixture(scope="module")
 def fig5(paper_study: Any) -> Any:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("spirillum.view.figures.sheet.lay_out", lambda _figure: None)  # as `unplaced`
-        return figures_of(paper_study)["fig5-wide"].figure()
+    return unplaced_figure(paper_study, "fig5-wide")
+
+
+@pytest.fixture(scope="module")
+def observed_fig5(observed_study: Any) -> Any:
+    return unplaced_figure(observed_study, "fig5-wide")
 
 
 def test_paper_study_has_the_papers_figures(paper_study: Any) -> None:
@@ -139,12 +149,11 @@ def test_other_studies_do_not_borrow_the_papers_reynolds_number(paper_study: Any
     assert not [line for line in figures["bound"].figure().axes[0].get_lines() if line.get_color() == "black"]
 
 
-@pytest.mark.usefixtures("unplaced")
-def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> None:
-    picture = figures_of(observed_study)["fig5-wide"]
-    figure = picture.figure()
+def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any, observed_fig5: Any) -> None:
+    figure = observed_fig5
     assert len(figure.axes) == 12
-    assert "synthetic.csv" in picture.caption
+    assert figure.get_figwidth() <= 170.0 / 25.4  # of a page of a journal, inches
+    assert "synthetic.csv" in figures_of(observed_study)["fig5-wide"].caption
     assert any("observed" in entry for entry in legend_entries(figure))
     seen = observed_study.sel(channel="wide").isel(wavelength=3)
     bars = figure.axes[3].containers[0]
@@ -159,9 +168,8 @@ def test_observed_means_and_intervals_equal_the_dataset(observed_study: Any) -> 
     np.testing.assert_allclose(model.get_ydata(), expected)
 
 
-@pytest.mark.usefixtures("unplaced")
-def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) -> None:
-    figure = figures_of(observed_study)["fig5-wide"].figure()
+def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any, observed_fig5: Any) -> None:
+    figure = observed_fig5
     wide = observed_study.sel(channel="wide")
     derived = (wide["observed_tail_rate"] - wide["observed_body_rate"]).isel(wavelength=3, amplitude=0).item() / HZ
     assert figure.axes[7].containers[0][0].get_ydata()[0] == pytest.approx(derived)
@@ -172,9 +180,8 @@ def test_motor_rate_is_observed_else_derived_else_a_models(observed_study: Any) 
     assert np.isnan(curves(figure.axes[7], "rft")[0].get_ydata()).all()
 
 
-@pytest.mark.usefixtures("unplaced")
-def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study: Any) -> None:
-    figure = figures_of(observed_study)["fig5-wide"].figure()
+def test_inferred_friction_at_observed_rates_shows_both_readings(observed_study: Any, observed_fig5: Any) -> None:
+    figure = observed_fig5
     part = observed_study["effective_friction_at_observed_rate"].sel(channel="wide", model="sbt").isel(wavelength=3)
     rotor, paper = curves(figure.axes[11], "sbt")
     factor = 1e-6 if "µN m s/rad" in figure.axes[8].get_ylabel() else 1.0
