@@ -335,11 +335,20 @@ def _at_assumed_rates(task: Task, quick: QuickParts, rates: Sequence[float], rea
     """Steady swimming along a curve of assumed motor rates, signed as each motor drives."""
     electrics = task.batch.electrics
     assert electrics is not None  # noqa: S101 - the caller has asked
-    polarity = np.broadcast_to(electrics.polarity, (task.batch.size,))
-    curves = [[_swum(quick, reading, motor_rate=rate * polarity) for rate in rates] for reading in readings]
-    return {
-        f"{name}_at_assumed_rate": np.stack([_stacked(curve, name) for curve in curves], axis=1) for name in AT_RATES
-    }
+    driven = np.outer(rates, np.broadcast_to(electrics.polarity, (task.batch.size,)))
+    curves = [_curve(quick, reading, driven) for reading in readings]
+    return {f"{name}_at_assumed_rate": np.stack([curve[name] for curve in curves], axis=1) for name in AT_RATES}
+
+
+def _curve(quick: QuickParts, reading: str, driven: Values) -> Part:
+    """Steady swimming at motor rates (rate, robot); a closed form answers for all of them at once. (robot, rate)."""
+    _, batch, model = quick[0]
+    if len(quick) == 1 and model.closed_form and batch.size > 1:
+        rows = np.tile(np.arange(batch.size), len(driven))
+        found = swim(batch.taken(rows), model, motor_rate=driven.ravel(), friction=reading)
+        return {name: getattr(found, name).reshape(driven.shape).T for name in AT_RATES}
+    swum = [_swum(quick, reading, motor_rate=rates) for rates in driven]
+    return {name: _stacked(swum, name) for name in AT_RATES}
 
 
 def _reasons(batch: RobotBatch, model: str) -> PerRobot:
