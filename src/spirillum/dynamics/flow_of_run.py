@@ -66,7 +66,7 @@ def flow_of_run(
     Axes are those of the body where it lies against the wall, not rolled: x along the robot, z away from the nearest
     wall. No force and torque but weight, contact and a field act on the robot. A film thinner than a fiftieth of the
     body's diameter is drawn as thick as that, with the same velocities, and a warning says so: to resolve it would take
-    many minutes. A yawed robot takes about a minute, as it has no mirror image.
+    many minutes. A yawed robot takes one to three minutes, as it has no mirror image.
 
     Args:
         run: its file, or its dataset.

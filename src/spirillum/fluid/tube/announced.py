@@ -9,7 +9,7 @@ ANNOUNCED = "no table of this tube yet"
 TABLE_TAKES = "12 to 18 minutes of one core"
 """What it takes to make the table of one robot; estimated from what four tails at once took."""
 TILTED = "a pitched or yawed place without a table: the flow is solved for in minutes of one core"
-OF_A_RUN = "the flow at a moment of a run: solved for in about a minute of one core"
+OF_A_RUN = "the flow at a moment of a run: solved for in one to three minutes of one core"
 """Progress messages that are to be read, too."""
 _SECONDS = 10.0
 """Time that a place takes one process, s: for the paper's robots; near the glass it is three times as long."""
