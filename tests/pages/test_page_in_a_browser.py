@@ -25,6 +25,7 @@ def test_robot_is_drawn_and_moves_as_simulate_says(tab: Any) -> None:
     stripes = (picture.max(axis=2) - picture.min(axis=2)) > 90.0  # only the robot has such colours
     assert stripes.mean() > 2e-3
     first = tab.value(FRAME)
+    tab.command(do="play", value=True)
     tab.until(f"{FRAME}.time > {first['time'] + 0.5}")
     tab.command(do="play", value=False)
     tab.until("!spirillum.frame.playing")
