@@ -114,8 +114,8 @@ def _shortened(points: Samples, faces: Faces) -> tuple[Samples, Faces, Faces]:
     origin = np.arange(len(faces))
     while True:
         edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)  # (m, 3, 2)
-        unique, place = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
-        place = place.reshape(-1, 3)
+        key, place = np.unique(edges[..., 0] * len(points) + edges[..., 1], return_inverse=True)  # one number an edge
+        unique, place = np.stack(np.divmod(key, len(points)), axis=-1), place.reshape(-1, 3)
         long = np.linalg.norm(points[unique[:, 0]] - points[unique[:, 1]], axis=1) > _LONGEST
         if not long.any():
             return points, faces, origin
