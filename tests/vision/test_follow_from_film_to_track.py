@@ -27,10 +27,10 @@ def slope(time, values):
 
 @pytest.fixture(scope="module")
 def swimmer(flat_pictures, tmp_path_factory):
-    """11 pixels in 24 frames, with 4 frames a second; and its film."""
+    """11 pixels in 12 frames, with 2 frames a second; and its film."""
     turning = {"body_rate": -0.4, "tail_rate": 3.0}
     film = flat_pictures.Flat(
-        frames=24, fps=4.0, velocity=1e-3, direction="left", view="side", lamp=0.1, noise=2.0, **turning
+        frames=12, fps=2.0, velocity=1e-3, direction="left", view="side", lamp=0.1, noise=2.0, **turning
     )
     path = tmp_path_factory.mktemp("swimmer") / "a.mp4"
     film.write(path)
@@ -67,7 +67,7 @@ def test_speed_and_direction_from_the_side_and_to_the_left(swimmer, followed):
     assert np.nanmedian(found.position_error) < 0.1 * pixel
     assert pixel == pytest.approx((0.2 - 0.015) / 350.0, rel=1e-3)
     assert found.size == (320, 240)
-    assert done == list(range(1, 25))
+    assert done == list(range(1, 13))
     assert [state.time for state in seen] == found.time.tolist()
     assert found.picture[0, 2] < found.picture[0, 0]  # the nose is on the left
     assert not [flag for flag in found.flags if flag.spoils]
@@ -90,7 +90,7 @@ def test_a_start_beyond_the_film_is_refused(swimmer):
 
 
 def test_a_robot_that_leaves_is_kept_as_far_as_it_was_seen(flat_pictures, tmp_path):
-    film = flat_pictures.Flat(frames=16, fps=3.0, start=(0.03, 0.0), velocity=0.02, body_rate=0.1, tail_rate=0.5)
+    film = flat_pictures.Flat(frames=11, fps=2.0, start=(0.03, 0.0), velocity=0.02, body_rate=0.1, tail_rate=0.5)
     found = track(film, tmp_path)
     assert "robot-left-the-view" in [flag.name for flag in found.flags]
     seen = np.isfinite(found.position[:, 0])
@@ -144,7 +144,7 @@ def test_what_has_neither_stripes_nor_tail_of_the_robot_gives_no_numbers(flat_pi
 
 
 def test_a_robot_in_full_view_for_a_while_is_measured_then(flat_pictures, tmp_path):
-    film = flat_pictures.Flat(frames=30, fps=5.0, start=(0.035, 0.0), velocity=0.008, body_rate=-0.3, tail_rate=3.0)
+    film = flat_pictures.Flat(frames=18, fps=3.0, start=(0.035, 0.0), velocity=0.008, body_rate=-0.3, tail_rate=3.0)
     found = track(film, tmp_path)
     assert "they are left out" in next(f.sentence for f in found.flags if f.name == "robot-partly-out-of-view")
     seen = np.isfinite(found.position[:, 0])
@@ -157,10 +157,10 @@ def test_a_robot_in_full_view_for_a_while_is_measured_then(flat_pictures, tmp_pa
 
 
 def test_no_robot_and_no_ruler_get_a_sentence(flat_pictures, tmp_path):
-    empty = flat_pictures.Flat(frames=1, start=(1.0, 0.0), noise=4.0)
+    empty = flat_pictures.Flat(frames=1, start=(1.0, 0.0), noise=4.0, size=(240, 120))
     with pytest.raises(InputError, match="no robot like 'biorob2012-wide'"):
         track(empty, tmp_path)
-    bare = flat_pictures.Flat(frames=1, ruler=False, size=(240, 180))
+    bare = flat_pictures.Flat(frames=1, ruler=False, size=(240, 120))
     setup = bare.write(tmp_path / "b.mp4")
     setup.write_text(flat_pictures.Flat().setup_text())
     with pytest.raises(InputError, match="shows no ruler"):
