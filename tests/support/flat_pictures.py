@@ -298,6 +298,18 @@ class Flat:
             cv2.imwrite(str(path / f"{round(time * self.fps):05d}.png"), picture[..., ::-1])
 
 
+_DRAWN: dict[str, list[np.ndarray]] = {}
+
+
+def drawn(film: Flat) -> list[np.ndarray]:
+    """The pictures of a film; those of the same film are drawn once, and are not to be written on."""
+    if (key := repr(film)) not in _DRAWN:
+        _DRAWN[key] = [picture for _, picture in film.pictures()]
+        for picture in _DRAWN[key]:
+            picture.setflags(write=False)
+    return _DRAWN[key]
+
+
 def flat(**changes: Any) -> Flat:
     """A flat film with some things changed."""
     return replace(Flat(), **changes)

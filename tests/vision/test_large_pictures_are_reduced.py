@@ -99,7 +99,7 @@ def test_a_film_is_followed_alike_where_it_is_searched_in_reduced_pictures(
 
     pytest.importorskip("av")
     path = tmp_path_factory.mktemp("reduced") / "a.mp4"
-    film = flat_pictures.Flat(frames=12, fps=4.0, body_rate=-0.4, tail_rate=3.0, noise=2.0, spacing=4e-3)
+    film = flat_pictures.Flat(frames=8, fps=2.7, body_rate=-0.4, tail_rate=3.0, noise=2.0, spacing=4e-3)
     setup, robot = load_setup(film.write(path))
     monkeypatch.setattr("spirillum.vision.video.pictures._USUAL", 160)
     monkeypatch.setattr(search, "SEARCH", replace(search.SEARCH, reduced_width=8.0))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flat_pictures import drawn
 from spirillum.robot.load import load
 from spirillum.vision.camera.optics import BodyPose, optics_of
 from spirillum.vision.setup import load_setup
@@ -32,16 +33,6 @@ def learnt(
     return wire, pictures, true["tail_phase"]
 
 
-_DRAWN: dict[str, list[np.ndarray]] = {}
-
-
-def drawn(film: Any) -> list[np.ndarray]:
-    """The pictures of a film; those of the same film are drawn once."""
-    if (key := repr(film)) not in _DRAWN:
-        _DRAWN[key] = [picture for _, picture in film.pictures()]
-    return _DRAWN[key]
-
-
 def errors(
     wire: TailWave, pictures: list[tuple[np.ndarray, BodyPose]], phase: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -53,6 +44,9 @@ def film(flat_pictures: ModuleType, **changes: Any) -> Any:
     known = {"frames": 24, "size": (480, 160), "focal": 560.0, "fine": 3, "tail_rate": 2 * np.pi * 1.3}
     return flat_pictures.flat(**(known | changes))
 
+
+FEW = {"frames": 16}
+"""Enough for a tail that does not fit, or is not seen."""
 
 LOOKS: list[dict[str, Any]] = [
     {},
@@ -75,7 +69,7 @@ def test_noise_and_bubbles_leave_errors_as_large_as_said(flat_pictures: ModuleTy
     import cv2
 
     wire, pictures, phase = learnt(film(flat_pictures, noise=14.0, lamp=0.2), tmp_path)
-    rng = np.random.default_rng(5)
+    pictures, rng = [(picture.copy(), pose) for picture, pose in pictures], np.random.default_rng(5)
     for picture, _ in pictures:
         for u, v in rng.uniform((20, 60), (200, 100), (4, 2)):
             cv2.circle(picture, (int(u), int(v)), 5, (255, 255, 255), 1)
@@ -92,9 +86,11 @@ def test_perspective_shows_a_wrong_hand(flat_pictures: ModuleType, tmp_path: Pat
     assert wire.flags[0].spoils == ("tail_rotation_rate",)
 
 
-@pytest.mark.parametrize("change", [{"tail.wavelength": "20 mm"}, {"tail.wavelength": "32 mm"}])
+@pytest.mark.parametrize(
+    "change", [{"tail.wavelength": "20 mm"}, pytest.param({"tail.wavelength": "32 mm"}, marks=pytest.mark.slow)]
+)
 def test_a_tail_of_another_wavelength_does_not_fit(flat_pictures: ModuleType, tmp_path: Path, change: Any) -> None:
-    wire, _, _ = learnt(film(flat_pictures), tmp_path, **change)
+    wire, _, _ = learnt(film(flat_pictures, **FEW), tmp_path, **change)
     assert wire.flags[0].name == "tail-does-not-fit"
     assert re.search(r"tail.wavelength looks like 2[456]\.", wire.flags[0].sentence)
     assert "amplitude" not in wire.flags[0].sentence
@@ -104,14 +100,14 @@ def test_a_tail_of_another_wavelength_does_not_fit(flat_pictures: ModuleType, tm
 def test_a_tail_of_another_amplitude_does_not_fit_and_its_wavelength_is_not_blamed(
     flat_pictures: ModuleType, tmp_path: Path, amplitude: str
 ) -> None:
-    wire, _, _ = learnt(film(flat_pictures), tmp_path, **{"tail.amplitude": amplitude})
+    wire, _, _ = learnt(film(flat_pictures, **FEW), tmp_path, **{"tail.amplitude": amplitude})
     assert wire.flags[0].name == "tail-does-not-fit"
     assert "amplitude looks like 2." in wire.flags[0].sentence  # 2.5 mm
     assert "wavelength" not in wire.flags[0].sentence
 
 
 def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> None:
-    wire, pictures, phase = learnt(film(flat_pictures, wire=(150, 190, 170), noise=3.0), tmp_path)
+    wire, pictures, phase = learnt(film(flat_pictures, **FEW, wire=(150, 190, 170), noise=3.0), tmp_path)
     missed, _ = errors(wire, pictures, phase)
     assert np.isnan(missed).mean() > 0.9
     assert any("tail_rotation_rate" in flag.spoils for flag in wire.flags)
@@ -121,7 +117,7 @@ def test_no_wire_gives_no_phase(flat_pictures: ModuleType, tmp_path: Path) -> No
 def test_a_tail_lost_in_noise_is_not_seen_and_is_not_said_to_have_another_shape(
     flat_pictures: ModuleType, tmp_path: Path, seed: int
 ) -> None:
-    wire, _, _ = learnt(film(flat_pictures, wire=(150, 190, 170), noise=20.0, seed=seed), tmp_path)
+    wire, _, _ = learnt(film(flat_pictures, **FEW, wire=(150, 190, 170), noise=20.0, seed=seed), tmp_path)
     assert [flag.name for flag in wire.flags] == ["tail-unreadable"]
     assert wire.flags[0].spoils == ("tail_rotation_rate",)
     assert "compress the film less" in wire.flags[0].sentence
