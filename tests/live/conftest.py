@@ -10,9 +10,9 @@ from flat_pictures import Flat
 
 @pytest.fixture(scope="session")
 def swimmer() -> Any:
-    """A robot in 72 pictures of 6 s, not yet written: 4 mm/s, -0.9 rad/s, 5 rad/s."""
+    """A robot in 60 pictures of 6 s, not yet written: 4 mm/s, -0.9 rad/s, 5 rad/s."""
     turning = {"body_rate": -0.9, "tail_rate": 5.0}
-    return Flat(frames=72, fps=12.0, velocity=4e-3, start=(0.01, 0.0), noise=2.0, **turning)
+    return Flat(frames=60, fps=10.0, velocity=4e-3, start=(0.01, 0.0), noise=2.0, **turning)
 
 
 @pytest.fixture(scope="session")

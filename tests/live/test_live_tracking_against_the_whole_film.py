@@ -18,7 +18,7 @@ RATES = {"forward_velocity": 4e-3, "body_rotation_rate": -0.9, "tail_rotation_ra
 
 @pytest.fixture(scope="module")
 def tracked(filmed, pictures):
-    tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn="2 s")
+    tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn="2.4 s")
     return tracker, [tracker.update(picture, time) for time, picture in pictures]
 
 
@@ -34,8 +34,8 @@ def test_speed_and_rates_are_those_of_the_whole_film(tracked, filmed):
 def test_every_frame_after_the_learning_is_where_the_robot_is(tracked, swimmer):
     seen = [one for one in tracked[1] if one.seen]
     assert [one.state for one in tracked[1][:10]] == ["learning"] * 10
-    assert "first 2 s" in tracked[1][0].reason
-    assert len(seen) > 45
+    assert "first 2.4 s" in tracked[1][0].reason
+    assert len(seen) > 30
     time = np.array([one.time for one in seen])
     true = swimmer.truth(time)
     assert [one.x for one in seen] == pytest.approx(true["x"], abs=4e-4)
@@ -48,30 +48,27 @@ def test_every_frame_after_the_learning_is_where_the_robot_is(tracked, swimmer):
 def test_rates_of_the_last_seconds_hold_the_truth(tracked):
     for name, true in RATES.items():
         rates = [one.rates[name] for one in tracked[1] if one.seen and math.isfinite(one.rates[name].value)]
-        assert len(rates) > 20
+        assert len(rates) > 14
         assert np.mean([rate.low < true < rate.high for rate in rates]) > 0.9
         assert np.median([rate.value for rate in rates]) == pytest.approx(true, rel=0.02)
 
 
 def test_what_is_said_of_a_frame_does_not_depend_on_later_ones(tracked, filmed, pictures):
-    tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn="2 s")
-    first = [tracker.update(picture, time) for time, picture in pictures[:40]]
-    assert [one.to_dict() for one in first] == [one.to_dict() for one in tracked[1][:40]]
+    tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn="2.4 s")
+    first = [tracker.update(picture, time) for time, picture in pictures[:30]]
+    assert [one.to_dict() for one in first] == [one.to_dict() for one in tracked[1][:30]]
 
 
-def test_a_robot_that_was_learnt_from_a_film_is_followed_from_the_first_frame(filmed, pictures):
+def test_a_robot_learnt_from_a_film_is_followed_from_the_first_frame_and_said_to_be_lost_once_it_is_gone(
+    filmed, pictures, flat_pictures
+):
     tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn_from=filmed)
     assert tracker.learnt
     seen = [tracker.update(picture, time) for time, picture in pictures[:4]]
     assert all(one.seen for one in seen)
     assert "too few readings" in seen[-1].rates["forward_velocity"].reason
-
-
-def test_a_robot_that_is_gone_is_said_to_be_lost(filmed, pictures, flat_pictures, swimmer):
-    tracker = LiveTracker(filmed.with_name("swimmer.setup.toml"), learn_from=filmed)
     empty = flat_pictures.Flat(start=(1.0, 0.0)).draw(0.0)
-    tracker.update(pictures[0][1], 0.0)
-    gone = tracker.update(empty, 0.1)
+    gone = tracker.update(empty, pictures[4][0])
     assert gone.state == "lost"
     assert "not seen" in gone.reason
     assert math.isnan(gone.x)

@@ -28,16 +28,16 @@ def setup_of(film):
 
 def test_a_film_gives_a_line_for_every_frame_and_one_for_all(filmed, capsys):
     with pytest.raises(SystemExit) as left:
-        main(["track", str(filmed), "--setup", str(setup_of(filmed)), "--pace", "fast", "--learn", "2s"])
+        main(["track", str(filmed), "--setup", str(setup_of(filmed)), "--pace", "fast", "--learn", "2.4s"])
     assert left.value.code == 0
     *lines, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [line["frame"] for line in lines] == list(range(72))
+    assert [line["frame"] for line in lines] == list(range(60))
     assert lines[0]["state"] == "learning"
     assert lines[-1]["state"] == "tracking"
     assert lines[-1]["position"]["unit"] == "m"
     assert "latency" not in lines[-1]
     assert last["schema"] == "spirillum.track/1"
-    assert last["frames"] == 72
+    assert last["frames"] == 60
     assert last["frames_dropped"] == 0
     for name, true in RATES.items():
         assert last[name]["low"] < true < last[name]["high"]
@@ -87,7 +87,7 @@ def served(listening, data, seconds):
 
 
 def test_a_stream_of_the_network_is_tracked_by_its_own_times(filmed, pictures):
-    data = stream_of(pictures, 12.0)
+    data = stream_of(pictures, 10.0)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         server = threading.Thread(target=served, args=(listening, data, 2.0), daemon=True)
         server.start()
@@ -112,10 +112,10 @@ def test_a_camera_that_stops_keeps_what_was_tracked(camera, filmed, capsys):
         main(["track", camera, "--setup", str(setup_of(filmed)), "--learn-from", str(filmed)])
     out, err = capsys.readouterr()
     assert left.value.code == 2
-    assert err == "spirillum: camera:swimmer.mp4 stopped after 72 frames: what was tracked is kept\n"
+    assert err == "spirillum: camera:swimmer.mp4 stopped after 60 frames: what was tracked is kept\n"
     last = json.loads(out.splitlines()[-1])
     assert last["frames_tracked"] > 0
-    assert last["frames"] + last["frames_dropped"] == 72
+    assert last["frames"] + last["frames_dropped"] == 60
 
 
 def test_another_size_than_asked_for_is_said(monkeypatch, filmed):
