@@ -23,11 +23,16 @@ from spirillum.vision.flag import Flag
 from spirillum.vision.track.track import Track
 
 Make = Callable[..., Track]
+SHORT = 2.0
+"""Enough of a track where only its files are looked at, s."""
 
 
 def test_observations_are_read_back(tmp_path: Path, make_track: Make, robot: Any) -> None:
     flag = Flag("aliased-body", "too fast", ("body_rotation_rate",))
-    trials = [trial_of(make_track(seed=1), robot, "one"), trial_of(make_track(seed=2, flags=(flag,)), robot, "two")]
+    trials = [
+        trial_of(make_track(seed=1), robot, "one"),
+        trial_of(make_track(seed=2, span=SHORT, flags=(flag,)), robot, "two"),
+    ]
     text = observation_rows(trials, robot, "setup.toml")
     assert text is not None
     path = tmp_path / "observations.csv"
@@ -63,7 +68,7 @@ def test_series_carry_units_and_come_back(tmp_path: Path, make_track: Make, robo
 
 @pytest.mark.parametrize("layout", [series_of, movement_of])
 def test_files_are_those_that_xarray_writes(tmp_path: Path, make_track: Make, robot: Any, layout: Any) -> None:
-    arrays = layout(trial_of(make_track(), robot, "a"), robot)
+    arrays = layout(trial_of(make_track(span=SHORT), robot, "a"), robot)
     arrays.write(tmp_path / "a.nc")
     write_dataset(arrays.dataset(), tmp_path / "b.nc")
     with xr.open_dataset(tmp_path / "a.nc") as ours, xr.open_dataset(tmp_path / "b.nc") as theirs:
@@ -75,7 +80,7 @@ def test_files_are_those_that_xarray_writes(tmp_path: Path, make_track: Make, ro
 
 def test_layout_of_movement(tmp_path: Path, make_track: Make, robot: Any) -> None:
     """What its validator asks of poses: these dimensions and variables; and the attributes that its loaders set."""
-    track = make_track()
+    track = make_track(span=SHORT)
     path = tmp_path / "a.movement.nc"
     movement_of(trial_of(track, robot, "a"), robot).write(path)
     with xr.open_dataset(path, engine="h5netcdf") as found:
@@ -114,7 +119,7 @@ def test_what_a_video_says_of_itself_stays_with_its_numbers(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
     flag = Flag("synthetic", "the video says of itself that it is synthetic: nothing here is measured")
-    followed |= {"a.mp4": make_track(flags=(flag,)), "b.mp4": make_track(seed=1)}
+    followed |= {"a.mp4": make_track(span=SHORT, flags=(flag,)), "b.mp4": make_track(span=SHORT, seed=1)}
     found = measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
     assert "a: the video says of itself that it is synthetic: nothing here is measured" in found.warnings
     assert (tmp_path / "out" / "observations.csv").read_text().startswith("# SYNTHETIC: ")
@@ -127,7 +132,7 @@ def test_no_trial_writes_over_another(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
     names = ["a.mp4", "a.movement.mp4", "A.avi"]
-    followed |= {name: make_track(seed=seed) for seed, name in enumerate(names)}
+    followed |= {name: make_track(span=SHORT, seed=seed) for seed, name in enumerate(names)}
     found = measure(names, setup_file, tmp_path / "out", annotated=False, figures=False)
     series = [name for name in found.files if name.endswith(".nc")]
     assert len({name.casefold() for name in series}) == 6
@@ -143,9 +148,9 @@ def test_one_bad_video_does_not_stop_the_others(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
     followed |= {
-        "a.mp4": make_track(),
+        "a.mp4": make_track(span=SHORT),
         "b.mp4": InputError("b.mp4 is empty; allowed: a film"),
-        "c.mp4": make_track(seed=3),
+        "c.mp4": make_track(span=SHORT, seed=3),
     }
     folder = tmp_path / "out"
     found = measure([f"{name}.mp4" for name in "abc"], setup_file, folder, annotated=False, figures=False)
@@ -171,7 +176,7 @@ def test_nothing_measured_is_an_error_with_the_first_sentence(
 def test_tables_of_others_stay_and_datasets_of_others_are_said(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
-    followed |= {"a.mp4": make_track(), "b.mp4": make_track(seed=2)}
+    followed |= {"a.mp4": make_track(span=SHORT), "b.mp4": make_track(span=SHORT, seed=2)}
     folder = tmp_path / "out"
     folder.mkdir()
     (folder / "observations.csv").write_text("my own")
@@ -188,7 +193,7 @@ def test_tables_of_others_stay_and_datasets_of_others_are_said(
 def test_an_interruption_keeps_what_was_finished(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make
 ) -> None:
-    followed |= {"a.mp4": make_track(), "b.mp4": KeyboardInterrupt()}
+    followed |= {"a.mp4": make_track(span=SHORT), "b.mp4": KeyboardInterrupt()}
     with pytest.raises(KeyboardInterrupt):
         measure(["a.mp4", "b.mp4"], setup_file, tmp_path / "out", annotated=False, figures=False)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"a.nc", "a.movement.nc", "observations.csv"}
@@ -199,7 +204,7 @@ def test_the_report_stands_alone_and_says_flags_and_failures(
 ) -> None:
     flag = Flag("robot-left-the-view", "the robot left the view at 8 s <b>&", ("tail_rotation_rate",))
     followed |= {
-        "b.mp4": make_track(seed=1, flags=(flag,)),
+        "b.mp4": make_track(span=SHORT, seed=1, flags=(flag,)),
         "c.mp4": InputError("c.mp4 is no film"),
     }
     measure(["b.mp4", "c.mp4"], setup_file, tmp_path / "out", annotated=False)
@@ -234,7 +239,7 @@ def test_bad_options_are_one_sentence(setup_file: Path, options: dict[str, Any],
 def test_a_full_disk_loses_no_finished_trial(
     tmp_path: Path, setup_file: Path, followed: dict[str, Any], make_track: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    followed |= {"a.mp4": make_track(), "b.mp4": make_track(seed=1)}
+    followed |= {"a.mp4": make_track(span=SHORT), "b.mp4": make_track(span=SHORT, seed=1)}
     write = Labelled.write
 
     def full(self: Labelled, path: Path) -> None:

@@ -16,9 +16,9 @@ pytest.importorskip("cv2")
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Path, Path]:
-    """The film's truth, its file and its setup: 3 s at 10 frames a second, two of them dropped."""
+    """The film's truth, its file and its setup: 3 s at 8 frames a second, two of them dropped."""
     flat = flat_pictures.flat(
-        frames=30, fps=10.0, velocity=1.5e-3, body_rate=-1.1, fine=3, dropped=frozenset({11, 12}), direction="left"
+        frames=24, fps=8.0, velocity=1.5e-3, body_rate=-1.1, fine=3, dropped=frozenset({11, 12}), direction="left"
     )
     path = tmp_path_factory.mktemp("film") / "flat.mp4"
     setup = flat.write(path)
@@ -46,7 +46,7 @@ def test_speed_and_rates_against_what_was_drawn(film: tuple[Any, Path, Path], me
         item = found.trials[0].quantities[name]
         assert item.value == pytest.approx(value, rel=0.01)
         assert item.low < item.value < item.high
-    assert found.trials[0].track.time.size == 28
+    assert found.trials[0].track.time.size == 22
 
 
 def test_the_annotated_film_keeps_frames_and_times_and_draws_the_outline(
@@ -74,7 +74,7 @@ def test_the_page_shows_a_frame(measured: tuple[Any, Path]) -> None:
 
 
 def test_clicks_on_the_same_film_give_the_same_speed(film: tuple[Any, Path, Path], tmp_path: Path) -> None:
-    """Every tenth frame, clicked exactly on the projected mid-length: scale and times come from the video."""
+    """Every ninth frame, clicked exactly on the projected mid-length: scale and times come from the video."""
     flat, path, setup = film
     rows = ["frame,x_px,y_px"]
     for index, time in enumerate(flat.times):
