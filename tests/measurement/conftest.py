@@ -1,11 +1,13 @@
 """Tracks with a known truth, made by hand."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from spirillum.measurement.trials import Trial, trial_of
 from spirillum.robot.load import load
 from spirillum.vision.camera.scale import Scale
 from spirillum.vision.flag import Flag
@@ -42,7 +44,7 @@ def setup_text() -> str:
     return SETUP
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_track() -> Callable[..., Track]:
     """A track of a steady robot with white errors."""
     import tomllib
@@ -82,5 +84,18 @@ def make_track() -> Callable[..., Track]:
             video=video,
             flags=flags,
         )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_trial(make_track: Callable[..., Track], robot: Any) -> Callable[..., Trial]:
+    """The trial of a track; that of the same track is measured once."""
+    known: dict[str, Trial] = {}
+
+    def make(name: str = "", **track: Any) -> Trial:
+        if (key := repr(sorted(track.items()))) not in known:
+            known[key] = trial_of(make_track(**track), robot)
+        return replace(known[key], name=name)
 
     return make
