@@ -83,7 +83,7 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
     film = tmp_path_factory.mktemp("trial") / "film.mp4"
     fast = {"model": "sbt"}  # without walls it goes far in 2 s
-    camera = {"size": "320x240", "fps": 8.0}
+    camera = {"size": "320x240", "fps": 12.0}
     return sp.render("biorob2012-wide", film, motion=fast, trial={"duration": "2 s"}, camera=camera)
 
 
