@@ -12,7 +12,7 @@ from spirillum.vision.track.size import checked_scale
 pytest.importorskip("av")
 pytest.importorskip("cv2")
 
-FRAMES, FPS = 18, 3.0
+FRAMES, FPS = 24, 4.0
 SIZE = 2.0 * np.hypot(0.005, 0.2 / 35.0)
 """Two of the stated standard errors of the apparent size: half a body has 35 pixels here."""
 
@@ -43,7 +43,7 @@ def flags(track):
 @pytest.fixture(scope="module")
 def resting(flat_pictures, tmp_path_factory):
     """The track of a robot at rest with a tail that turns, at the right scale."""
-    flat = flat_pictures.Flat(frames=FRAMES, fps=FPS, velocity=0.0, body_rate=0.0, tail_rate=2.0)
+    flat = flat_pictures.Flat(frames=12, fps=2.0, velocity=0.0, body_rate=0.0, tail_rate=2.0)
     path = tmp_path_factory.mktemp("resting") / "a.mp4"
     return follow(path, *load_setup(flat.write(path)))
 
