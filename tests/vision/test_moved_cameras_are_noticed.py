@@ -27,7 +27,7 @@ def test_shifts_of_what_stands_still_are_found_whatever_else_moves(shift):
 
 @pytest.mark.parametrize(
     ("ruler", "pixels"),
-    [(True, 6), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((True, 0), (False, 6), (False, 0)))],
+    [(True, 6), (False, 0), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((True, 0), (False, 6)))],
 )
 def test_a_bump_gives_no_numbers(flat_pictures, tmp_path, ruler, pixels):
     flat = flat_pictures.Flat(frames=12, fps=2.0, velocity=1e-3, ruler=ruler, noise=3.0)
