@@ -31,7 +31,7 @@ _LARGEST_CHUNK = 64 << 20
 
 @cache
 def _hdf5() -> type[h5py.File]:
-    """A file of HDF5 that opens each array of its root once.
+    """A file of HDF5 that opens each array of its root once, and where nothing is written those of its groups too.
 
     h5netcdf asks for the arrays of a file's dimensions some dozen times for every variable, and each time HDF5 opens
     one anew: half of the time that writing takes.
@@ -40,7 +40,7 @@ def _hdf5() -> type[h5py.File]:
 
     class Hdf5(h5py.File):  # type: ignore[misc]
         def __getitem__(self, name: Any) -> Any:
-            if not isinstance(name, str) or "/" in name.lstrip("/"):
+            if not isinstance(name, str) or ("/" in name.lstrip("/") and self.mode != "r"):
                 return super().__getitem__(name)
             if not (own := name.lstrip("/")):
                 return self

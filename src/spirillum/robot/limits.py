@@ -54,13 +54,16 @@ class Limit:
         """The requirement that `value` stands in `relation` to `bound`; equality is read to rounding error."""
         limit = np.atleast_1d(np.asarray(bound, dtype=float))
         slack = 1e-12 * np.abs(np.where(np.isinf(limit), 0.0, limit))
-        holds = {
-            "more than": value > limit,
-            "less than": value < limit,
-            "at least": value >= limit - slack,
-            "at most": value <= limit + slack,
-            "exactly": np.abs(value - limit) <= slack,
-        }[relation]
+        if relation == "more than":
+            holds = value > limit
+        elif relation == "less than":
+            holds = value < limit
+        elif relation == "at least":
+            holds = value >= limit - slack
+        elif relation == "at most":
+            holds = value <= limit + slack
+        else:
+            holds = np.abs(value - limit) <= slack
         return cls(field, value, relation, limit, unit, why, holds, flag)
 
     def sentence(self, index: int = 0) -> str:
