@@ -52,9 +52,11 @@ def _excess(motor: Electrics, i: Values, linear: Values, drive: Values) -> Value
     return (winding_resistance(motor, i) + linear) * i - drive
 
 
-def _newton_step(motor: Electrics, i: Values, linear: Values, f: Values) -> Values:
-    """The next current of Newton's method where the excess is f, A."""
-    return i - f / (winding_resistance(motor, i) + linear + _resistance_slope(motor, i) * i)
+def _excess_and_step(motor: Electrics, i: Values, linear: Values, drive: Values) -> tuple[Values, Values]:
+    """The excess at a current, V, and the next current of Newton's method, A."""
+    resistance = winding_resistance(motor, i) + linear
+    excess = resistance * i - drive
+    return excess, i - excess / (resistance + _resistance_slope(motor, i) * i)
 
 
 def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Values) -> Values:
@@ -91,9 +93,8 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
     # scipy.optimize.elementwise.find_root is as fast for a million robots, but six times slower for one robot and five
     # times slower for the few hundred currents that every step of a posterior's sampler asks for.
     for _ in range(200):
-        f = _excess(motor, i, linear, drive)
+        f, newton = _excess_and_step(motor, i, linear, drive)
         low, high = np.where(f < 0, i, low), np.where(f < 0, high, i)
-        newton = _newton_step(motor, i, linear, f)
         # Newton creeps along an exponential: a step that is not half the one before gives way to bisection.
         good = (newton >= low) & (newton <= high) & (np.abs(newton - i) <= 0.5 * last)
         new = np.where(good, newton, 0.5 * (low + high))
@@ -101,7 +102,7 @@ def steady_current(motor: Electrics, back_emf: Values, back_emf_per_current: Val
         if not np.any(last > 1e-9 * np.abs(i)):
             break
     # Newton's error is the square of the step before; where rounding led out of the bracket, the last step halved it.
-    newton = _newton_step(motor, i, linear, _excess(motor, i, linear, drive))
+    _, newton = _excess_and_step(motor, i, linear, drive)
     i = np.where(np.isfinite(newton), np.clip(newton, low, high), i)
     return np.where(battery_voltage(motor, i) < 0, np.nan, sense * i)
 
