@@ -105,7 +105,7 @@ def test_every_parameter_reaches_the_prediction(
 ) -> None:
     monkeypatch.setattr("spirillum.calibration.posterior.LARGEST_RHAT", 10.0)
     monkeypatch.setattr("spirillum.calibration.posterior.FEWEST_EFFECTIVE", 1.0)
-    few = Sampling(ensembles=2, walkers=28, warm_up=50, steps=51, kept=17, doublings=0)
+    few = Sampling(ensembles=2, walkers=56, warm_up=30, steps=26, kept=13, doublings=0)
     small = {"presets": (WIDE,), "wavelengths": (15.0, 25.0), "amplitudes": (1.5, 2.5)}
     stated = {"motor.back_emf_constant": "20%"} if "back_emf" in free else None  # else B_eff stands for it as well
     found = sp.calibrate(made(**small, seed=4), WIDE, model=model, free=free, sampling=few, assume_uncertainty=stated)
@@ -121,20 +121,9 @@ def test_every_parameter_reaches_the_prediction(
     assert again.advance_per_radian == pytest.approx(answer.advance_per_radian, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"posterior": "missing.nc"}, "missing.nc does not exist"),
-        ({"posterior": "calibration.toml"}, "is not a NetCDF-4 file"),
-        ({"posterior": "other.nc"}, "is no posterior of a calibration"),
-        ({"posterior": "unmixed.nc"}, "unmixed.nc has not converged"),
-        ({"posterior": "cut.nc"}, "cut.nc cannot be read"),
-        ({"posterior": "posterior.nc", "model": "rft"}, "is of model 'sbt', not 'rft'"),
-        ({"posterior": "posterior.nc", "calibration": "calibration.toml"}, "a posterior alone"),
-        ({"posterior": "posterior.nc", "calibrated": False}, "a posterior alone"),
-    ],
-)
-def test_wrong_posteriors_are_refused(fitted: Path, settings: dict[str, Any], words: str) -> None:
+@pytest.fixture(scope="module")
+def damaged(fitted: Path) -> Path:
+    """The folder of the posterior, with files beside it that are none."""
     import xarray as xr
 
     from spirillum.fitted.posterior_file import posterior_checksum
@@ -148,8 +137,25 @@ def test_wrong_posteriors_are_refused(fitted: Path, settings: dict[str, Any], wo
         values = {str(name): item.values for name, item in tree["posterior"].data_vars.items()}
         tree.attrs["checksum"] = posterior_checksum(tree.attrs, values)
         tree.to_netcdf(fitted / "unmixed.nc", engine="h5netcdf")
+    return fitted
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"posterior": "missing.nc"}, "missing.nc does not exist"),
+        ({"posterior": "calibration.toml"}, "is not a NetCDF-4 file"),
+        ({"posterior": "other.nc"}, "is no posterior of a calibration"),
+        ({"posterior": "unmixed.nc"}, "unmixed.nc has not converged"),
+        ({"posterior": "cut.nc"}, "cut.nc cannot be read"),
+        ({"posterior": "posterior.nc", "model": "rft"}, "is of model 'sbt', not 'rft'"),
+        ({"posterior": "posterior.nc", "calibration": "calibration.toml"}, "a posterior alone"),
+        ({"posterior": "posterior.nc", "calibrated": False}, "a posterior alone"),
+    ],
+)
+def test_wrong_posteriors_are_refused(damaged: Path, settings: dict[str, Any], words: str) -> None:
     ready = {
-        name: fitted / value if name in ("posterior", "calibration") else value for name, value in settings.items()
+        name: damaged / value if name in ("posterior", "calibration") else value for name, value in settings.items()
     }
     with pytest.raises(InputError, match="allowed") as caught:
         sp.predict(WIDE, tail_rate="1 Hz", **ready)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,14 @@ from synthetic_experiments import SHORT
 WIDE = "biorob2012-wide"
 
 
+@cache
+def wide() -> Any:
+    return load(WIDE)
+
+
 def known(size: int, tau: float, error: float, observed: dict[str, float], trials: int = 4, **tail: Any) -> Any:
     """A posterior with known discrepancy and error, and one robot that was observed; nothing was measured."""
-    robot = load(WIDE)
+    robot = wide()
     seen = {name: {"mean": mean, "trials": trials, "scale": abs(mean)} for name, mean in observed.items()}
     own = {
         "channel_diameter": 0.04,

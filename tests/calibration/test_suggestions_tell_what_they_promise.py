@@ -207,7 +207,8 @@ def test_a_set_tail_is_refused_for_every_candidate_has_its_own(
 
 
 def test_a_set_field_of_robots_that_nobody_named_says_whose_they_are(fitted: Path, run: Callable[..., Any]) -> None:
-    found = run("suggest", str(fitted / "posterior.nc"), "--set", "motor.resistance=5 ohm", "--json")
+    few = ("--candidates", str(candidates(fitted, "40,20,2.5")))
+    found = run("suggest", str(fitted / "posterior.nc"), *few, "--set", "motor.resistance=5 ohm", "--json")
     assert found.code == 0
     assert "biorob2012-wide and biorob2012-narrow, are taken" in json.loads(found.out)["warnings"][0]
 
@@ -215,8 +216,8 @@ def test_a_set_field_of_robots_that_nobody_named_says_whose_they_are(fitted: Pat
 def test_the_default_robots_are_for_their_own_posterior(fitted: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from spirillum.fitted import posterior_file
 
-    found = sp.suggest(fitted / "posterior.nc")
-    assert len(found.candidates) == 50
+    found = sp.suggest(fitted / "posterior.nc", candidates=candidates(fitted, "40,20,2.5", "30,20,2.5"))
+    assert len(found.candidates) == 2
     assert "biorob2012-wide and biorob2012-narrow, are taken" in found.warnings[0]
     known = posterior_file.read_posterior(fitted / "posterior.nc")
     for changed in (replace(known, channels=(0.024,)), replace(known, body=(0.016, 0.035))):

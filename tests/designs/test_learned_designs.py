@@ -37,8 +37,12 @@ def truth(batch: RobotBatch, variables: tuple[Variable, ...]) -> Points:
     return points_of(batch, variables, Rft().axial)
 
 
-def test_learned_optimum_is_that_of_the_truth(robot: Robot) -> None:
-    """Within 1 % of the best of a full grid, under unknown friction; the stated error is that of the optimum."""
+def test_learned_optimum_is_that_of_the_truth(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within 1 % of the best of a full grid, under unknown friction; the stated error is that of the optimum.
+
+    No wire of these tails touches itself: to ask that of every design takes most of the time.
+    """
+    monkeypatch.setattr("spirillum.fluid.wire.slender._closest", lambda _: np.inf)
     unknowns = unknowns_of(robot, FRICTION, None, "slender")
     space = space_of(robot, TAIL)
     objective = Objective(quantity_of("forward_velocity", "maximise"), 1.0)

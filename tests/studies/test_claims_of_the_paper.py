@@ -1,6 +1,9 @@
 """Verdicts: undecidable without observed rates, decided with them, never invented."""
 
+import tomllib
 from collections import Counter
+from importlib.resources import files
+from typing import Any
 
 import pytest
 
@@ -14,6 +17,13 @@ from spirillum.papers.registry import claims_of
 def unobserved() -> list[Claim]:
     """Claims of the paper's study without observations."""
     return evaluated(sp.study())
+
+
+@pytest.fixture(scope="module")
+def brief() -> dict[str, Any]:
+    """The paper's study without its curves against assumed motor rates, which take longest and decide no claim."""
+    settings = tomllib.loads(files("spirillum.papers.biorob2012").joinpath("study.toml").read_text(encoding="utf-8"))
+    return {name: value for name, value in settings.items() if name != "assumed_motor_rates"}
 
 
 def by_words(claims: list[Claim], words: str) -> Claim:
@@ -65,26 +75,28 @@ def test_every_claim_is_complete(unobserved: list[Claim]) -> None:
     assert set(verdicts) == {"agrees", "disagrees", "undecidable"}
 
 
-def test_synthetic_observations_decide(planted) -> None:
+def test_synthetic_observations_decide(planted, brief: dict[str, Any]) -> None:
     """Speeds made by SBT: SBT then explains them best, and statements about them are decided."""
-    claims = evaluated(sp.study(observations=planted(None, "sbt", "rotor", 1e-5)))
+    claims = evaluated(sp.study(brief, observations=planted(brief, "sbt", "rotor", 1e-5)))
     assert by_words(claims, "SBT predicts forward velocities better").verdict == "agrees"
     assert by_words(claims, "Reynolds number, wide").verdict == "disagrees"
     assert by_words(claims, "largest velocity decrease").verdict == "disagrees"
     assert by_words(claims, "B_eff depends mostly on the amplitude").verdict in ("agrees", "disagrees")
     assert by_words(claims, "body rotation rates within 1 to 50 %").verdict in ("agrees", "disagrees")
-    swapped = evaluated(sp.study(observations=planted(None, "rft", "rotor", 1e-5)))
+    swapped = evaluated(sp.study(brief, observations=planted(brief, "rft", "rotor", 1e-5)))
     assert by_words(swapped, "SBT predicts forward velocities better").verdict == "disagrees"
 
 
 @pytest.mark.parametrize("columns", ["forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz", "forward_velocity_mm_s"])
-def test_a_few_tails_decide_nothing_about_all_of_them(tmp_path, columns: str, unobserved: list[Claim]) -> None:
+def test_a_few_tails_decide_nothing_about_all_of_them(
+    tmp_path, columns: str, unobserved: list[Claim], brief: dict[str, Any]
+) -> None:
     """Synthetic rows of two wide tails: statements about all tails stay open, and say what is missing."""
     path = tmp_path / "observations.csv"
     values = "1.0,1.2,-0.1"[: 3 if "," not in columns else None]
     rows = [f"40,25,{amplitude},{values}" for amplitude in ("2.5", "3.5")]
     path.write_text("\n".join([f"channel_diameter_mm,wavelength_mm,amplitude_mm,{columns}", *rows]) + "\n")
-    claims = evaluated(sp.study(observations=path))
+    claims = evaluated(sp.study(brief, observations=path))
     assert [claim.claim for claim in claims] == [claim.claim for claim in unobserved]
     for few, none in zip(claims, unobserved, strict=True):
         assert "nan" not in few.computed

@@ -25,7 +25,7 @@ SHORT = {
     "friction": ["rotor"],
     "claims": "biorob2012",
     "predicted": True,
-    "laid_down": {"duration": "2.4 s", "wait": ["0 s", "5 s"]},
+    "laid_down": {"duration": "2.4 s", "wait": ["0 s", "0.5 s"]},
     "grid": {
         "channels": {"wide": "biorob2012-wide", "narrow": "biorob2012-narrow"},
         "wavelengths": ["25 mm"],
@@ -50,7 +50,7 @@ def readings(short) -> Readings:
 def test_a_reading_is_that_of_the_run_itself(short) -> None:
     """Run 1 of the narrow robot, read over the whole of it, against `simulate`, and its B_eff against `predict`."""
     robot = sp.load("biorob2012-narrow")
-    laid = laid_down_runs(robot, LaidDown(duration="2.4 s", wait=("0 s", "5 s")))[1]
+    laid = laid_down_runs(robot, LaidDown(duration="2.4 s", wait=("0 s", "0.5 s")))[1]
     assert (laid.gap, laid.pitch, laid.wait, laid.roughness, laid.friction_coefficient) == (1e-4, 0.0, 0.0, 3e-5, 0.0)
     run = sp.simulate(
         robot,

@@ -3,10 +3,10 @@
 import hashlib
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,24 +28,24 @@ GRID = {
     "assumed_motor_rates": list(AT),
     "grid": {
         "channels": {"wide": "biorob2012-wide", "narrow": "biorob2012-narrow"},
-        "wavelengths": [f"{value} mm" for value in (15, 20, 25, 30, 35)],
-        "amplitudes": ["1.5 mm", "2 mm", "2.5 mm", "3 mm", "40 mm"],
+        "wavelengths": [f"{value} mm" for value in (15, 20, 25)],
+        "amplitudes": ["1.5 mm", "2.5 mm", "40 mm"],
     },
 }
 
 
 @pytest.fixture
 def small_regions(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two rows of amplitudes a region, so that there are six: some smaller than the others."""
-    monkeypatch.setattr(regions, "BLOCK", 11)
+    """Two rows of amplitudes a region, so that there are four: some smaller than the others."""
+    monkeypatch.setattr(regions, "BLOCK", 7)
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The store of the grid in six regions, written by one process without a break; nobody changes it."""
+    """The store of the grid in four regions, written by one process without a break; nobody changes it."""
     store = tmp_path_factory.mktemp("whole") / "study.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(regions, "BLOCK", 11)
+        patch.setattr(regions, "BLOCK", 7)
         sp.study(GRID, store=store)
     return store
 
@@ -75,7 +75,7 @@ def test_store_holds_what_the_study_answers(whole: Path) -> None:
     assert stored.attrs["unanswered"] == int(np.count_nonzero(stored["outside"])) > 0
     assert not (whole / "notes").exists()
     chunks = [path for path in (whole / "outside" / "c").rglob("*") if path.is_file()]
-    assert len(chunks) == 6
+    assert len(chunks) == 4
 
 
 def test_store_of_a_list_with_observed_rates_holds_what_the_study_answers(
@@ -97,7 +97,7 @@ def test_store_of_a_list_with_observed_rates_holds_what_the_study_answers(
 def test_interrupted_store_adds_what_is_missing(tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = tmp_path / "part.zarr"
     done: list[int] = []
-    original, most = study_store.write_pieces, 4
+    original, most = study_store.write_pieces, 3
 
     def counted(folder: Path, pieces: dict[str, bytes]) -> None:
         if any(key.startswith("notes") for key in pieces):
@@ -113,7 +113,7 @@ def test_interrupted_store_adds_what_is_missing(tmp_path: Path, whole: Path, mon
     next(path for path in (store / "tail_torque" / "c").rglob("*") if path.is_file()).unlink()
     most = 99
     sp.study(GRID, store=store)
-    assert len(done) == 7
+    assert len(done) == 5
     assert tree(store) == tree(whole)
     done.clear()
     sp.study(GRID, store=store)
@@ -173,7 +173,8 @@ def test_what_cannot_be_stored_gets_a_sentence(tmp_path: Path) -> None:
     walled = {"models": ["tube"], "robots": ["biorob2012-wide"], "band": True}
     with pytest.raises(sp.InputError, match="band with a store"):
         sp.study(walled, store=tmp_path / "band.zarr")
-    many = {**GRID, "grid": {**GRID["grid"], "wavelengths": [f"{1 + n / 1e6} cm" for n in range(60_000)]}}  # type: ignore[dict-item]
+    wavelengths, amplitudes = ([f"{1 + n / 1e4} mm" for n in range(count)] for count in (3_000, 100))
+    many = {**GRID, "grid": {**GRID["grid"], "wavelengths": wavelengths, "amplitudes": amplitudes}}  # type: ignore[dict-item]
     with pytest.raises(sp.InputError, match=r"at most 5000000, or 500000000 in a store"):
         sp.study(many)
     assert tree(store) == before
@@ -186,23 +187,39 @@ def test_a_store_prints_no_ranking_to_shorten(run, tmp_path: Path) -> None:  # t
     assert not (tmp_path / "study.zarr").exists()
 
 
+@contextmanager
+def little_space() -> Iterator[None]:
+    """No file can be larger than 6 kB: it stands for a full disk."""
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (6000, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit on the size of files")
-def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(tmp_path: Path) -> None:
-    """A limit on the size of files stands for the disk."""
-    (tmp_path / "study.toml").write_text('models = ["rft"]\nrobots = ["biorob2012-wide"]\n')
-    limited = (
-        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
-        "sys.dont_write_bytecode = True;"  # else modules are kept cut off, and no other process can import them
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000));"
-        "from spirillum.cli import main; main(['study', 'study.toml', '--store', 'study.zarr'])"
-    )
-    found = subprocess.run([sys.executable, "-c", limited], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert found.returncode == 2
-    (line,) = [line for line in found.stderr.splitlines() if not line.startswith("estimate")]
+def test_a_full_disk_gets_a_sentence_and_the_rest_is_added_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # else modules are kept cut off, for all who import them
+    tiny = {"models": ["rft"], "robots": ["biorob2012-wide"]}
+    sp.study(tiny, store="whole.zarr")
+    Path("study.toml").write_text('models = ["rft"]\nrobots = ["biorob2012-wide"]\n')
+    with little_space():
+        found = run("study", "study.toml", "--store", "study.zarr")
+    assert found.code == 2
+    (line,) = [line for line in found.err.splitlines() if not line.startswith("estimate")]
     assert line.startswith("spirillum: no space is left for ")
     assert line.endswith("; allowed: a place with space")
-    again = sp.study({"models": ["rft"], "robots": ["biorob2012-wide"]}, store=tmp_path / "study.zarr")
+    again = sp.study(tiny, store="study.zarr")
     assert np.isfinite(again["forward_velocity"]).all()
+    assert tree(tmp_path / "study.zarr") == tree(tmp_path / "whole.zarr")
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "here", "tcp://"])

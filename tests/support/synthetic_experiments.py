@@ -15,7 +15,7 @@ PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 HEADER = "robot,channel_diameter_mm,wavelength_mm,amplitude_mm,trial,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz"
 WAVELENGTHS = (10.0, 15.0, 20.0, 25.0)
 AMPLITUDES = (1.5, 2.0, 2.5, 3.5)
-SHORT = Sampling(ensembles=2, walkers=64, warm_up=100, steps=150, kept=40, doublings=3)
+SHORT = Sampling(ensembles=2, walkers=160, warm_up=60, steps=120, kept=20, doublings=3)
 """A posterior that passes its own diagnostics: walkers of one step are computed together, many cost little more."""
 
 
