@@ -67,6 +67,7 @@ def test_an_interruption_while_sampling_prints_nothing(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_figures_name_tails_and_say_synthetic(made: Callable[..., Path]) -> None:
     from spirillum.view.figures.calibration import calibration_figures
 

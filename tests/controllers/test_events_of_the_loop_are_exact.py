@@ -77,7 +77,7 @@ def test_shares_of_lost_frames_and_commands_are_those_asked_for(toy: Any) -> Non
 
 def test_errors_of_frames_have_their_sizes_and_memory(toy: Any) -> None:
     settings = lab(camera={"position_noise": 1e-5, "position_wander": 3e-5, "memory": 0.5})
-    run = run_loop(toy(0.0), Always(), settings, 600.0, seed=1)
+    run = run_loop(toy(0.0), Always(), settings, 300.0, seed=1)
     errors = np.array([sight.position for _, sight in run.frames if sight is not None])
     assert np.std(errors) == pytest.approx(np.hypot(1e-5, 3e-5), rel=0.1)
     after = np.corrcoef(errors[:-15], errors[15:])[0, 1]  # half a second

@@ -69,10 +69,11 @@ def trial(lab: Lab, seed: int, *, gap: float = 1.0) -> tuple[tuple[float, float]
     return (float(3.0**u), float(2.0**v)), sights, readings
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+@pytest.mark.parametrize("trials", [40, pytest.param(80, marks=pytest.mark.slow)])
+def test_intervals_hold_the_truth_as_often_as_they_say(trials: int) -> None:
     lab, bank = Lab.of(LAB), paths()
     held, widths = [], []
-    for seed in range(80):
+    for seed in range(trials):
         truth, sights, readings = trial(lab, seed)
         found = learnt(bank, lab, [Stretch(0.0, END)], sights, readings)
         assert found is not None

@@ -19,7 +19,7 @@ def places(run: LoopRun, times: Any) -> Any:
     return np.interp(times, [m.time for m in run.moments], [m.pose.position[0] for m in run.moments])
 
 
-@pytest.mark.parametrize("share", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("share", [0.5, pytest.param(1.0, marks=pytest.mark.slow), 2.0])
 @pytest.mark.parametrize(("lab", "within"), [(Lab.exact(), 0.005), (Lab.of(None), 0.05)])
 def test_speed_is_held_whatever_the_robots_own_is(toy: Any, share: float, lab: Lab, within: float) -> None:
     """It expects SPEED, the robot has a share of it: no rest with exact sensors, 5 % with those that err as usual."""

@@ -104,14 +104,14 @@ def test_a_pusher_in_its_tube_leaves_its_orbit() -> None:
     answers = {
         name: sp.control(
             robot,
-            {"kind": "keep-axis", "duration": "10 s"},
+            {"kind": "keep-axis", "duration": "7 s"},
             lab=LAB,
             controller=name,
             plant={"placement": {"gap": "8.5 mm"}},
         )
         for name in ("feedback", "nothing")
     }
-    last = {name: distances(answer.run, [10.0])[0] for name, answer in answers.items()}
+    last = {name: distances(answer.run, [7.0])[0] for name, answer in answers.items()}
     assert last["nothing"] > 2.1e-3
     assert last["feedback"] < last["nothing"] - 5e-4
     assert answers["feedback"].to_dict()["motor_off_at_end"]

@@ -36,6 +36,11 @@ def found(coefficient: float = 0.1, tail_rate: str | None = None) -> FreeMotion:
     return free_motion(robot(), roughness=ROUGH, in_tube=in_tube, tail_rate=tail_rate)
 
 
+@lru_cache
+def settled() -> Any:
+    return sp.settle(robot(), roughness=ROUGH, in_tube={"friction_coefficient": 0.1}, until="0.2 mm")
+
+
 def test_simulation_laid_down_at_the_steady_place_stays_there() -> None:
     """Within the ripple of the tail's phase: speed and body rate to 1 %, azimuth and yaw to 0.1 degrees."""
     motion = found().prediction
@@ -94,7 +99,7 @@ def _turned_about_x(quaternion: np.ndarray, angle: float) -> np.ndarray:
 
 def test_film_carries_the_body_and_dry_friction_rolls_it_back() -> None:
     """The tail is right-handed: the body turns to negative rates, and so does the azimuth in a film."""
-    film, dry = found(0.0).run.lying, found(0.3).run.lying
+    film, dry = found(0.0).run.lying, found(0.1).run.lying
     assert found(0.0).prediction.body_rotation_rate < 0
     assert film.azimuth < -0.1
     assert dry.azimuth > film.azimuth + 0.1
@@ -127,8 +132,7 @@ def test_friction_is_inferred_at_a_tail_rate_that_is_given() -> None:
 
 def test_predict_settle_and_the_engine_say_the_same() -> None:
     """With the robot's own roughness and friction; what `settle` adds is the way there."""
-    rough = {"roughness": ROUGH, "in_tube": {"friction_coefficient": 0.1}}
-    answer = sp.settle(robot(), **rough, until="0.2 mm")
+    answer = settled()
     motion = found()
     assert answer.prediction.forward_velocity == pytest.approx(motion.prediction.forward_velocity, rel=1e-9)
     assert answer.lying == motion.run.lying
@@ -146,7 +150,7 @@ def test_predict_settle_and_the_engine_say_the_same() -> None:
 
 def test_film_under_the_level_robot_is_a_thin_one() -> None:
     """Over 3 sqrt(2) pi mu L (a_e/h)^(3/2) of the straight side: towards 1 as the gap falls."""
-    ratios = sp.settle(robot(), roughness=ROUGH).lubrication_ratios
+    ratios = settled().lubrication_ratios
     assert ratios == pytest.approx(np.ones(ratios.size), abs=0.05)
     a, h = 9e-3, 1e-7
     xi = np.arccosh(1 + h / a)

@@ -70,7 +70,7 @@ def test_slip_beyond_step_out_has_adlers_mean(share: float) -> None:
     assert 2 * np.pi * slips / (last - first) == pytest.approx(np.sqrt(rate**2 - step_out**2), rel=1e-3)
 
 
-@pytest.mark.parametrize("angle", [50.0, pytest.param(70.0, marks=pytest.mark.slow), 85.0])
+@pytest.mark.parametrize("angle", [50.0, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (70.0, 85.0))])
 def test_tumbling_wobbling_and_step_out_of_a_tilted_moment(angle: float) -> None:
     """Morozov and Leshansky, Nanoscale 6:1580 (2014): sin(wobble) = w_0 cos(angle)/w above w_0 cos(angle)."""
     tilt, along, across = np.radians(angle), 1.0, 3.0

@@ -85,6 +85,7 @@ def test_least_gap_that_is_resolved_directly_is_told() -> None:
         prepared(robot, "tube", placement={"gap": 0.97e-3 * told, "pitch": 0.0})
 
 
+@pytest.mark.usefixtures("unplaced")
 def test_run_is_kept_where_its_picture_cannot_be_written(tmp_path: Path) -> None:
     run, lost = tmp_path / "run.nc", "/proc/run.png"
     arguments = ["simulate", "biorob2012-wide", "--motion", "held", "--turns", "0.1", "-o", str(run), "--plot", lost]
