@@ -36,6 +36,8 @@ __all__ = [
 _STARTS = 6
 _STEP = 1e-4
 """Step of the central differences, in standard deviations of the prior."""
+_SMALL_STEP = float(np.sqrt(np.finfo(float).eps))
+"""Step of the forward differences on the way to the best fit, relative to coordinates above one."""
 _BLIND = 1e-8
 """Relative change of a prediction by one standard deviation of a prior that is none but rounding."""
 LARGEST = 12.0
@@ -221,15 +223,22 @@ def weighted_residuals(
         discrepancy: relative misfit from robot to robot, by quantity.
         prior: weight of the distance from the middle of the prior.
     """
-    predicted = problem.predicted_at(z)
+    return _residuals(problem, z[None], error, discrepancy, prior)[0]
+
+
+def _residuals(
+    problem: Problem, z: Samples, error: dict[Quantity, float], discrepancy: dict[Quantity, float], prior: float
+) -> Samples:
+    """`weighted_residuals` at many coordinates, (draws, free numbers), at once: (draws, residuals)."""
+    predicted = problem.predicted(z)
     # A discrepancy is relative to the size of the mean here: else a large prediction would excuse itself.
     sized = {name: problem.ratio(name).scale for name in predicted}
     errors = standard_errors(problem, sized, error, discrepancy)
     parts = []
     for name, values in predicted.items():
         ratio = problem.ratio(name)
-        parts.append(((ratio.mean - values) / errors[name])[ratio.seen])
-    found: Samples = np.nan_to_num(np.concatenate([*parts, prior * z]), nan=1e6, posinf=1e6, neginf=-1e6)
+        parts.append(((ratio.mean - values) / errors[name])[:, ratio.seen])
+    found: Samples = np.nan_to_num(np.concatenate([*parts, prior * z], axis=1), nan=1e6, posinf=1e6, neginf=-1e6)
     return found
 
 
@@ -245,12 +254,20 @@ def _best(
     """The best of several local fits; the first starts where it is told, the others are spread over the prior."""
     from scipy.optimize import least_squares
 
+    def jacobian(z: Samples) -> Samples:
+        """By forward differences, all from one call: most of what a call takes does not depend on how much it asks."""
+        step = np.copysign(_SMALL_STEP * np.maximum(1.0, np.abs(z)), z)
+        step = np.where(np.abs(z + step) > LARGEST, -step, step)
+        rows = _residuals(problem, np.concatenate([z[None], z + np.diag(step)]), error, discrepancy, prior)
+        return (rows[1:] - rows[0]).T / step
+
     spread = np.random.default_rng(20120624).normal(size=(starts - 1, start.size))
     best, cost = start, np.inf
     for first in (start, *spread):
         found = least_squares(
             lambda z: weighted_residuals(problem, z, error, discrepancy, prior=prior),
             np.clip(first, -3.0, 3.0) if first is not start else first,
+            jac=jacobian,
             bounds=(-LARGEST, LARGEST),
             xtol=1e-13,
             ftol=1e-13,

@@ -26,7 +26,7 @@ from spirillum.fluid.closed.perrin import body_axial
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.batch import RobotBatch
-from spirillum.robot.limits import broken
+from spirillum.robot.limits import all_hold
 from spirillum.swimming.drawn_resistance import AxialTable, Draws, chebyshev_points
 from spirillum.swimming.steady import requirements
 
@@ -265,14 +265,16 @@ def _with_assumed(free: Sequence[str], assumed: Mapping[str, float]) -> tuple[st
 
 
 def _check_domain(experiment: Experiment, model: SwimmerModel, batch: RobotBatch) -> None:
-    for place, rows in enumerate(experiment.rows):
-        one = batch if batch.size == 1 else next(b for cut, b in batch.blocks(1) if cut.start == place)
-        outside = broken(requirements(one, model))
-        if outside:
-            raise InputError(
-                f"{experiment.source}, row {rows[0]}: no robot has this tail with model '{model.name}': "
-                f"{outside[0].sentence()}"
-            )
+    limits = requirements(batch, model)
+    outside = np.flatnonzero(~all_hold(limits))
+    if not outside.size:
+        return
+    place = int(outside[0])
+    first = next(limit for limit in limits if not np.broadcast_to(limit.holds, (batch.size,))[place])
+    raise InputError(
+        f"{experiment.source}, row {experiment.rows[place][0]}: no robot has this tail with model '{model.name}': "
+        f"{first.sentence(place)}"
+    )
 
 
 def _check_motor(experiment: Experiment, free: Sequence[str], batch: RobotBatch) -> None:
