@@ -37,7 +37,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(made: Callable[..., Path]
 
 def test_a_wrong_model_says_by_how_much_it_misses(made: Callable[..., Path]) -> None:
     small = {"wavelengths": (10.0, 15.0, 25.0), "amplitudes": (1.5, 3.5), "presets": PRESETS[:1]}
-    path = made(model="slender", drag=(3.0,), rotation=(1.5,), **small)
+    path = made(drag=(3.0,), rotation=(1.5,), **small)
     found = sp.calibrate(path, PRESETS[0], model="rft", method="least-squares")
     fitted = found.values["body_drag"]
     assert found.discrepancy["advance"].value > 0.05

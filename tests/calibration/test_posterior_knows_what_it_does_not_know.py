@@ -19,9 +19,9 @@ WIDE = "biorob2012-wide"
 
 @pytest.fixture(scope="module")
 def wrong(made: Callable[..., Path]) -> Any:
-    """Resistive force theory fitted to data that `slender` made."""
+    """Resistive force theory fitted to data that slender-body theory made."""
     small = {"wavelengths": (10.0, 15.0, 25.0), "amplitudes": (1.5, 3.5), "presets": (WIDE,)}
-    path = made(model="slender", drag=(3.0,), rotation=(1.5,), **small)
+    path = made(drag=(3.0,), rotation=(1.5,), **small)
     return sp.calibrate(path, WIDE, model="rft", sampling=SHORT)
 
 
