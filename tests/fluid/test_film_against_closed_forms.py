@@ -96,11 +96,11 @@ def test_rest_of_a_sphere_near_a_plane_is_regular(gap):
 @pytest.mark.parametrize("name", BODIES)
 def test_resistance_is_symmetric_positive_and_mirrored(name):
     for pitch, yaw in PLACES:
-        for offset in (0.0, 5e-3, 9e-3):
+        for offset in (0.0, 9e-3):
             film = film_resistance(BODIES[name], 20e-3, offset, pitch, yaw)
             assert np.abs(film - film.T).max() <= 1e-12 * np.abs(film).max()
             assert np.linalg.eigvalsh(film / np.sqrt(np.outer(np.diag(film), np.diag(film)))).min() > 0
-            mirrored = film_resistance(BODIES[name], 20e-3, offset, pitch, -yaw)
+            mirrored = film_resistance(BODIES[name], 20e-3, offset, pitch, -yaw) if yaw else film
             assert relative(MIRROR @ mirrored @ MIRROR, film) < 1e-10
 
 

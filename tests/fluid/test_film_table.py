@@ -1,11 +1,20 @@
 """The tabulated film against the direct solution, and what must hold anywhere."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 
+import spirillum as sp
 from spirillum.errors import InputError
+from spirillum.fluid.tube import film as film_module
 from spirillum.fluid.tube.film import FilmTable, film_resistance
+from spirillum.fluid.tube.film_surface import frame
+from spirillum.fluid.tube.library import find_table
+from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.kernels.film_table import film_at, smallest_gap
+from spirillum.kernels.tube_table import parts_of
+from spirillum.robot.batch import RobotBatch
 from spirillum.robot.outline import body_outline
 
 TUBE, A = 20e-3, 9e-3
@@ -15,7 +24,10 @@ MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 @pytest.fixture(scope="module")
 def table():
-    return FilmTable.of(CAPSULE, TUBE, intervals=11)
+    """The film in the table that is shipped for the paper's robot: to make one takes some fifteen seconds."""
+    geometry = RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
+    assert geometry.body == CAPSULE
+    return FilmTable(parts_of(find_table(geometry, TUBE).packed).film)
 
 
 def offset_at(packed, gap, p, psi):
@@ -41,20 +53,56 @@ def errors(table, seed, count, pitch, gaps=(1e-3, 0.2)):
     return np.array(found)
 
 
-def test_coarse_table_is_near_the_direct_solution(table):
+def test_shipped_table_is_near_the_direct_solution(table):
     found = errors(table, 0, 40, 0.1)
-    assert found.max() < 2e-2
-    assert np.median(found) < 2e-3
+    assert found.max() < 3e-3
+    assert np.median(found) < 3e-4
 
 
-@pytest.mark.parametrize(("pitch", "yaw"), [(0.0, 0.0), (0.0, 0.004), (0.002, -0.02), (-0.005, 0.1)])
-def test_film_as_thin_as_asperities_is_near_the_direct_solution(table, pitch, yaw):
-    """Where a robot rests: 2e-5 to 1e-3 of the radius. A level robot is met by the smallest yaw of the nodes."""
+def test_table_gives_back_the_films_that_it_was_made_of(monkeypatch):
+    """In single precision; but where a pitch was too steep to be solved for."""
+    made_of = []
+
+    def kept(body, radius, e, p, psi):
+        made_of.append((e, p, psi, resistance_of(body, radius, e, p, psi)))
+        return made_of[-1][-1]
+
+    resistance_of = film_module.resistance_of
+    monkeypatch.setattr(film_module, "resistance_of", kept)
+    table = FilmTable.of(CAPSULE, TUBE, intervals=2)
+    solved = [(place, film) for *place, film in made_of if abs(place[1]) < 0.45]
+    assert len(solved) > 0.7 * len(made_of)
+    for place, film in solved:
+        roots = np.sqrt(np.diag(film))
+        assert np.abs((table.at(*place)[0] - film) / np.outer(roots, roots)).max() < 1e-5
+
+
+def thin_errors(table, pitch, yaw):
+    """Where a robot rests, as thin as asperities: 2e-5 to 1e-3 of the radius."""
+    found = []
     for gap in A * np.geomspace(2e-5, 1e-3, 4):
         e = offset_at(table.packed, gap, pitch, yaw)
         direct = film_resistance(CAPSULE, TUBE, e, pitch, yaw)
         roots = np.sqrt(np.diag(direct))
-        assert np.abs((table.at(e, pitch, yaw)[0] - direct) / np.outer(roots, roots)).max() < 1e-2
+        found.append(np.abs((table.at(e, pitch, yaw)[0] - direct) / np.outer(roots, roots)).max())
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("pitch", "yaw"), [(0.0, 0.0), (0.002, -0.02)])
+def test_film_as_thin_as_asperities_is_near_the_direct_solution(table, pitch, yaw):
+    """A level robot is met by the smallest yaw of the nodes."""
+    assert thin_errors(table, pitch, yaw).max() < 1e-2
+
+
+@pytest.mark.slow
+def test_coarse_table_of_small_yaws_is_near_the_direct_solution():
+    """Where the film is thick, and as thin as asperities."""
+    table = FilmTable.of(CAPSULE, TUBE, intervals=11)
+    found = errors(table, 0, 40, 0.1)
+    assert found.max() < 2e-2
+    assert np.median(found) < 2e-3
+    for pitch, yaw in ((0.0, 0.0), (0.0, 0.004), (0.002, -0.02), (-0.005, 0.1)):
+        assert thin_errors(table, pitch, yaw).max() < 1e-2
 
 
 @pytest.mark.slow
@@ -119,9 +167,21 @@ def test_smallest_gap_is_that_of_the_surface(table):
         assert smallest_gap(table.packed, e, p, psi) == pytest.approx(nearest, abs=2e-7)
 
 
-def test_table_of_a_sphere_turns_with_it():
-    sphere = body_outline("sphere", 2 * A, 2 * A, 0.0, None, None)
-    table = FilmTable.of(sphere, TUBE, intervals=9)
+def test_table_of_a_sphere_turns_with_it(monkeypatch):
+    """Made of one film at each offset: under a sphere that is turned it is that of a level one."""
+    sphere, resistance_of = body_outline("sphere", 2 * A, 2 * A, 0.0, None, None), film_module.resistance_of
+
+    @lru_cache
+    def level(body, e):
+        return resistance_of(body, TUBE, e, 0.0, 0.0)
+
+    def turned(body, _radius, e, p, psi):
+        turn = np.kron(np.eye(2), frame(p, psi))
+        return turn.T @ level(body, round(e, 12)) @ turn
+
+    with monkeypatch.context() as patch:
+        patch.setattr(film_module, "resistance_of", turned)
+        table = FilmTable.of(sphere, TUBE, intervals=9)
     for e, p, psi in ((10.9e-3, 0.3, 0.05), (10.99e-3, -0.1, -0.1), (5e-3, 0.0, 0.02), (0.0, 0.1, 0.0)):
         direct = film_resistance(sphere, TUBE, e, p, psi)
         roots = np.sqrt(np.diag(direct))

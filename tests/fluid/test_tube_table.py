@@ -16,7 +16,6 @@ import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.fluid.tube import library, tube
 from spirillum.fluid.tube.building import _powers
-from spirillum.fluid.tube.film import FilmTable
 from spirillum.fluid.tube.on_axis import OnAxis
 from spirillum.fluid.tube.places import Places, rings_of
 from spirillum.fluid.tube.responses import RESPONSES, response_errors, response_of
@@ -59,7 +58,10 @@ def places(geometry: RobotGeometry) -> Places:
 
 @pytest.fixture(scope="module")
 def film(geometry: RobotGeometry) -> np.ndarray:
-    return FilmTable.of(geometry.body, R, intervals=1).packed  # coarse: it is only added and taken away
+    """That of the table that is shipped."""
+    table = library.find_table(geometry, R)
+    assert table is not None
+    return kernel.parts_of(table.packed).film
 
 
 def packed(places: Places, film: np.ndarray, coefficients, yawed=None) -> np.ndarray:
