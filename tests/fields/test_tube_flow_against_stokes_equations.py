@@ -17,6 +17,7 @@ MU, R = 3.5, 0.02
 PHASE = 0.4
 BODY = np.array([4e-4, 0.0, 0.0, -0.2, 0.0, 0.0])
 ROTOR = np.array([4e-4, 0.0, 0.0, 7.5, 0.0, 0.0])
+SLITLESS = {"coupling.clearance": "3 mm", "tail.wire_diameter": "1.5 mm"}
 FASTEST = 7.5 * 2.5e-3  # of the wire
 
 
@@ -35,8 +36,12 @@ SLOW = [pytest.param(which, marks=pytest.mark.slow) for which in ("pitched", "ya
 
 @pytest.fixture(scope="module")
 def closed(placed: Callable[..., Any]) -> TubeFlowField:
-    """The paper's robot with one turn of its tail, 1 mm above the floor of a closed tube."""
-    return tube_flow_field(placed(gap="1 mm", ends="closed"), BODY, ROTOR, PHASE, 0.0)
+    """The paper's robot with one turn of a thick tail, 1.5 mm above the floor of a closed tube.
+
+    Its coupling stands further off the body than the paper's: what is claimed does not depend on the narrow slit, which
+    takes most of the unknowns.
+    """
+    return tube_flow_field(placed(SLITLESS, gap="1.5 mm", ends="closed"), BODY, ROTOR, PHASE, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -120,14 +125,14 @@ def test_the_mean_flow_passes_every_section(request: pytest.FixtureRequest, whic
 
 def test_the_fluid_beside_the_body_makes_room_for_it(closed: TubeFlowField) -> None:
     """What body and fluid carry through a section in the middle of the body adds up to nothing."""
-    node, weight = np.polynomial.legendre.leggauss(48)
-    rho, angle = 0.5 * R * (1.0 + node)[:, None], 2 * np.pi * np.arange(72) / 72
+    node, weight = np.polynomial.legendre.leggauss(32)
+    rho, angle = 0.5 * R * (1.0 + node)[:, None], 2 * np.pi * np.arange(48) / 48
     places = np.stack(np.broadcast_arrays(0.0, rho * np.cos(angle), rho * np.sin(angle)), axis=-1).reshape(-1, 3)
     points = in_body_axes(closed, places)
     names = closed.part_at(points)
     velocity = np.where(names == "body", BODY[0], 0.0)
     velocity[names == ""] = closed.velocity(points[names == ""])[:, 0]
-    carried = 0.5 * R * weight * rho[:, 0] @ velocity.reshape(48, 72).mean(axis=1) * 2 * np.pi
+    carried = 0.5 * R * weight * rho[:, 0] @ velocity.reshape(32, 48).mean(axis=1) * 2 * np.pi
     assert abs(carried) < 0.02 * BODY[0] * np.pi * 0.009**2
 
 
@@ -152,7 +157,7 @@ def test_the_far_flow_is_carried_on(pitched: TubeFlowField) -> None:
 
 def test_open_ends_have_one_pressure(placed: Callable[..., Any], closed: TubeFlowField) -> None:
     """At the mean flow that the model finds, the pressure is the same half of L_eff ahead and behind."""
-    batch, still = placed(gap="1 mm", ends="open"), closed
+    batch, still = placed(SLITLESS, gap="1.5 mm", ends="open"), closed
     length = float(batch.channel_length[0]) + END_LOSS * R
     mean = float(still.held.load @ still.twists) / (8 * np.pi * length + still.held.drag)
     field = replace(still, mean_flow=mean)
@@ -198,10 +203,11 @@ def test_stokes_equations(request: pytest.FixtureRequest, which: str) -> None:
 def test_a_wide_tube_returns_the_unbounded_flow(placed: Callable[..., Any], batch_of: Callable[..., Any]) -> None:
     """The difference falls off as the radius grows, for a robot that is pulled."""
     points = np.array([[-0.06, 0.006, 0.001], [-0.02, 0.01, -0.02], [0.03, 0.0, 0.01], [-0.05, -0.01, 0.0]])
-    unbounded = flow_field(batch_of(**{"tail.length": "25 mm"}), BODY, ROTOR, PHASE)
+    alone = {"tail.length": "25 mm", "tail.wire_diameter": "1.5 mm", "coupling.diameter": "0 mm"}
+    unbounded = flow_field(batch_of(**alone), BODY, ROTOR, PHASE)
     errors = []
     for diameter in (0.4, 0.8):
-        fields = {"channel.diameter": f"{diameter} m", "model.tube.tolerance": 0.05}
+        fields = {**alone, "channel.diameter": f"{diameter} m", "model.tube.tolerance": 0.05}
         batch = placed(fields, eccentricity=0.0, ends="closed")
         field = tube_flow_field(batch, BODY, ROTOR, PHASE, 0.0)
         difference = field.velocity(points) - unbounded.velocity(points)

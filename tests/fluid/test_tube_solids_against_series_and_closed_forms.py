@@ -111,7 +111,8 @@ def closed_forms() -> Any:
 
 
 CYLINDERS = [
-    (20.0, 2.0, 1e-4, 2e-4, 80.0),
+    (20.0, 3.0, 1e-3, 2e-4, 80.0),
+    pytest.param(20.0, 2.0, 1e-4, 2e-4, 80.0, marks=pytest.mark.slow),
     pytest.param(15.0, 2.0, 1e-4, 2e-4, 80.0, marks=pytest.mark.slow),
     (15.0, 0.5, 1e-2, 2e-3, 50.0),
 ]
@@ -151,7 +152,7 @@ def test_the_papers_capsule_lying() -> None:
     outline = capsule(35.0, "flat")
     fine = held(outline, 20.0, 2.0, Fineness(tolerance=1e-5, order=12))
     fine_values = np.array([fine.matrix[0, 0], fine.matrix[3, 3], fine.load[0], fine.drag])
-    for tolerance in (1e-2, 1e-3, 1e-4):
+    for tolerance in (1e-2, 1e-4):
         found = held(outline, 20.0, 2.0, Fineness(tolerance=tolerance))
         values = np.array([found.matrix[0, 0], found.matrix[3, 3], found.load[0], found.drag])
         errors = np.abs(values / fine_values - 1)
@@ -195,7 +196,7 @@ def test_a_sphere_near_the_wall_feels_a_film() -> None:
     along, around = 1 / a, 1 / a - 1 / radius
     root = 1 / np.sqrt(along * around)
     gaps = np.array([0.16, 0.08, 0.04, 0.02])
-    fineness = Fineness(tolerance=1e-4)
+    fineness = Fineness(tolerance=1e-3)
     matrices = np.array([held(sphere(a), radius, gap, fineness, a).matrix for gap in gaps])
     squeezed = np.diff(matrices[:, 2, 2]) / np.diff(1 / gaps) / (12 * np.pi * root / (along + around))
     pressure = 6 * along / (3 * along + 2 * around)
