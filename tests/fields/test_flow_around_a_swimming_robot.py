@@ -71,7 +71,7 @@ def test_a_point_inside_is_named_with_its_part(swimming: sp.Flow) -> None:
 
 
 def test_as_much_flows_in_as_out(swimming: sp.Flow) -> None:
-    normals = _directions(2000)
+    normals = _directions(600)
     out = np.sum(swimming.velocity(0.1 * normals + np.array([-0.03, 0, 0])) * normals, axis=1)
     assert abs(out.mean()) < 1e-3 * np.abs(out).mean()
 

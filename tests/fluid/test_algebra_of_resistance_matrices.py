@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -20,6 +20,8 @@ from spirillum.fluid.algebra import (
     two_parts_axial,
 )
 
+few = settings(max_examples=20)
+"""Examples of an identity between polynomials."""
 numbers = st.floats(-3, 3, allow_subnormal=False)
 vectors = arrays(float, 3, elements=numbers)
 twists = arrays(float, 6, elements=numbers)
@@ -34,12 +36,14 @@ def assert_same(found: np.ndarray, wanted: np.ndarray) -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-12, atol=1e-12 * (1 + np.abs(wanted).max()))
 
 
+@few
 @given(p=vectors, v=vectors)
 def test_skew_is_the_cross_product(p: np.ndarray, v: np.ndarray) -> None:
     assert_same(skew(p) @ v, np.cross(p, v))
     np.testing.assert_array_equal(skew(p), -skew(p).T)
 
 
+@few
 @given(offset=vectors, twist=twists)
 def test_transfer_is_the_velocity_of_a_rigid_body(offset: np.ndarray, twist: np.ndarray) -> None:
     moved = transfer(offset) @ twist
@@ -47,12 +51,14 @@ def test_transfer_is_the_velocity_of_a_rigid_body(offset: np.ndarray, twist: np.
     np.testing.assert_array_equal(moved[3:], twist[3:])
 
 
+@few
 @given(first=vectors, second=vectors)
 def test_transfers_compose_and_invert(first: np.ndarray, second: np.ndarray) -> None:
     assert_same(transfer(first) @ transfer(second), transfer(first + second))
     assert_same(transfer(first) @ transfer(-first), np.eye(6))
 
 
+@few
 @given(matrix=matrices, point=vectors, twist=twists)
 def test_dissipation_does_not_know_the_reference_point(
     matrix: np.ndarray, point: np.ndarray, twist: np.ndarray
@@ -62,6 +68,7 @@ def test_dissipation_does_not_know_the_reference_point(
     assert_same(there @ about_point(matrix, point)[0] @ there, twist @ matrix[0] @ twist)
 
 
+@few
 @given(matrix=matrices, point=vectors, twist=twists)
 def test_wrench_about_another_point(matrix: np.ndarray, point: np.ndarray, twist: np.ndarray) -> None:
     """The force stays, the torque changes by force x lever."""
@@ -71,6 +78,7 @@ def test_wrench_about_another_point(matrix: np.ndarray, point: np.ndarray, twist
     np.testing.assert_allclose(moved[3:], here[3:] - np.cross(point, here[:3]), rtol=1e-9, atol=1e-9)
 
 
+@few
 @given(matrix=matrices, first=vectors, second=vectors)
 def test_reference_points_compose_and_return(matrix: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
     scale = 1e-12 * np.abs(matrix).max() * (1 + np.abs(first).max() + np.abs(second).max()) ** 4
@@ -79,6 +87,7 @@ def test_reference_points_compose_and_return(matrix: np.ndarray, first: np.ndarr
     np.testing.assert_allclose(about_point(at_first, second), about_point(matrix, first + second), atol=scale)
 
 
+@few
 @given(angle=angles)
 def test_rotation_about_x(angle: np.ndarray) -> None:
     """From y towards z, as the tail turns for a positive rate."""
@@ -89,6 +98,7 @@ def test_rotation_about_x(angle: np.ndarray) -> None:
     assert_same(q @ np.array([0, 1.0, 0]), np.array([0, np.cos(angle[0]), np.sin(angle[0])]))
 
 
+@few
 @given(matrix=matrices, one=angles, other=angles, twist=twists)
 def test_rotations_compose_and_keep_dissipation(
     matrix: np.ndarray, one: np.ndarray, other: np.ndarray, twist: np.ndarray
@@ -101,6 +111,7 @@ def test_rotations_compose_and_keep_dissipation(
     assert_same(moved @ turned[0] @ moved, twist @ matrix[0] @ twist)
 
 
+@few
 @given(matrix=matrices, point=vectors, angle=angles)
 def test_turning_and_shifting_commute(matrix: np.ndarray, point: np.ndarray, angle: np.ndarray) -> None:
     q = axis_rotation(angle)
@@ -109,6 +120,7 @@ def test_turning_and_shifting_commute(matrix: np.ndarray, point: np.ndarray, ang
     np.testing.assert_allclose(shifted_first, turned_first, rtol=1e-11, atol=1e-11 * np.abs(shifted_first).max())
 
 
+@few
 @given(body=matrices, rotor=matrices, twist=twists)
 def test_locked_joint_adds_the_parts(body: np.ndarray, rotor: np.ndarray, twist: np.ndarray) -> None:
     both = both_parts(body, rotor)
@@ -117,6 +129,7 @@ def test_locked_joint_adds_the_parts(body: np.ndarray, rotor: np.ndarray, twist:
     assert_same(together @ both[0] @ together, twist @ joint_locked(both)[0] @ twist)
 
 
+@few
 @given(full=arrays(float, (2, 12, 12), elements=numbers), twist=twists)
 def test_locked_joint_keeps_interaction(full: np.ndarray, twist: np.ndarray) -> None:
     spd = full @ np.swapaxes(full, -1, -2)
@@ -132,6 +145,7 @@ def test_axial_entries_are_forces_and_torques_along_x() -> None:
     np.testing.assert_array_equal(axial_entries(full)[0], full[0][np.ix_(wanted, wanted)])
 
 
+@few
 @given(body=matrices, rotor=matrices)
 def test_axial_form_from_entries(body: np.ndarray, rotor: np.ndarray) -> None:
     def three(m: np.ndarray) -> tuple[Any, Any, Any]:

@@ -51,7 +51,7 @@ def test_spheroid(aspect: float) -> None:
     np.testing.assert_allclose(diagonal(spheroid(aspect, 1.0)), exact(aspect, 1.0), rtol=1e-11)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(power=st.floats(-1, 1), size=st.floats(-5, 2))
 def test_spheroid_of_any_shape(power: float, size: float) -> None:
     """Already at the order of the standard accuracy."""
@@ -143,7 +143,7 @@ def axial_drag_by_elements(length: float, count: int = 24) -> float:
     return float(2 * np.pi * density[: len(middle)] @ (middle[:, 1] * size))
 
 
-@pytest.mark.parametrize("length", [2.0, 10.0])
+@pytest.mark.parametrize("length", [2.0, pytest.param(10.0, marks=pytest.mark.slow)])
 def test_cylinder_against_brute_force_elements(length: float) -> None:
     """Elements alone are good to some 2e-4 with 48 of them."""
     found = diagonal(cylinder_outline(1.0, 0.5 * length, -0.5 * length))[0]
@@ -219,7 +219,7 @@ def test_thin_disk() -> None:
 def test_small_fillet_tends_to_the_sharp_edge() -> None:
     """Rounding an edge takes away drag in proportion to its radius; a body inside another drags less."""
     sharp = diagonal(body_outline("cylinder", 18.0, 35.0, 0.0, "flat", "flat"))
-    radii = np.array([3.0, 1.0, 0.3, 0.1, 0.01])
+    radii = np.array([3.0, 0.3, 0.01])
     lost = 1 - np.array([diagonal(body_outline("cylinder", 18.0, 35.0, f, "fillet", "fillet")) for f in radii]) / sharp
     assert np.all(lost[1:] < lost[:-1])
     assert np.all(lost > 0)
@@ -264,7 +264,7 @@ def test_turned_end_for_end(front: str, rear: str) -> None:
     assert there[2, 4] == pytest.approx(-there[1, 5], rel=1e-9)
 
 
-@settings(max_examples=10)
+@settings(max_examples=5)
 @given(
     length=st.floats(1.2, 6.0),
     fillet=st.floats(0.1, 0.5),

@@ -162,7 +162,7 @@ def test_spin_adds_the_torque_of_a_turning_cylinder(batch_of: Callable[..., Any]
 @pytest.mark.parametrize("coefficients", SETS[:3])
 @pytest.mark.parametrize("taper", TAPERS)
 @pytest.mark.parametrize("arc_element", ["printed", "true"])
-@pytest.mark.parametrize("wavelength", ["10 mm", "25 mm"])
+@pytest.mark.parametrize("wavelength", ["10 mm", pytest.param("25 mm", marks=pytest.mark.slow)])
 def test_axial_form_is_the_matrix_at_any_phase(
     batch_of: Callable[..., Any], hand: str, coefficients: str, taper: str | float, arc_element: str, wavelength: str
 ) -> None:
@@ -180,7 +180,7 @@ def test_axial_form_is_the_matrix_at_any_phase(
         np.testing.assert_allclose([matrix[0, 0], matrix[0, 3], matrix[3, 3]], axial, rtol=1e-9)
 
 
-@pytest.mark.parametrize("height", ["3.2 mm", "9 mm", "40 mm"])
+@pytest.mark.parametrize("height", ["3.2 mm", pytest.param("9 mm", marks=pytest.mark.slow), "40 mm"])
 @pytest.mark.parametrize("taper", ["none", 0.1, 1.0, 3.7, 100.0])
 @pytest.mark.parametrize("arc_element", ["printed", "true"])
 def test_axial_form_near_a_floor_is_the_average_over_a_turn(
@@ -190,7 +190,7 @@ def test_axial_form_near_a_floor_is_the_average_over_a_turn(
     np.testing.assert_allclose(np.ravel(tail_axial(batch)), average_over_a_turn(batch, 64), rtol=1e-9)
 
 
-@pytest.mark.parametrize("arc_element", ["printed", "true"])
+@pytest.mark.parametrize("arc_element", [pytest.param("printed", marks=pytest.mark.slow), "true"])
 def test_axial_form_near_a_floor_with_the_steepest_root(batch_of: Callable[..., Any], arc_element: str) -> None:
     """Where the root rises almost along z, its matrix changes so fast with phase that 64 phases are too few."""
     batch = near_a_floor(batch_of, "3.2 mm", 1e4, arc_element, "right")

@@ -51,7 +51,7 @@ def free_set(request: pytest.FixtureRequest, batch_of: Callable[..., Any]) -> An
     return batch_of(model__rft__coefficients=request.param)
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(tail=tails, turns=turns, phase=phases)
 def test_symmetric_positive_definite(any_set: Any, tail: dict[str, float], turns: float, phase: np.ndarray) -> None:
     batch = valid(any_set, tail, turns)
@@ -68,7 +68,7 @@ def test_symmetric_positive_definite(any_set: Any, tail: dict[str, float], turns
     np.linalg.cholesky(axial)
 
 
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(tail=tails, turns=turns, phase=phases, turned=st.floats(-4, 4))
 def test_constant_in_the_tails_own_frame(
     free_set: Any, tail: dict[str, float], turns: float, phase: np.ndarray, turned: float
@@ -78,7 +78,7 @@ def test_constant_in_the_tails_own_frame(
     assert_same(after[0], rotated(before, axis_rotation(np.array([turned])))[0], 1e-10)
 
 
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(tail=tails, turns=turns, phase=phases)
 def test_left_handed_is_the_mirror_image(any_set: Any, tail: dict[str, float], turns: float, phase: np.ndarray) -> None:
     """Mirrored in the plane z = 0 a right-handed tail at phi is a left-handed one at -phi; torque is axial."""
@@ -92,7 +92,7 @@ def test_left_handed_is_the_mirror_image(any_set: Any, tail: dict[str, float], t
     np.testing.assert_allclose(other, one * [1, -1, 1], rtol=1e-14)
 
 
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(tail=tails, turns=turns, phase=phases, power=st.floats(-3, 1))
 def test_scale(any_set: Any, tail: dict[str, float], turns: float, phase: np.ndarray, power: float) -> None:
     """All lengths times s: forces times s, couplings times s^2, torques times s^3."""
@@ -109,7 +109,7 @@ def test_scale(any_set: Any, tail: dict[str, float], turns: float, phase: np.nda
     np.testing.assert_allclose(Rft().axial(large)[0], s * axial_units @ Rft().axial(small)[0] @ axial_units, rtol=1e-10)
 
 
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(tail=tails, turns=turns, phase=phases, factor=st.floats(1e-3, 1e3))
 def test_linear_in_viscosity(
     any_set: Any, tail: dict[str, float], turns: float, phase: np.ndarray, factor: float

@@ -64,7 +64,7 @@ def test_a_tail_of_the_other_hand_swims_as_its_mirror_image(name: str) -> None:
     assert image is not None
     assert image.geometry.hand == -1.0
     draw, sign = np.random.default_rng(5), MIRROR[:, None] * MIRROR
-    for _ in range(50):
+    for _ in range(20):
         seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1.0, 1.0))
         yaw = draw.uniform(-1.0, 1.0) * largest_yaw(table.packed, seat.offset, seat.pitch)
         phase = draw.uniform(0.0, 2.0 * np.pi)
@@ -94,7 +94,7 @@ def test_files_are_small_and_each_is_the_table_of_a_robot_of_the_paper() -> None
 def test_positive_definite_and_symmetric_anywhere_in_the_tube(name: str) -> None:
     table, places = shipped(name)
     draw = np.random.default_rng(0)
-    for _ in range(300):
+    for _ in range(100):
         seat = places.seat_between(draw.uniform(places.gaps[0], 1.0), draw.uniform(-1, 1))
         deeper = draw.uniform(0.0, 1.0) * (places.radius - 0.009 - seat.offset) if seat.pitch == 0 else 0.0
         most = largest_yaw(table.packed, seat.offset + deeper, seat.pitch)

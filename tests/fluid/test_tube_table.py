@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +52,14 @@ def geometry() -> RobotGeometry:
     return RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
 
 
+@lru_cache
+def places_in(geometry: RobotGeometry, radius: float) -> Places:
+    return Places(geometry, radius)
+
+
 @pytest.fixture(scope="module")
 def places(geometry: RobotGeometry) -> Places:
-    return Places(geometry, R)
+    return places_in(geometry, R)
 
 
 @pytest.fixture(scope="module")
@@ -227,7 +233,7 @@ def test_places_keep_the_tail_off_the_glass(places: Places) -> None:
 @pytest.mark.parametrize("t", [0.02, 0.2, 0.7, 1.0])
 def test_largest_yaw_is_where_the_tail_nears_the_glass(geometry: RobotGeometry, radius: float, t: float) -> None:
     """Between its nodes, too, nose up and down: to 0.1 degrees."""
-    places = Places(geometry, radius)
+    places = places_in(geometry, radius)
     for f in (-0.9, -0.25, 0.0, 0.1, 0.6):
         seat = places.seat_between(t, f, places.largest_yaw(t, f))
         for turned, sign in ((-0.1, 1.0), (0.1, -1.0)):
@@ -237,7 +243,7 @@ def test_largest_yaw_is_where_the_tail_nears_the_glass(geometry: RobotGeometry, 
 
 @pytest.mark.parametrize("radius", [R, 0.015])
 def test_yawed_places_keep_the_tail_off_the_glass(geometry: RobotGeometry, radius: float) -> None:
-    yawed, wire = Places(geometry, radius), geometry.wire()
+    yawed, wire = places_in(geometry, radius), geometry.wire()
     clear = [
         yawed.seat(float(t), float(f), float(most)).tail_clearance(wire.points, wire.radius).clearance
         for t, row in zip(yawed.yaw_gaps, yawed.most_yaw, strict=True)
@@ -516,10 +522,15 @@ def test_a_table_whose_head_is_wrong_is_none(change: dict[str, Any], tmp_path: P
         TubeTable.read(tmp_path / "a.table")
 
 
+@lru_cache
+def shipped() -> TubeTable:
+    return TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+
+
 @pytest.mark.parametrize("count", [-1.0, 0.0, 0.5, 5.0, 13.0, 1e9, np.nan])
 @pytest.mark.parametrize("column", ["_RINGS", "_GAPS", "_UP", "_DOWN", "_PHASES", "_YAW_GAPS", "_YAW_PITCHES"])
 def test_a_packed_table_with_a_wrong_count_is_not_whole(column: str, count: float) -> None:
-    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    table = shipped()
     assert kernel.is_whole(table.packed, table.radius)
     changed = table.packed.copy()
     own = changed[getattr(kernel, column)]
@@ -529,7 +540,7 @@ def test_a_packed_table_with_a_wrong_count_is_not_whole(column: str, count: floa
 
 @pytest.mark.parametrize(("column", "value"), [(0, 0.03), (1, np.nan), (1, 0.03), (9, 14.0), (12, -1.0), (14, -3.0)])
 def test_a_packed_table_with_a_wrong_film_is_not_whole(column: int, value: float) -> None:
-    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    table = shipped()
     changed = table.packed.copy()
     changed[kernel.film_start(changed) + column] = value
     assert not kernel.is_whole(changed, table.radius)
@@ -538,7 +549,7 @@ def test_a_packed_table_with_a_wrong_film_is_not_whole(column: int, value: float
 
 
 def test_a_table_with_an_even_number_of_phases_is_none(tmp_path: Path) -> None:
-    table = TubeTable.read(next((Path(library.__file__).parent / "tables").glob("*.table")))
+    table = shipped()
     nodes = table.packed.copy()
     nodes[kernel._PHASES] = 4.0
     parts = kernel.parts_of(table.packed)

@@ -77,7 +77,10 @@ def test_every_piece_is_one_closed_surface_that_faces_outwards(name: str) -> Non
         assert np.min(doubled) > 0, piece.name
 
 
-@pytest.mark.parametrize("name", ["paper", "plain helix", "slow rise", "ball", "fillets", "round rear", "micrometres"])
+MORE = ("plain helix", "slow rise", "round rear", "micrometres")
+
+
+@pytest.mark.parametrize("name", ["paper", "ball", "fillets", *(pytest.param(n, marks=pytest.mark.slow) for n in MORE)])
 def test_volume_and_centroid_converge_at_second_order(name: str) -> None:
     robot = load(WIDE, **ROBOTS[name])
     for label, solid in robot_solids(robot).items():

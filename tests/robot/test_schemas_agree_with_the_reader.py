@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import jsonschema
@@ -13,7 +14,7 @@ from spirillum.fitted.calibration_file import CalibrationFile
 from spirillum.robot.fields import Section
 from spirillum.robot.load import preset_names, preset_text
 from spirillum.robot.robot import Robot
-from spirillum.schemas import schema_of
+from spirillum.schemas import schema_of as made_schema_of
 from spirillum.studies.spec import Study
 from spirillum.units import KINDS
 from spirillum.vision.setup import Setup
@@ -34,6 +35,8 @@ VALUES: tuple[Any, ...] = (
     *TABLES,
     [TABLES[-1]],
 )
+schema_of = cache(made_schema_of)
+"""Nobody here changes a schema, and to make one takes a fifth of a second."""
 
 
 def _fields() -> Iterator[tuple[str, FieldInfo]]:

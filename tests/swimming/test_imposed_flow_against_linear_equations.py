@@ -21,7 +21,7 @@ from spirillum.units import Hz
 K_M, K_B, B_M = 0.00045, 0.004, 7e-7  # Table II
 B = 6e-6
 READINGS = ["none", "rotor", "body", "paper"]
-FLOWS = [-3e-3, -4e-4, 2e-3]
+FLOWS = [-3e-3, pytest.param(-4e-4, marks=pytest.mark.slow), 2e-3]
 FORWARD, REVERSE = {}, {"tail.handedness": "left", "motor.polarity": "reverse"}
 
 

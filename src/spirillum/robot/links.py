@@ -13,6 +13,7 @@ with brackets between the ends. They are exact as long as the wire is thinner th
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -66,7 +67,7 @@ class Links(NamedTuple):
     """Coupling and wire."""
 
 
-def links_of(robot: RobotTables) -> Links:
+def links_of(robot: RobotTables, solids: Mapping[str, Solid] | None = None) -> Links:
     """Mass, centre, inertia and displaced volume of body and rotor.
 
     `body.mass` is that of body and coupling together, assumed to be of uniform density. The wire has
@@ -74,8 +75,9 @@ def links_of(robot: RobotTables) -> Links:
 
     Args:
         robot: a checked robot.
+        solids: its `robot_solids`, where they are known already.
     """
-    solids = robot_solids(robot)
+    solids = robot_solids(robot) if solids is None else solids
     body, wire = solids["body"], solids["tail"]
     main = body.volume + (solids["coupling"].volume if "coupling" in solids else 0.0)
     density = np.nan if robot.body.mass is None else robot.body.mass / main

@@ -93,7 +93,8 @@ class Robot(RobotTables):
         """
         batch, tail = RobotBatch.of(self), self.tail
         alpha, arc = float(batch.arc_fraction[0]), float(batch.arc_length[0])
-        solids, links = robot_solids(self), links_of(self)
+        solids = robot_solids(self)
+        links = links_of(self, solids)
         coupling = solids["coupling"].volume if "coupling" in solids else 0.0
         volumes = np.array([link.volume for link in links])
         volume = float(np.sum(volumes))
