@@ -235,7 +235,7 @@ def test_more_modes_and_nodes_change_little(batch_of: Callable[..., Any]) -> Non
     """The error that a resolution announces by its tolerance is the one that it makes."""
     from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
-    geometry = RobotGeometry.of(batch_of(tail__length="25 mm"))
+    geometry = RobotGeometry.of(batch_of(tail__length="25 mm", coupling__clearance="2 mm"))
     solids, wires = geometry.solids("robot"), [(geometry.wire(), 1)]
     fine = solve(solids, wires, Discretisation(order=16, tolerance=1e-9))
     errors = []

@@ -114,7 +114,8 @@ CYLINDERS = [
     (20.0, 3.0, 1e-3, 2e-4, 80.0),
     pytest.param(20.0, 2.0, 1e-4, 2e-4, 80.0, marks=pytest.mark.slow),
     pytest.param(15.0, 2.0, 1e-4, 2e-4, 80.0, marks=pytest.mark.slow),
-    (15.0, 0.5, 1e-2, 2e-3, 50.0),
+    (15.0, 0.9, 1e-2, 2e-3, 50.0),
+    pytest.param(15.0, 0.5, 1e-2, 2e-3, 50.0, marks=pytest.mark.slow),
 ]
 """Radius and gap, tolerance, error allowed, length of the longer one."""
 

@@ -428,7 +428,8 @@ def test_tails_solved_for_together_have_the_answers_that_each_has_alone(
 ) -> None:
     monkeypatch.setenv("SPIRILLUM_CACHE", "off")
     coarse = Fineness("standard", 0.05, order=4)
-    tails = [geometry._replace(tail_length=0.02, wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
+    short = geometry._replace(coupling_diameter=0.0, tail_length=0.02)
+    tails = [short._replace(wavelength=w, amplitude=a) for w, a in ((0.02, 0.0025), (0.01, 0.002))]
     seat, elsewhere = Seat(R, 0.0), Seat(R, 0.002)
     want = [Solution(((tail, (0.4,)),), seat, coarse) for tail in tails]
     told: list[int] = []
@@ -451,7 +452,7 @@ def test_a_place_is_kept_once_all_phases_of_all_its_tails_are(
 ) -> None:
     monkeypatch.setenv("SPIRILLUM_CACHE", str(tmp_path))
     coarse = Fineness("standard", 0.05, order=4)
-    tail = geometry._replace(tail_length=0.02, wavelength=0.02)
+    tail = geometry._replace(coupling_diameter=0.0, tail_length=0.02, wavelength=0.02)
     one, more = (Solution(((tail, phases),), Seat(R, 0.0), coarse) for phases in ((0.4,), (0.4, 0.7)))
     assert not all_kept([one])
     tube._answer.cache_clear()

@@ -185,7 +185,7 @@ def test_a_wide_channel_gives_slender(batch: Any) -> None:
 
 def test_error_estimate(robot: Any) -> None:
     """There is one, and it is not nothing, at the smallest and the largest tolerance that it takes to be quick."""
-    for tolerance in (0.05, 0.01):
+    for tolerance in (0.05, 0.02):
         answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 3})
         assert 0 < answer.error_estimate < 2 * tolerance, tolerance
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
@@ -207,7 +207,7 @@ def test_placement_of_an_answer() -> None:
     assert found["ends"] == "open"
     assert found["gap"]["value"] == pytest.approx(4e-3, rel=1e-6)
     assert found["pitch"]["value"] == pytest.approx(np.radians(2))
-    default = sp.resistance(robot, model="tube", part="body").to_dict()["placement"]
+    default = sp.resistance(robot, model="tube", part="body", resolution={"tolerance": 0.05}).to_dict()["placement"]
     assert default["gap"]["value"] == pytest.approx(6e-3 / 18, rel=1e-6)
 
 
@@ -249,7 +249,8 @@ def refuse(*arguments):
     raise AssertionError("computed anew")
 tube.held_in_tube = refuse
 robot = sp.load("biorob2012-wide")
-answer = sp.resistance(robot, model="tube", part="body", placement={"gap": "4 mm", "ends": "closed"})
+asked = {"placement": {"gap": "4 mm", "ends": "closed"}, "resolution": {"tolerance": 0.04}}
+answer = sp.resistance(robot, model="tube", part="body", **asked)
 print([float(value).hex() for value in np.ravel(answer.matrix)])
 """
 
@@ -264,7 +265,8 @@ def test_another_process_finds_the_same_numbers(fresh: Path) -> None:
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    made = sp.resistance("biorob2012-wide", model="tube", part="body", placement={"gap": "4 mm", "ends": "closed"})
+    asked = {"placement": {"gap": "4 mm", "ends": "closed"}, "resolution": {"tolerance": 0.04}}
+    made = sp.resistance("biorob2012-wide", model="tube", part="body", **asked)
     assert len(list(fresh.rglob("*.f64"))) == 1
     assert run().strip() == str([float(value).hex() for value in np.ravel(made.matrix)])
 

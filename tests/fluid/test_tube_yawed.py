@@ -16,7 +16,8 @@ BODIES = {
     "ball": Outline((Arc((0.0, 0.0), (0.4, 0.4), (0.0, np.pi)),), ()),
     "capsule": body_outline("capsule", 0.8, 1.2, 0.0, "hemisphere", "flat"),
 }
-ROUND_AND_EDGED = [pytest.param("ball", marks=pytest.mark.slow), "capsule"]
+ROUND_AND_EDGED = ["ball", pytest.param("capsule", marks=pytest.mark.slow)]
+"""Symmetries hold for either; a ball has fewer unknowns."""
 COARSE = Fineness(tolerance=2e-3, order=4)
 """Symmetries hold far below what the flow is resolved to."""
 MIRROR = np.array([1, -1, 1, -1, 1, -1] * 2 + [1.0])  # y to -y
@@ -70,7 +71,7 @@ def test_mirror_image(body: str) -> None:
         assert difference(one, MIRROR[:, None] * other * MIRROR) < 1e-8
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", ROUND_AND_EDGED)
 def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
     """Two decoupled systems against the coupled one: nose up and the tail at phi, nose to the left at phi + 90 deg."""
     pitched = robot(body, Seat(1.0, 0.0, -0.12), 0.7)
@@ -82,20 +83,24 @@ def test_on_the_axis_yaw_is_pitch_a_quarter_turn_away(body: str) -> None:
 
 def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
     """Offset and pitch in one vertical plane: from 180 degrees further, above the axis and pitched the other way."""
-    below = robot("capsule", Seat(1.0, 0.1, 0.1, yaw=0.15), 0.7)
-    above = robot("capsule", Seat(1.0, -0.1, -0.1, yaw=-0.15), 0.7 + np.pi)
+    below = robot("ball", Seat(1.0, 0.1, 0.1, yaw=0.15), 0.7)
+    above = robot("ball", Seat(1.0, -0.1, -0.1, yaw=-0.15), 0.7 + np.pi)
     half = axis_rotation(np.array([np.pi]))[0]
     assert difference(below, in_other_axes(above, half)) < 1e-8
 
 
-@pytest.mark.parametrize("body", ROUND_AND_EDGED)
-def test_reciprocal_positive_and_continuous(body: str) -> None:
+@pytest.mark.parametrize("body", [pytest.param("ball", marks=pytest.mark.slow), "capsule"])
+def test_reciprocal_and_positive(body: str) -> None:
     """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
     found = held_in_tube(solids(body, Seat(1.0, 0.15, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
     whole = thirteen(found)
     scale = np.sqrt(np.diag(whole))
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
     assert np.linalg.eigvalsh(whole / np.outer(scale, scale))[0] > 0.005
+
+
+@pytest.mark.parametrize("body", ROUND_AND_EDGED)
+def test_continuous_where_the_yaw_goes_to_zero(body: str) -> None:
     pitched = robot(body, Seat(1.0, 0.1, 0.1))
     for yaw, error in ((1e-9, 5e-8), (-1e-3, 2e-3)):
         assert difference(pitched, robot(body, Seat(1.0, 0.1, 0.1, yaw=yaw))) < error

@@ -60,7 +60,7 @@ def test_a_fillet_as_large_as_the_radius_is_a_hemisphere() -> None:
     assert fillet == pytest.approx(round_, rel=1e-13)
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(wavelength=st.floats(0.01, 10), amplitude=st.floats(0.05, 5))
 def test_coil_spacing(wavelength: float, amplitude: float) -> None:
     """Smallest distance from a turn of the centreline to the next, by search on a grid and on a finer one."""
@@ -140,7 +140,7 @@ def test_arc_length(wavelength: float, ratio: float, turns: float) -> None:
     )
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(wavelength=st.floats(1.0, 60), amplitude=st.floats(0.6, 15), share=st.floats(0.2, 1.8))
 def test_turns_that_touch_are_refused(wavelength: float, amplitude: float, share: float) -> None:
     """A wire fits exactly when it is thinner than the spacing of the coils and than the diameter of curvature."""

@@ -301,7 +301,7 @@ junk = st.recursive(
 )
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(overrides=st.dictionaries(paths, junk, min_size=1, max_size=3))
 def test_any_table_is_a_robot_or_an_input_error(overrides: dict[str, Any]) -> None:
     is_a_robot_or_an_input_error(overrides)

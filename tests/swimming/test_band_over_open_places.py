@@ -209,6 +209,8 @@ def test_tube_itself_has_a_band(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) 
         "model.tube.tolerance": 0.05,
         "model.tube.phases": 1,
         "tail.length": "20 mm",
+        "tail.wire_diameter": "1.5 mm",
+        "channel.diameter": "30 mm",
         "coupling.diameter": "0 mm",
     } | {f"body.{end}": "none" for end in ("front", "rear")}
     robot = sp.load(WIDE, **small, **coarse)

@@ -9,11 +9,13 @@ import pytest
 from spirillum.errors import InputError
 from spirillum.robot.batch import RobotBatch, batches
 from spirillum.robot.load import load
+from spirillum.robot.robot import Robot
 from spirillum.swimming.steady import requirements, swim
 
 BLOCK = 1 << 15
 WAVELENGTHS = np.array([10e-3, 15e-3, 20e-3, 25e-3])
 AMPLITUDES = np.array([1.5e-3, 2.5e-3, 3.5e-3, 2.0e-3])
+FRICTIONS = np.array([7e-7, 1e-6, 1e-5, 3e-5])
 
 
 def assert_equal(together: Any, i: int, alone: Any, rtol: float = 1e-13) -> None:
@@ -21,16 +23,10 @@ def assert_equal(together: Any, i: int, alone: Any, rtol: float = 1e-13) -> None
         np.testing.assert_allclose(values[i], getattr(alone, name)[0], rtol=rtol, err_msg=name)
 
 
-@pytest.mark.parametrize("model", ["sbt", "rft"])
-@pytest.mark.parametrize("reading", ["none", "rotor", "body", "paper"])
-def test_columns_and_stacked_robots_agree_with_single_robots(
-    batch_of: Callable[..., Any], wide: Any, model: str, reading: str
-) -> None:
-    frictions = np.array([7e-7, 1e-6, 1e-5, 3e-5])
-    columns = wide.with_values(
-        {"tail.wavelength": WAVELENGTHS, "tail.amplitude": AMPLITUDES, "friction.effective": frictions}
-    )
-    robots = [
+@pytest.fixture(scope="module")
+def robots() -> list[Robot]:
+    """One for each of the columns."""
+    return [
         load(
             "biorob2012-wide",
             **{
@@ -40,9 +36,19 @@ def test_columns_and_stacked_robots_agree_with_single_robots(
             },
         )
         for wavelength, amplitude, friction in zip(
-            WAVELENGTHS.tolist(), AMPLITUDES.tolist(), frictions.tolist(), strict=True
+            WAVELENGTHS.tolist(), AMPLITUDES.tolist(), FRICTIONS.tolist(), strict=True
         )
     ]
+
+
+@pytest.mark.parametrize("model", ["sbt", "rft"])
+@pytest.mark.parametrize("reading", ["none", "rotor", "body", "paper"])
+def test_columns_and_stacked_robots_agree_with_single_robots(
+    robots: list[Robot], wide: Any, model: str, reading: str
+) -> None:
+    columns = wide.with_values(
+        {"tail.wavelength": WAVELENGTHS, "tail.amplitude": AMPLITUDES, "friction.effective": FRICTIONS}
+    )
     stacked = RobotBatch.of(robots)
     rates = np.array([3.0, 4.0, 5.0, 9.0])  # slower, B_eff of reading `paper` would exceed E_x
     for given in ({}, {"tail_rate": rates}, {"motor_rate": rates}):

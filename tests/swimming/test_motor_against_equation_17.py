@@ -86,7 +86,7 @@ def electrics(batch_of: Callable[..., Any], motor: dict[str, float]) -> Any:
     return batch.electrics
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(motor=motors, back_emf=st.floats(-30, 30), per_current=st.one_of(st.just(0.0), st.floats(1e-6, 1e3)))
 def test_current_solves_17_for_every_motor_that_a_file_may_describe(
     batch_of: Callable[..., Any], motor: dict[str, float], back_emf: float, per_current: float

@@ -341,7 +341,7 @@ def test_unset_friction_is_the_rotors_own(batch_of: Callable[..., Any], wide: An
         assert first(swim(wide, friction=reading), "effective_friction") == 7e-7
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     wavelength=st.floats(8e-3, 60e-3),
     amplitude=st.floats(0.5e-3, 6e-3),
