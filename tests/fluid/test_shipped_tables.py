@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,7 @@ LARGEST = {
 PRESETS = ("biorob2012-wide", "biorob2012-narrow")
 
 
+@lru_cache
 def shipped(name: str) -> tuple[TubeTable, Places]:
     batch = RobotBatch.of(sp.load(name))
     geometry, radius = RobotGeometry.of(batch), 0.5 * float(batch.channel_diameter[0])

@@ -77,9 +77,8 @@ def test_rotor_is_coupling_and_tail() -> None:
 
 def test_paper_robot_swims_forward_and_turns_back() -> None:
     """A right-handed tail that turns about +x pushes forward, the body turns back; adding parts up overstates it."""
-    short = {"tail__length": "25 mm"}
-    answer = sp.predict(robot(**short), model="slender", tail_rate="1 Hz", calibrated=False)
-    left = sp.predict(robot(tail__handedness="left", **short), model="slender", tail_rate="-1 Hz", calibrated=False)
+    answer = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False)
+    left = sp.predict(robot(tail__handedness="left"), model="slender", tail_rate="-1 Hz", calibrated=False)
     assert answer.forward_velocity > 0
     assert answer.body_rotation_rate < 0
     assert left.forward_velocity == pytest.approx(answer.forward_velocity, rel=1e-10)
@@ -100,19 +99,16 @@ def test_flow_between_body_and_bare_tail_slows_the_robot(wide: Any) -> None:
 @pytest.mark.parametrize("accuracy", ["standard", "high"])
 def test_accuracy(accuracy: str) -> None:
     """Both forms of the wire agree within what their statement says; the estimate is of that size."""
-    asked = {"model": "slender", "tail_rate": "1 Hz", "calibrated": False}
-    answer = sp.predict(PRESET, **asked, resolution={"accuracy": accuracy})
-    other = sp.predict(PRESET, **asked, resolution={"accuracy": "high"}) if accuracy != "high" else answer
+    answer = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, resolution={"accuracy": accuracy})
+    other = sp.predict(PRESET, model="slender", tail_rate="1 Hz", calibrated=False, resolution={"accuracy": "high"})
     assert answer.forward_velocity == pytest.approx(other.forward_velocity, rel=0.01)
     assert 0 < answer.error_estimate < 0.02
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
-    short = {"tail__length": "25 mm"}
-    in_the_call = sp.predict(robot(**short), **asked, resolution={"accuracy": accuracy})
-    own = sp.predict(robot(model__slender__accuracy=accuracy, **short), **asked)
-    assert own.forward_velocity == in_the_call.forward_velocity
-    matrix = sp.resistance(robot(**short), model="slender", resolution={"accuracy": accuracy}).matrix
+    own = sp.predict(robot(model__slender__accuracy=accuracy), model="slender", tail_rate="1 Hz", calibrated=False)
+    assert own.forward_velocity == answer.forward_velocity
+    matrix = sp.resistance(PRESET, model="slender", resolution={"accuracy": accuracy}).matrix
     np.testing.assert_array_equal(
-        matrix, sp.resistance(robot(model__slender__accuracy=accuracy, **short), model="slender").matrix
+        matrix, sp.resistance(robot(model__slender__accuracy=accuracy), model="slender").matrix
     )
 
 

@@ -22,12 +22,16 @@ from spirillum.robot.placement import Placement
 MODEL: Any = find_swimmer_model("tube")
 ZERO = np.zeros(1)
 SMALL = {
+    "body.shape": "sphere",
+    "body.length": "18 mm",
+    "body.front": "none",
+    "body.rear": "none",
     "coupling.diameter": "0 mm",
     "tail.length": "20 mm",
     "tail.wavelength": "20 mm",
     "tail.wire_diameter": "1.5 mm",
 }
-"""The paper's body with a short and thick tail, so that an answer takes a fraction of a second."""
+"""A ball as wide as the paper's body with a short and thick tail: an answer takes a fraction of a second."""
 
 
 @pytest.fixture(scope="module")
@@ -200,8 +204,7 @@ def test_error_estimate_holds_what_few_phases_miss(robot: Any) -> None:
 
 def test_placement_of_an_answer() -> None:
     """Of a small ball, which is solved for in less time than a capsule; its default gap is 1/18 of its radius."""
-    ball = {"body.shape": "sphere", "body.diameter": "12 mm", "body.length": "12 mm"}
-    robot = sp.load("biorob2012-wide", **SMALL, **ball, **{"body.front": "none", "body.rear": "none"})
+    robot = sp.load("biorob2012-wide", **{**SMALL, "body.diameter": "12 mm", "body.length": "12 mm"})
     found = predicted(robot, placement={"gap": "4 mm", "pitch": "2 deg"}).to_dict()["placement"]
     assert found["kind"] == "in the channel"
     assert found["ends"] == "open"

@@ -57,11 +57,17 @@ def _fields() -> Iterator[tuple[str, FieldInfo]]:
 FIELDS = dict(_fields())
 
 
-@pytest.mark.parametrize("path", FIELDS)
-def test_what_is_read_is_in_the_schema(path: str) -> None:
+@cache
+def alone_with_its_schema(path: str) -> tuple[Any, dict[str, Any]]:
+    """A table of that field alone."""
     info = FIELDS[path]
     alone: Any = create_model("Alone", __base__=Section, field=(info.annotation, info))
-    schema = alone.model_json_schema()
+    return alone, alone.model_json_schema()
+
+
+@pytest.mark.parametrize("path", FIELDS)
+def test_what_is_read_is_in_the_schema(path: str) -> None:
+    alone, schema = alone_with_its_schema(path)
     checker = jsonschema.Draft202012Validator(schema)
     for value in VALUES:
         try:
@@ -73,9 +79,8 @@ def test_what_is_read_is_in_the_schema(path: str) -> None:
 
 @pytest.mark.parametrize("path", FIELDS)
 def test_examples_of_the_schema_are_read(path: str) -> None:
-    info = FIELDS[path]
-    alone: Any = create_model("Alone", __base__=Section, field=(info.annotation, info))
-    own = alone.model_json_schema()["properties"]["field"]
+    alone, schema = alone_with_its_schema(path)
+    own = schema["properties"]["field"]
     for form in (own, *own.get("anyOf", ())):
         for example in (
             *form.get("examples", ()),

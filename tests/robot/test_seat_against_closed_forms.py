@@ -57,7 +57,7 @@ def surface(shape: str, along: int = 200, around: int = 181) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def helix(phase: float = 0.0, count: int = 601) -> np.ndarray:
+def helix(phase: float = 0.0, count: int = 301) -> np.ndarray:
     """The paper's tail (25, 2.5 mm)."""
     columns = {"root": 0.0275, "wavelength": 0.025, "amplitude": 0.0025, "length": 0.06, "taper": 100.0, "hand": 1.0}
     arrays = {name: np.full(1, value) for name, value in {**columns, "phase": phase}.items()}
