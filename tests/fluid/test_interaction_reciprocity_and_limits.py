@@ -134,17 +134,17 @@ def test_phase(any_rear: Any, values: dict[str, float], turns: float, phase: flo
         )
 
 
-def test_phase_against_a_tail_that_is_built_turned(wide: Any) -> None:
+def test_phase_against_a_tail_that_is_built_turned(batch_of: Callable[..., Any]) -> None:
     """Solved anew with every station turned about the axis."""
-    phase = 0.7
-    solution = robot_solution(wide)
+    phase, batch = 0.7, batch_of(tail__length="25 mm")
+    solution = robot_solution(batch)
     turn = axis_rotation(np.array([phase]))[0]
     from spirillum.fluid.wire.robot_geometry import RobotGeometry
 
     wires = [(replace(w, points=w.points @ turn.T, tangents=w.tangents @ turn.T), 1) for w in solution.wires]
-    solids = RobotGeometry.of(wide).solids("robot")
+    solids = RobotGeometry.of(batch).solids("robot")
     anew = solve(solids, wires, Discretisation(order=8, tolerance=1e-4)).matrix
-    found = MODEL.resistance(wide, np.array([phase]))[0] / float(wide.viscosity[0])
+    found = MODEL.resistance(batch, np.array([phase]))[0] / float(batch.viscosity[0])
     assert_same(anew, found, 1e-10)
 
 

@@ -34,7 +34,7 @@ def straight(x: float, length: float, radius: float) -> Wire:
 
 def coil(radius: float = 0.05) -> Wire:
     """A short coil behind a ball of radius 0.4, in body axes."""
-    xi = np.linspace(0.0, 1.2, 200)
+    xi = np.linspace(0.0, 0.8, 140)
     turn = 2 * np.pi * xi / 0.8
     return wire_along(np.stack([-0.7 - xi, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), radius)
 

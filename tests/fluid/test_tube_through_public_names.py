@@ -190,7 +190,7 @@ def test_a_wide_channel_gives_slender(batch: Any) -> None:
 def test_error_estimate(robot: Any) -> None:
     """There is one, and it is not nothing, at the smallest and the largest tolerance that it takes to be quick."""
     for tolerance in (0.05, 0.02):
-        answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 3})
+        answer = predicted(robot, resolution={"tolerance": tolerance, "phases": 2})
         assert 0 < answer.error_estimate < 2 * tolerance, tolerance
     assert answer.to_dict()["error_estimate"]["value"] == answer.error_estimate
 

@@ -25,7 +25,7 @@ MIRROR = np.array([1, -1, 1, -1, 1, -1] * 2 + [1.0])  # y to -y
 
 def coil(phase: float = 0.0, hand: float = 1.0) -> Wire:
     """Behind the body, in body axes: y = r cos(h k x + phase), z = r sin(h k x + phase)."""
-    x = -0.7 - np.linspace(0.0, 1.2, 200)
+    x = -0.7 - np.linspace(0.0, 0.8, 140)
     turn = hand * 2 * np.pi * x / 0.8 + phase
     return wire_along(np.stack([x, 0.15 * np.cos(turn), 0.15 * np.sin(turn)], axis=1), 0.05)
 

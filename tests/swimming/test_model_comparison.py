@@ -25,7 +25,8 @@ def test_every_model_answers_as_it_does_alone(settings: dict[str, Any]) -> None:
 
 def test_without_a_choice_all_models_are_asked() -> None:
     short = {"tail.length": "20 mm", "tail.wavelength": "20 mm", "tail.wire_diameter": "1.5 mm"}
-    robot = sp.load(WIDE, **short, **{"coupling.diameter": "0 mm", "model.tube.phases": 1})
+    ball = {"body.shape": "sphere", "body.length": "18 mm", "body.front": "none", "body.rear": "none"}
+    robot = sp.load(WIDE, **short, **ball, **{"coupling.diameter": "0 mm", "model.tube.phases": 1})
     found = sp.compare_models(robot, tail_rate=1.0, placement={"gap": "2 mm"}, resolution={"tolerance": 0.05})
     assert found.models == tuple(SWIMMER_MODELS)
     assert {*found.predictions, *found.refusals} == set(SWIMMER_MODELS)
