@@ -97,7 +97,7 @@ def test_below_the_axis_against_the_same_place_seen_from_another_side() -> None:
 @pytest.mark.parametrize("body", [pytest.param("ball", marks=pytest.mark.slow), "capsule"])
 def test_reciprocal_and_positive(body: str) -> None:
     """Edges limit reciprocity to the order of the quadrature, yawed as pitched."""
-    found = held_in_tube(solids(body, Seat(1.0, 0.15, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
+    found = held_in_tube(solids(body, Seat(1.0, 0.2, 0.1, yaw=0.15), Fineness(tolerance=4e-3)), [(coil(0.7), 1)])
     whole = thirteen(found)
     scale = np.sqrt(np.diag(whole))
     assert found.asymmetry < {"ball": 3e-8, "capsule": 5e-5}[body]
