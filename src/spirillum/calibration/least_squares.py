@@ -223,7 +223,8 @@ def weighted_residuals(
         discrepancy: relative misfit from robot to robot, by quantity.
         prior: weight of the distance from the middle of the prior.
     """
-    return _residuals(problem, z[None], error, discrepancy, prior)[0]
+    found: Samples = _residuals(problem, z[None], error, discrepancy, prior)[0]
+    return found
 
 
 def _residuals(
@@ -259,7 +260,8 @@ def _best(
         step = np.copysign(_SMALL_STEP * np.maximum(1.0, np.abs(z)), z)
         step = np.where(np.abs(z + step) > LARGEST, -step, step)
         rows = _residuals(problem, np.concatenate([z[None], z + np.diag(step)]), error, discrepancy, prior)
-        return (rows[1:] - rows[0]).T / step
+        slopes: Samples = (rows[1:] - rows[0]).T / step
+        return slopes
 
     spread = np.random.default_rng(20120624).normal(size=(starts - 1, start.size))
     best, cost = start, np.inf
