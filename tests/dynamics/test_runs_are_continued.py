@@ -1,5 +1,6 @@
 """A run in the tube that is continued is one run: to rounding, with means of its own part."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +14,20 @@ from spirillum.errors import InputError
 WIDE = "biorob2012-wide"
 
 
-def run(duration: str, **more: Any) -> xr.Dataset:
-    return sp.simulate(WIDE, model="tube", timing={"duration": duration, "on": [("0.1 s", "0.5 s")]}, **more)
+def simulated(duration: str, robot: Mapping[str, Any] | None = None, **more: Any) -> xr.Dataset:
+    loaded = sp.load(WIDE, **(robot or {}))
+    return sp.simulate(loaded, model="tube", timing={"duration": duration, "on": [("0.1 s", "0.5 s")]}, **more)
 
 
 @pytest.fixture(scope="module")
 def early(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("runs") / "early.nc"
-    run("0.3 s").to_netcdf(path)
+    simulated("0.3 s").to_netcdf(path)
     return path
 
 
 def test_a_continued_run_is_the_run_that_had_not_ended(early: Path) -> None:
-    whole, rest = run("0.6 s"), run("0.6 s", in_tube={"continued": early})
+    whole, rest = simulated("0.6 s"), simulated("0.6 s", in_tube={"continued": early})
     begun = float(rest.time[0])
     assert 0.0 < begun - float(xr.open_dataset(early).time[-1]) < 0.01
     assert float(rest.time[-1]) == pytest.approx(float(whole.time[-1]))
@@ -54,7 +56,7 @@ def test_a_continued_run_is_the_run_that_had_not_ended(early: Path) -> None:
 def test_a_continued_run_has_one_start(early: Path, more: dict[str, Any], words: str) -> None:
     settings = {"continued": early, **more.pop("in_tube", {})}
     with pytest.raises(InputError, match=words):
-        run("0.6 s", in_tube=settings, **more)
+        simulated("0.6 s", in_tube=settings, **more)
 
 
 def test_only_a_run_of_the_same_robot_is_continued(early: Path, tmp_path: Path) -> None:
@@ -63,6 +65,39 @@ def test_only_a_run_of_the_same_robot_is_continued(early: Path, tmp_path: Path) 
     held = tmp_path / "held.nc"
     sp.simulate(WIDE, model="sbt", motion="held", timing={"duration": "0.1 s"}).to_netcdf(held)
     with pytest.raises(InputError, match="no run in a tube; allowed: an earlier run of this robot"):
-        run("0.6 s", in_tube={"continued": held})
+        simulated("0.6 s", in_tube={"continued": held})
     with pytest.raises(InputError, match="the run already ends at t = "):
-        run("0.2 s", in_tube={"continued": early})
+        simulated("0.2 s", in_tube={"continued": early})
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"placement": {"flow": "1 mm/s"}}, "a run with ends open, and not imposed flow; allowed: all as in that run"),
+        ({"roughness": "30 um"}, "a run with roughness 9e-07, and not 3e-05"),
+        ({"in_tube": {"friction_coefficient": 0.2}}, r"a run with friction coefficient 0\.1, and not 0\.2"),
+        ({"robot": {"fluid.viscosity": "1 Pa s"}}, r"a run with another fluid\.viscosity"),
+    ],
+    ids=str,
+)
+def test_a_run_is_continued_in_the_same_surroundings(early: Path, more: dict[str, Any], words: str) -> None:
+    """Else a flow or an oil would change at the seam, and nothing would say so."""
+    settings = {"continued": early, **more.pop("in_tube", {})}
+    with pytest.raises(InputError, match=words):
+        simulated("0.6 s", in_tube=settings, **more)
+
+
+def test_another_flow_at_the_seam_is_refused(tmp_path: Path) -> None:
+    simulated("0.2 s", placement={"flow": "1 mm/s"}).to_netcdf(tmp_path / "flowing.nc")
+    after = {"continued": tmp_path / "flowing.nc"}
+    with pytest.raises(InputError, match=r"a run with mean flow at its end 0\.001, and not 0\.002"):
+        simulated("0.4 s", in_tube=after, placement={"flow": "2 mm/s"})
+    assert float(simulated("0.4 s", in_tube=after, placement={"flow": "1 mm/s"}).time[-1]) == pytest.approx(0.4)
+
+
+def test_the_run_that_is_read_is_not_written_over(early: Path, run: Any) -> None:
+    before = early.read_bytes()
+    same = run("simulate", "biorob2012-wide", "--duration", "0.6s", "--continue", str(early), "-o", str(early))
+    assert same.code == 2
+    assert "is read by this command and would be written over" in same.err
+    assert early.read_bytes() == before

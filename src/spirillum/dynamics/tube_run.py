@@ -33,7 +33,10 @@ from spirillum.swimming.prediction import Prediction
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["series_in_tube", "tube_run"]
+__all__ = ["ENDS", "series_in_tube", "tube_run"]
+
+ENDS = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed flow"}
+"""Ends of the channel in words."""
 
 _FEWEST = 2
 """Moments of the shortest run."""
@@ -148,13 +151,12 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
 
 
 def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Mapping[str, Any]:
-    ends = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed flow"}
     ordered = sorted(events, key=lambda event: event.time)
     return {
         "roughness": robot.roughness,
         "friction_coefficient": float(robot.tube[kernel.COEFFICIENT]),
         "sliding_speed": float(robot.tube[kernel.SLIDING]),
-        "ends": ends[float(robot.tube[kernel.ENDS])],
+        "ends": ENDS[float(robot.tube[kernel.ENDS])],
         "wait": wait,
         "events": json.dumps([{"time": event.time, "what": event.what} for event in ordered]),
     }

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
+from spirillum.dynamics.earlier_run import earlier_run
 from spirillum.dynamics.integration import Progress
-from spirillum.dynamics.run_file import open_run
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.table_check import held_against_check
 from spirillum.dynamics.timing import Timing
@@ -72,7 +72,7 @@ def run_in_tube(
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
     links = in_tilted_field(links, field)
     turn = links.turn
-    begun = start if asked.continued is None else _run_before(asked.continued, robot, table)
+    begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links)
     dataset = tube_run(steady, links, begun, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     places = {name: dataset[of].values for name, of in _PLACES.items()}
@@ -183,20 +183,6 @@ def _check_continued(placed: Placement, asked: InTube) -> None:
                 f"{name} is given together with in_tube.continued, which begins where that run ended; allowed: one of "
                 "them"
             )
-
-
-def _run_before(path: str | Path, robot: Robot, table: TubeTable) -> xr.Dataset:
-    """A run that is continued.
-
-    Raises:
-        InputError: if the file is none, or of another robot or tube.
-    """
-    found = open_run(path)
-    own, other = table.key, str(found.attrs.get("table", ""))
-    if other != own:
-        what = "no run in a tube" if not other else f"a run of another robot, tube or version than {robot.name}'s"
-        raise InputError(f"in_tube.continued = {str(path)[:80]}: {what}; allowed: an earlier run of this robot")
-    return found
 
 
 def _around(robot: Robot, placed: Placement, asked: InTube, roughness: float | None) -> Surroundings:

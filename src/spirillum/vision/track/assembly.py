@@ -15,6 +15,7 @@ from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
 from spirillum.vision.track.cuts import cuts_in, jumps_of_time, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
+from spirillum.vision.track.elsewhere import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
 from spirillum.vision.track.learning import Learnt
 from spirillum.vision.track.lost_frames import Reading, restored_times
@@ -75,6 +76,8 @@ def track_of(
     cut = cut_off(record.placed)
     elongation = np.where(seen & ~cut, [one.elongation for one in record.placed], np.nan)
     pose[cut] = errors[cut] = roll[cut] = tail[cut] = np.nan
+    other = something_else(time, pose[:, :2], np.isfinite(roll[:, 0]) | np.isfinite(tail[:, 0]), body.robot.body.length)
+    pose[other] = errors[other] = elongation[other] = np.nan
     position = places_seen_by(sight.optics, optics, pose[:, :2]) - sight.optics.origin[:2]
     along = Along(position, pose[:, 2], ())
     if setup.markers.spacing is None:  # no ruler says how the camera is rolled
@@ -97,6 +100,7 @@ def track_of(
     motion, pixel = Motion(time, position[:, 0], body_angle, tail_phase), optics.length_per_pixel
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot)
+    seen_flags = (*seen_flags, *something_else_flag(other))
     early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)

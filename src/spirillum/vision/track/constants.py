@@ -518,6 +518,20 @@ class CutConstants:
 
 
 @dataclass(frozen=True)
+class ElsewhereConstants:
+    """Frames on which something else than the robot was followed (`elsewhere`)."""
+
+    fewest: int = 12
+    """Fewest frames on which stripes or tail are read."""
+    shortest: int = 3
+    """Fewest frames in a row without them."""
+    beside: int = 5
+    """Frames to both sides of a jump whose medians are compared."""
+    jump: float = 0.15
+    """Jump of the place over the body's length."""
+
+
+@dataclass(frozen=True)
 class LostFramesConstants:
     """Frames lost while the times go on evenly (`lost_frames`)."""
 
@@ -675,6 +689,7 @@ WIDTHS = WidthConstants()
 TAIL = TailConstants()
 UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
+ELSEWHERE = ElsewhereConstants()
 LOST_FRAMES = LostFramesConstants()
 DIRECTION = DirectionConstants()
 SWAY = SwayConstants()

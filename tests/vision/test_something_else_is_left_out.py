@@ -1,0 +1,53 @@
+"""Frames without marks, from which the place jumps to the robot's, are left out; a robot without marks stays."""
+
+import numpy as np
+import pytest
+
+from spirillum.vision.track.elsewhere import something_else, something_else_flag
+
+LENGTH = 0.04
+TIME = np.arange(150) / 30.0
+
+
+def way(seed: int = 0) -> np.ndarray:
+    """A robot at 1 mm/s along x, with noise of 20 um."""
+    return np.stack([1e-3 * TIME, np.zeros(TIME.size)], axis=1) + np.random.default_rng(seed).normal(
+        0.0, 2e-5, (TIME.size, 2)
+    )
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 100), (110, 150)])
+@pytest.mark.parametrize("off", [(0.012, 0.0), (-0.02, 0.005), (0.0, 0.008)])
+def test_a_stretch_beside_the_robot_is_found(first: int, last: int, off: tuple[float, float]) -> None:
+    place, marked = way(), np.ones(TIME.size, dtype=bool)
+    place[first:last] += off
+    marked[first:last] = False
+    found = something_else(TIME, place, marked, LENGTH)
+    assert np.flatnonzero(found).tolist() == list(range(first, last))
+    assert f"on {last - first} frames" in something_else_flag(found)[0].sentence
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, 60), (60, 100), (110, 150)])
+def test_the_robot_without_marks_stays(first: int, last: int) -> None:
+    """Glare may hide stripes and tail for a while: the body goes on its way."""
+    place, marked = way(), np.ones(TIME.size, dtype=bool)
+    marked[first:last] = False
+    assert not something_else(TIME, place, marked, LENGTH).any()
+    assert something_else_flag(np.zeros(3, dtype=bool)) == ()
+
+
+def test_jumps_of_a_robot_whose_marks_are_read_are_not_its_business() -> None:
+    """Cut films and lost frames have flags of their own."""
+    place = way()
+    place[75:] += (0.02, 0.0)
+    assert not something_else(TIME, place, np.ones(TIME.size, dtype=bool), LENGTH).any()
+    few = np.arange(TIME.size) < 11
+    assert not something_else(TIME, place, few, LENGTH).any()
+
+
+def test_a_robot_that_goes_on_after_a_cut_without_marks_is_left_out_but_not_before() -> None:
+    place, marked = way(), np.ones(TIME.size, dtype=bool)
+    place[50] = np.nan
+    place[51:70] += (0.0, 0.01)
+    marked[51:70] = False
+    assert np.flatnonzero(something_else(TIME, place, marked, LENGTH)).tolist() == list(range(51, 70))
