@@ -158,6 +158,17 @@ def test_film_under_the_level_robot_is_a_thin_one() -> None:
     assert lubrication_resistance(3.5, 0.026, a, np.inf, h) == pytest.approx(exact, rel=1e-4)
 
 
+def test_a_robot_that_dry_friction_holds_has_no_speed() -> None:
+    """A heavy robot's friction is more than its drive's forces: what is left is the smoothing of Coulomb's law."""
+    heavy = sp.load("biorob2012-wide", **{"body.mass": "60 g"})
+    held = sp.predict(heavy, motion="free")
+    assert any("dry friction (coefficient 0.1) holds the robot" in said for said in held.warnings)
+    assert np.isnan(held.error_estimate)
+    slides = sp.predict(heavy, motion="free", in_tube={"friction_coefficient": 0.0})
+    assert slides.forward_velocity > 20.0 * held.forward_velocity
+    assert not any("holds the robot" in said for said in slides.warnings)
+
+
 @pytest.mark.parametrize(
     ("overrides", "options", "words"),
     [

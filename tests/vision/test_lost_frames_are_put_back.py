@@ -1,5 +1,7 @@
 """Frames lost while the times go on evenly are put back, or nothing is given; whole films stay as they are."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -93,13 +95,23 @@ def test_a_repeated_frame_that_makes_up_for_a_lost_one_and_a_robot_that_stands_a
     assert "repeated-frames" not in restored(*repeating(stands)[::2])[1]
 
 
-@pytest.mark.parametrize(("first", "last"), [(0, 90), (60, 90), (150, 240)])
-def test_a_robot_that_stands_for_a_while_is_said_to(first: int, last: int) -> None:
+@pytest.mark.parametrize(
+    ("first", "last", "advice"),
+    [(0, 90, "with --start 3.0"), (60, 90, r"with --end 2.0\ds or --start 3.0"), (150, 240, "with --end 5.0")],
+)
+def test_a_robot_that_stands_for_a_while_is_said_to(first: int, last: int, advice: str) -> None:
     time, _, readings = repeating([0 if first <= k < last else 1 for k in range(240)])
     found, names = restored(time, readings)
     assert names == ["stands-for-a-while"]
     assert f"stands from {first / FPS:.1f}" in found.flags[0].sentence
+    assert re.search(advice, found.flags[0].sentence)
     assert found.time is time
+
+
+def test_of_several_rests_the_longest_is_said() -> None:
+    time, _, readings = repeating([0 if k < 40 or k >= 180 else 1 for k in range(240)])
+    found, _ = restored(time, readings)
+    assert "stands from 6.0" in found.flags[0].sentence
 
 
 @pytest.mark.parametrize("there", [30, 60, 120])

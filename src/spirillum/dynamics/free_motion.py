@@ -158,8 +158,14 @@ def free_motion(
     run = long_run(links, state, sign, heavy=heavy, until=until, progress=tell)
     swimming = means_over(held, links, run.start, run.time, int(np.ceil(run.time / run.turn.time)))
     checked, lies = _checked(run, links), run.lying.state in ("steady", "orbits")
-    warnings = (*held.warnings, *(checked.said if lies else ()), *_said(run, links, weight=weight))
-    known = lies and checked.known
+    stuck = _stuck(swimming, run, links, 0.5 * ready.body.diameter)
+    warnings = (
+        *held.warnings,
+        *(checked.said if lies and not stuck else ()),
+        *_said(run, links, weight=weight),
+        *stuck,
+    )
+    known = lies and checked.known and not stuck
     error = table.error_at(run.lying.yaw)["forward_velocity"] if known else float("nan")
     acts = friction_acts(held.friction, held.tail_rate)
     source = fitted_of(calibration, posterior).source_of(ready, held.model, friction=acts)
@@ -239,6 +245,19 @@ def _said(run: LongRun, links: TubeRobot, *, weight: bool) -> list[str]:
             "reach it; `simulate` follows the way there"
         )
     return found
+
+
+def _stuck(swimming: Swimming, run: LongRun, links: TubeRobot, radius: float) -> list[str]:
+    """A sentence on a body that slides more slowly than dry friction is resolved; none on any other."""
+    forward, body = float(swimming.forward_velocity[0]), float(swimming.body_rotation_rate[0])
+    smoothed = float(links.tube[kernel.SLIDING])
+    if run.lying.contact_force <= 0.0 or not np.hypot(forward, radius * body) < smoothed:
+        return []
+    return [
+        f"dry friction (coefficient {float(links.tube[kernel.COEFFICIENT]):g}) holds the robot: its body slides by "
+        f"less than the {show(smoothed, 'um/s')} below which friction is made smooth, so that its speed is none but "
+        "that of the smoothing, and has no error estimate; with a coefficient of 0 it would swim as the fluid lets it"
+    ]
 
 
 def means_over(held: Prediction, links: TubeRobot, state: Samples, time: float, turns: int) -> Swimming:

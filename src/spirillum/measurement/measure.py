@@ -74,7 +74,9 @@ class Measurement(Shown):
         if len(self.trials) == 1:
             found.append("one trial: the intervals are its own, and say nothing of how trials differ")
         if self.files and TABLE not in self.files:
-            found.append(f"no trial gives a speed or a rate of a robot in a channel: {TABLE} is not written")
+            free = self.robot.channel is None
+            why = f"the robot has no channel, which {TABLE} states" if free else "no trial gives a speed or a rate"
+            found.append(f"{why}: {TABLE} is not written")
         if self.left:
             found.append(f"not of this measurement, and left in the folder from before: {', '.join(self.left)}")
         return tuple(found)

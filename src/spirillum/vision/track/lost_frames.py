@@ -182,7 +182,8 @@ def _change_of_motion(time: Samples, readings: tuple[Reading, ...]) -> _Change |
     over = sliding_window_view(np.array(means), LOST_FRAMES.standing - few + 1, axis=1)
     still = np.flatnonzero(np.abs(over).max(axis=(0, 2)) < LOST_FRAMES.still)
     if still.size:
-        return _stands(float(time[still[0]]), float(time[still[-1] + LOST_FRAMES.standing - 1]))
+        longest = max(np.split(still, np.flatnonzero(np.diff(still) > 1) + 1), key=len)
+        return _stands(float(time[longest[0]]), float(time[longest[-1] + LOST_FRAMES.standing - 1]), time)
     back = np.flatnonzero(over.max(axis=(0, 2)) < -LOST_FRAMES.still)
     return _reverses(float(time[back[0]])) if back.size else None
 
@@ -342,11 +343,14 @@ def _repeats(count: int, steps: int) -> Flag:
     return Flag("repeated-frames", sentence)
 
 
-def _stands(first: float, last: float) -> _Change:
+def _stands(first: float, last: float, time: Samples) -> _Change:
+    near = float(time[1] - time[0])
+    before = "" if first <= float(time[0]) + near else f"--end {first:.2f}s"
+    behind = "" if last >= float(time[-1]) - near else f"--start {last:.2f}s"
     return _Change(
         "stands-for-a-while",
         f"the robot stands from {first:.2f} s to {last:.2f} s, its tail too, and moves at other times",
-        "choose the part in which it moves (start and end of the setup)",
+        f"measure with {' or '.join(part for part in (before, behind) if part)} (start and end of the setup)",
     )
 
 
@@ -354,7 +358,7 @@ def _reverses(moment: float) -> _Change:
     return _Change(
         "reverses",
         f"the robot reverses at about {moment:.2f} s, its tail too",
-        "choose a part in which it moves one way (start and end of the setup)",
+        f"measure with --end {moment:.2f}s or --start {moment:.2f}s (start and end of the setup)",
     )
 
 
