@@ -67,6 +67,17 @@ def test_equal_models_are_not_told_apart(made: Callable[..., Path]) -> None:
     assert "cannot be told apart" in ranking.verdict()
 
 
+def test_robots_that_cannot_be_left_out_name_no_winner(ranking: Any) -> None:
+    """Where each robot decides the fit, importance sampling does not say what the others would predict for it."""
+    from dataclasses import replace
+
+    bad = tuple(replace(item, pareto=np.full(item.pareto.size, 1.2)) for item in ranking.ranked)
+    untrusted = replace(ranking, ranked=bad)
+    assert ranking.trusted
+    assert not untrusted.clear
+    assert "sbt and rft are not ranked" in untrusted.verdict()
+
+
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_few_tails_name_no_winner(ranking: Any, count: int) -> None:
     from dataclasses import replace

@@ -37,6 +37,8 @@ _CLEAR = 4.0
 """Difference of the expected log density, over its standard error, from which one model is better without doubt."""
 _PARETO = 0.7
 """Largest shape of the importance weights' tail at which leaving a robot out can be trusted."""
+_MOST_BAD = 0.5
+"""Share of the robots with a larger one above which no model is named the better."""
 _FEWEST_ROBOTS = 4
 """Below that number a standard error over the robots is chance, and no model is named the better."""
 _MANY_ROBOTS = 10
@@ -96,10 +98,17 @@ class Ranking(Shown):
         return self.best.pointwise.size >= _FEWEST_ROBOTS
 
     @property
+    def trusted(self) -> bool:
+        """Whether, for the two best models, most robots can be left out by importance sampling."""
+        return all(float(np.mean(item.pareto > _PARETO)) <= _MOST_BAD for item in self.ranked[:2])
+
+    @property
     def clear(self) -> bool:
         """Whether the best is better than the second beyond doubt."""
         second = self.ranked[1] if len(self.ranked) > 1 else None
-        return self.enough and second is not None and -second.difference > _CLEAR * second.difference_error
+        if not (self.enough and self.trusted):
+            return False
+        return second is not None and -second.difference > _CLEAR * second.difference_error
 
     def verdict(self) -> str:
         """The ranking in a sentence."""
@@ -111,6 +120,11 @@ class Ranking(Shown):
             count = self.best.pointwise.size
             few = "1 tail is" if count == 1 else f"{count} tails are"
             return f"{few} too few to tell {names[0]} and {names[1]} apart; at least {_FEWEST_ROBOTS} are needed"
+        if not self.trusted:
+            return (
+                f"{names[0]} and {names[1]} are not ranked: leaving out most of the {self.best.pointwise.size} robots "
+                f"cannot be trusted (Pareto k above {_PARETO:g}); more robots, or fewer free parameters, would tell"
+            )
         how = f"by {-second.difference:.1f} +- {second.difference_error:.1f} in log density"
         if self.clear:
             return f"{names[0]} predicts left-out tails better than {names[1]}, {how}"
