@@ -1,6 +1,7 @@
 """A run in the tube that is continued is one run: to rounding, with means of its own part."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -101,3 +102,24 @@ def test_the_run_that_is_read_is_not_written_over(early: Path, run: Any) -> None
     assert same.code == 2
     assert "is read by this command and would be written over" in same.err
     assert early.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda found: found | {"time": 5.0},
+        lambda found: found | {"time": float("nan")},
+        lambda found: found | {"step": 0.0},
+        lambda found: found | {"state": [float("nan"), *found["state"][1:]]},
+        lambda found: found | {"state": [*found["state"][:3], 5.0, *found["state"][4:]]},
+        lambda found: found | {"state": [10**400, *found["state"][1:]]},
+        lambda found: found | {"more": 1},
+    ],
+)
+def test_a_checkpoint_that_was_changed_is_refused(early: Path, tmp_path: Path, change: Callable[[Any], Any]) -> None:
+    with xr.open_dataset(early) as dataset:
+        changed = dataset.load()
+    changed.attrs["checkpoint"] = json.dumps(change(json.loads(changed.attrs["checkpoint"])))
+    changed.to_netcdf(tmp_path / "changed.nc")
+    with pytest.raises(InputError, match=r"the run(.s checkpoint is not where the run ends| has no checkpoint)"):
+        simulated("0.6 s", in_tube={"continued": tmp_path / "changed.nc"})

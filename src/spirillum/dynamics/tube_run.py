@@ -40,6 +40,8 @@ ENDS = {kernel.CLOSED: "closed", kernel.OPEN: "open", kernel.IMPOSED: "imposed f
 
 _FEWEST = 2
 """Moments of the shortest run."""
+_UNIT = 1e-6
+"""Error of a quaternion's length that is rounding."""
 
 
 def tube_run(
@@ -137,17 +139,21 @@ def _checkpoint(dataset: xr.Dataset) -> Checkpoint:
     """Where a run can be continued.
 
     Raises:
-        InputError: if it holds no checkpoint.
+        InputError: if it holds no checkpoint, or one that is not of its end.
     """
-    text = str(dataset.attrs.get("checkpoint", ""))
+    allowed = "allowed: a run in a tube as `spirillum simulate` wrote it"
     try:
-        found = Checkpoint(**json.loads(text))
-        state = tuple(float(value) for value in found.state)
-    except (TypeError, ValueError) as error:
-        raise InputError("the run has no checkpoint; allowed: a run in a tube by `spirillum simulate`") from error
+        found = Checkpoint(**json.loads(str(dataset.attrs.get("checkpoint", ""))))
+        time, step, state = float(found.time), float(found.step), np.array([float(value) for value in found.state])
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise InputError(f"the run has no checkpoint; {allowed}") from error
     if len(state) != kernel.STATES:
         raise InputError(f"the run's checkpoint has {len(state)} numbers; allowed: {kernel.STATES}")
-    return Checkpoint(float(found.time), float(found.step), state)
+    quaternion = state[rigid_links.ATTITUDE : rigid_links.PHASE]
+    sound = np.isfinite([time, step, *state]).all() and abs(float(np.linalg.norm(quaternion)) - 1.0) < _UNIT
+    if not sound or not 0.0 <= time <= float(dataset["time"][-1]) or step <= 0.0:
+        raise InputError(f"the run's checkpoint is not where the run ends; {allowed}")
+    return Checkpoint(time, step, tuple(state.tolist()))
 
 
 def _assumptions(robot: TubeRobot, wait: float, events: tuple[Event, ...]) -> Mapping[str, Any]:
