@@ -123,3 +123,20 @@ def test_a_checkpoint_that_was_changed_is_refused(early: Path, tmp_path: Path, c
     changed.to_netcdf(tmp_path / "changed.nc")
     with pytest.raises(InputError, match=r"the run(.s checkpoint is not where the run ends| has no checkpoint)"):
         simulated("0.6 s", in_tube={"continued": tmp_path / "changed.nc"})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda run: run.drop_vars("azimuth"), "has no variable 'azimuth'"),
+        (lambda run: run.assign(body_angle=run["body_angle"] * np.nan), "'body_angle' is not finite"),
+        (lambda run: run.isel(time=slice(0)), "has no samples"),
+    ],
+)
+def test_a_damaged_run_is_not_continued(
+    early: Path, tmp_path: Path, change: Callable[[xr.Dataset], xr.Dataset], words: str
+) -> None:
+    with xr.open_dataset(early) as dataset:
+        change(dataset.load()).to_netcdf(tmp_path / "damaged.nc")
+    with pytest.raises(InputError, match=words):
+        simulated("0.6 s", in_tube={"continued": tmp_path / "damaged.nc"})

@@ -39,6 +39,10 @@ def earlier_run(path: str | Path, steady: Prediction, table: TubeTable, links: T
     if other != own:
         what = "no run in a tube" if not other else f"a run of another robot, tube or version than {name}'s"
         raise InputError(f"in_tube.continued = {str(path)[:80]}: {what}; allowed: an earlier run of this robot")
+    for needed in ("time", "azimuth", "body_angle", "tail_phase", "tail_angle"):
+        numbers_of(found, needed)
+    if not found.sizes.get("time"):
+        raise InputError(f"in_tube.continued = {str(path)[:80]} has no samples; allowed: an earlier run of this robot")
     if changed := _changed(found, steady, links):
         raise InputError(
             f"in_tube.continued = {str(path)[:80]} is a run with {changed}; allowed: all as in that run, which is "
