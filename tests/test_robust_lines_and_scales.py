@@ -9,6 +9,7 @@ from spirillum.robust import (
     mad_scale,
     repeated_median_line,
     running_median,
+    stretches_of,
     theil_sen_line,
 )
 
@@ -46,3 +47,9 @@ def test_running_median_takes_out_single_outliers_and_keeps_a_step() -> None:
     spoiled = values.copy()
     spoiled[[5, 40]] = 100.0
     assert np.array_equal(running_median(spoiled, 5), values)
+
+
+def test_stretches_are_those_of_the_mask() -> None:
+    mask = np.array([True, True, False, True, False, False, True, True])
+    assert [part.tolist() for part in stretches_of(mask)] == [[0, 1], [3], [6, 7]]
+    assert stretches_of(np.zeros(3, dtype=bool)) == []

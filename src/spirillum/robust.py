@@ -1,4 +1,4 @@
-"""Scales and lines of noisy series: median absolute deviation, running median, robust and least-squares lines."""
+"""Scales, lines and stretches of noisy series: median absolute deviation, running median, robust and other lines."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ __all__ = [
     "mad_scale",
     "repeated_median_line",
     "running_median",
+    "stretches_of",
     "theil_sen_line",
 ]
 
@@ -58,6 +59,16 @@ def running_median(values: Samples, window: int) -> Samples:
     """
     padded = np.pad(values, window // 2, mode="edge")
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, window), axis=1))
+
+
+def stretches_of(mask: np.ndarray) -> list[np.ndarray]:
+    """Places of a series that follow each other and are in a mask, stretch by stretch.
+
+    Args:
+        mask: (n,).
+    """
+    places = np.flatnonzero(mask)
+    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []
 
 
 def least_squares_line(time: Samples, values: Samples) -> Line:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.robust import repeated_median_line
+from spirillum.robust import repeated_median_line, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import ELSEWHERE
 
@@ -32,7 +32,7 @@ def something_else(time: Samples, place: Samples, marked: np.ndarray, length: fl
         return found
     speed = np.array([repeated_median_line(time[sure], place[sure, axis]).slope for axis in (0, 1)])
     along = place - speed * (time - time[0])[:, None]  # what does not move as the robot does jumps
-    for stretch in _stretches(~marked & known):
+    for stretch in stretches_of(~marked & known):
         beside = sure[(sure > stretch[-1]) | (sure < stretch[0])]
         after, before = beside[beside > stretch[-1]], beside[beside < stretch[0]]
         few = ELSEWHERE.beside
@@ -58,9 +58,3 @@ def something_else_flag(found: np.ndarray) -> tuple[Flag, ...]:
         "the setup around the robot's way leaves out what looks like it)"
     )
     return (Flag("something-else-followed", sentence),)
-
-
-def _stretches(mask: np.ndarray) -> list[np.ndarray]:
-    """Numbers of the frames in each stretch of a mask."""
-    places = np.flatnonzero(mask)
-    return np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else []

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from spirillum.arrays import Samples
-from spirillum.robust import mad_scale, running_median
+from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES
 from spirillum.vision.track.warnings import EVERYTHING
@@ -180,9 +180,9 @@ def _change_of_motion(time: Samples, readings: tuple[Reading, ...]) -> _Change |
     if len(means) < 2:
         return None
     over = sliding_window_view(np.array(means), LOST_FRAMES.standing - few + 1, axis=1)
-    still = np.flatnonzero(np.abs(over).max(axis=(0, 2)) < LOST_FRAMES.still)
-    if still.size:
-        longest = max(np.split(still, np.flatnonzero(np.diff(still) > 1) + 1), key=len)
+    rests = stretches_of(np.abs(over).max(axis=(0, 2)) < LOST_FRAMES.still)
+    if rests:
+        longest = max(rests, key=len)
         return _stands(float(time[longest[0]]), float(time[longest[-1] + LOST_FRAMES.standing - 1]), time)
     back = np.flatnonzero(over.max(axis=(0, 2)) < -LOST_FRAMES.still)
     return _reverses(float(time[back[0]])) if back.size else None
