@@ -1,7 +1,9 @@
 """Large studies: one process, several, a cluster, or runs that were killed leave the same bytes."""
 
 import hashlib
+import json
 import os
+import shutil
 import signal
 import sys
 import time
@@ -9,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -118,6 +121,63 @@ def test_interrupted_store_adds_what_is_missing(tmp_path: Path, whole: Path, mon
     done.clear()
     sp.study(GRID, store=store)
     assert done == []
+
+
+def spoilt(path: Path) -> None:
+    """Change one byte, and not the size."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def rewritten(path: Path, **attributes: Any) -> None:
+    found = json.loads(path.read_text())
+    found["attributes"] |= attributes
+    path.write_text(json.dumps(found))
+
+
+@pytest.mark.usefixtures("small_regions")
+def test_what_was_spoilt_in_a_finished_store_is_made_again(
+    tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks by their checksum, headers by what they have to hold; all else stays as it is."""
+    store = tmp_path / "study.zarr"
+    shutil.copytree(whole, store)
+    written: list[str] = []
+    original = study_store.write_pieces
+    monkeypatch.setattr(study_store, "write_pieces", lambda *of: (written.extend(of[1]), original(*of)))
+    for damage, pieces in (
+        (lambda: spoilt(next(path for path in (store / "tail_torque" / "c").rglob("*") if path.is_file())), 1),
+        (lambda: next(path for path in (store / "outside" / "c").rglob("*") if path.is_file()).unlink(), 1),
+        (lambda: spoilt(store / "wavelength" / "c" / "0"), 0),
+        (lambda: (store / "tail_torque" / "zarr.json").write_text("{}"), 0),
+        (lambda: rewritten(store / "zarr.json", title="Other tails", units="m"), 0),
+        (lambda: rewritten(store / "zarr.json", unanswered="many"), 4),
+        (lambda: rewritten(store / "zarr.json", warnings=[1]), 4),
+    ):
+        damage()
+        written.clear()
+        same(sp.study(GRID, store=store), xr.open_zarr(whole, chunks=None))
+        assert tree(store) == tree(whole)
+        assert sum(key.startswith("notes") for key in written) == pieces
+        assert written
+
+
+@pytest.mark.usefixtures("small_regions")
+@pytest.mark.parametrize(
+    "note", ["[]", '{"cautions": 3, "unanswered": 0}', '{"cautions": [[1]], "unanswered": 0}', "{"]
+)
+def test_a_spoilt_note_of_an_interrupted_store_is_made_again(
+    note: str, tmp_path: Path, whole: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = tmp_path / "study.zarr"
+    with monkeypatch.context() as patch:
+        patch.setattr(study_store, "_summed", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            sp.study(GRID, store=store)
+    next((store / "notes").iterdir()).write_text(note)
+    sp.study(GRID, store=store)
+    assert tree(store) == tree(whole)
 
 
 def test_processes_answer_what_one_answers(

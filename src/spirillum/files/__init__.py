@@ -33,6 +33,7 @@ from spirillum.files.writing import (
 from spirillum.files.zarr_store import (
     Stored,
     chunk_key,
+    is_whole,
     opened_store,
     region_files,
     store_files,
@@ -54,6 +55,7 @@ __all__ = [
     "holds_own_only",
     "is_own",
     "is_text",
+    "is_whole",
     "loaded_netcdf",
     "netcdf_file",
     "netcdf_target",

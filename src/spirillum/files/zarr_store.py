@@ -23,11 +23,22 @@ from spirillum.files.writing import synced
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Stored", "chunk_key", "opened_store", "region_files", "store_files", "store_target", "write_pieces"]
+__all__ = [
+    "Stored",
+    "chunk_key",
+    "is_whole",
+    "opened_store",
+    "region_files",
+    "store_files",
+    "store_target",
+    "write_pieces",
+]
 
 _SETTINGS = {"array.write_empty_chunks": True, "threading.max_workers": 1, "async.concurrency": 1}
 _LEVEL = 1
 """Of compression: faster than a disk, and floats gain nothing from more."""
+_CHECKSUM = 4
+"""Bytes of the checksum at the end of a chunk."""
 
 Place = Sequence[tuple[int, int]]
 """First place, and that behind the last, along each dimension."""
@@ -117,6 +128,18 @@ def region_files(
 def chunk_key(name: str, item: Stored, place: Place) -> str:
     """Path within the store of the chunk that a region of a variable is."""
     return "/".join([name, "c", *(str(start // part) for (start, _), part in zip(place, item.chunk, strict=True))])
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a chunk is there as it was written: its last four bytes are the CRC-32C of the others."""
+    from google_crc32c import value  # of zarr
+
+    with suppress(OSError):
+        content = path.read_bytes()
+        return len(content) > _CHECKSUM and value(content[:-_CHECKSUM]) == int.from_bytes(
+            content[-_CHECKSUM:], "little"
+        )
+    return False
 
 
 def _check_whole_chunk(name: str, item: Stored, place: Place) -> None:

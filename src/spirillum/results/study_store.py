@@ -10,12 +10,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from spirillum.answer import envelope
 from spirillum.crews import Crew, shared_out
 from spirillum.errors import InputError
 from spirillum.extras import required
-from spirillum.files import opened_store, read_json, results_folder, store_files, store_target, write_pieces
+from spirillum.files import (
+    is_whole,
+    opened_store,
+    read_json,
+    results_folder,
+    store_files,
+    store_target,
+    write_pieces,
+)
 from spirillum.studies.cautions import Caution, summed
 from spirillum.studies.dataset import described
 from spirillum.studies.estimate import estimate_of, is_large
@@ -67,14 +76,17 @@ def stored_study(
     with results_folder(store_target(store), claim=claim) as folder:
         plan = plan_of(loaded, observed, layout_of(loaded))
         attributes = {**described(loaded, observed, fingerprint, []), "coordinates": " ".join(plan.others)}
-        missing = _missing(plan, folder)
-        if not _finished(folder) or missing:
-            _begin(plan, folder, attributes)
+        outcome = _outcome_of(folder)
+        missing = _missing(plan, folder, finished=outcome is not None)
+        if outcome is None:
+            _write_headers(plan, folder, {**attributes, "finished": "no"})
+        if missing:
             if is_large(loaded):
                 tell(estimate_of(loaded, observed, plan, len(missing), crew).words, 0, 0)
             _write_regions(_Work(loaded, observed, plan, folder), missing, crew, tell)
-            notes = [read_json(folder / plan.note(region), "a note of a study") for region in plan.layout.regions()]
-            _finish(loaded, plan, folder, attributes, notes)
+        if outcome is None:
+            outcome = _summed(loaded, [_note_of(folder / plan.note(region)) for region in plan.layout.regions()])
+        _write_headers(plan, folder, {**attributes, **outcome._asdict(), "finished": "yes"})
         shutil.rmtree(folder / _NOTES, ignore_errors=True)
         return opened_store(folder)
 
@@ -88,33 +100,66 @@ class _Work(NamedTuple):
     folder: Path
 
 
-def _missing(plan: Plan, folder: Path) -> list[Region]:
-    """Regions of which a file is not there, or, until the study is finished, their note."""
-    finished = _finished(folder)
+class _Note(NamedTuple):
+    """What a region has to say, until the study is finished."""
+
+    cautions: list[Caution]
+    unanswered: int
+
+
+class _Outcome(NamedTuple):
+    """What is known once all regions are there."""
+
+    warnings: str
+    """One a line."""
+    unanswered: int
+
+
+def _missing(plan: Plan, folder: Path, *, finished: bool) -> list[Region]:
+    """Regions of which a file is not there as it was written; until the study is finished, their note is one."""
 
     def lacks(region: Region) -> bool:
-        keys = [key for key in plan.pieces(region) if not (finished and key.startswith(_NOTES))]
-        return not all(_is_written(folder / key) for key in reversed(keys))
+        note = plan.note(region)
+        chunks = [key for key in reversed(plan.pieces(region)) if key != note]
+        return not (all(is_whole(folder / key) for key in chunks) and (finished or _has_note(folder / note)))
 
     return [region for region in plan.layout.regions() if lacks(region)]
 
 
-def _is_written(path: Path) -> bool:
-    with suppress(OSError):
-        return path.stat().st_size > 0
+def _has_note(path: Path) -> bool:
+    with suppress(InputError):
+        _note_of(path)
+        return True
     return False
 
 
-def _finished(folder: Path) -> bool:
-    """Whether all has been written, the warnings too."""
+def _note_of(path: Path) -> _Note:
+    """What a region has to say.
+
+    Raises:
+        InputError: if it cannot be read, or is not what this program writes.
+    """
+    what = "a note of a study"
+    found = read_json(path, what)
+    try:
+        return TypeAdapter(_Note).validate_python(found)
+    except ValidationError as error:
+        raise InputError(f"{path} is damaged; allowed: {what}") from error
+
+
+def _outcome_of(folder: Path) -> _Outcome | None:
+    """What the study was finished with; nothing until then."""
     with suppress(InputError, KeyError, TypeError):
-        return bool(read_json(folder / "zarr.json", "a store")["attributes"]["finished"] == "yes")
-    return False
+        attributes = read_json(folder / "zarr.json", "a store")["attributes"]
+        found = _Outcome(attributes["warnings"], attributes["unanswered"])
+        if attributes["finished"] == "yes" and type(found.warnings) is str and type(found.unanswered) is int:
+            return found
+    return None
 
 
-def _begin(plan: Plan, folder: Path, attributes: Mapping[str, Any]) -> None:
-    """Write what is in the store, unless it stands there."""
-    files = store_files(plan.variables, plan.coordinates, {**attributes, "finished": "no"})
+def _write_headers(plan: Plan, folder: Path, attributes: Mapping[str, Any]) -> None:
+    """Write what is in the store, except its regions, where it does not stand there yet."""
+    files = store_files(plan.variables, plan.coordinates, attributes)
     changed = {key: content for key, content in files.items() if not _holds(folder / key, content)}
     if changed:
         write_pieces(folder, changed)
@@ -143,24 +188,12 @@ def _write_regions(work: _Work, missing: Sequence[Region], crew: Crew, tell: Tel
         tell(f"{models}, {job.region.size} robots{', ' if here[0] else ''}{here[0]}", done, total)
 
 
-def _finish(
-    loaded: LoadedStudy,
-    plan: Plan,
-    folder: Path,
-    attributes: Mapping[str, Any],
-    notes: Sequence[Mapping[str, Any]],
-) -> None:
-    """Write what is known once all regions are there."""
+def _summed(loaded: LoadedStudy, notes: Sequence[_Note]) -> _Outcome:
+    """What the notes of all regions say together."""
     warnings = warnings_of(loaded)
-    warnings += summed((Caution(*item) for note in notes for item in note["cautions"]), loaded.count)
+    warnings += summed((caution for note in notes for caution in note.cautions), loaded.count)
     warnings += warnings_of_calibrations(loaded)
-    results = {
-        "warnings": "\n".join(dict.fromkeys(warnings)),
-        "unanswered": sum(int(note["unanswered"]) for note in notes),
-        "finished": "yes",
-    }
-    files = store_files(plan.variables, plan.coordinates, {**attributes, **results})
-    write_pieces(folder, {"zarr.json": files["zarr.json"]})
+    return _Outcome("\n".join(dict.fromkeys(warnings)), sum(note.unanswered for note in notes))
 
 
 def store_answer(dataset: xr.Dataset, store: Path) -> dict[str, Any]:
