@@ -52,6 +52,21 @@ def test_what_is_proposed_for_a_film_too_short_to_learn_from_would_help(monkeypa
     assert "--pace" not in found.stopped
 
 
+def test_a_film_that_breaks_off_says_so(filmed, tmp_path):
+    """A third of its bytes is gone; the header, which states the length, stands first."""
+    copied, broken = tmp_path / "copied.mp4", tmp_path / "broken.mp4"
+    with av.open(filmed) as source, av.open(copied, "w", options={"movflags": "+faststart"}) as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                target.mux(packet)
+    content = copied.read_bytes()
+    broken.write_bytes(content[: len(content) * 2 // 3])
+    found = track(broken, setup_of(filmed), pace="fast", learn=2.0)
+    assert any("could not be read to its end" in line for line in found.warnings), found.warnings
+
+
 def test_lines_go_out_as_datagrams_to_this_computer(filmed):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
         receiver.bind(("127.0.0.1", 0))

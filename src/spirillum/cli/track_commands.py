@@ -85,10 +85,10 @@ def track(
         typer.echo(line_of(result.to_dict()))
     else:
         renderer.show(result.to_dict(), json=json)
-    _end(result)
+    _end(result, source)
 
 
-def _end(result: Tracked) -> None:
+def _end(result: Tracked, source: str) -> None:
     """Leave with the exit code of how it ended."""
     from spirillum.errors import InputError
     from spirillum.measurement.trials import RATE_NAMES
@@ -100,7 +100,7 @@ def _end(result: Tracked) -> None:
     if result.trial is not None:
         rates = [result.trial.quantities[name] for name in RATE_NAMES]
         if all(rate.value != rate.value for rate in rates):
-            slow = result.pace == "real" and result.dropped > result.tracked
+            slow = result.pace == "real" and Path(source).exists() and result.dropped > result.tracked
             hint = "; most frames passed while the robot was learnt: --pace fast looks at all of them" if slow else ""
             raise InputError(f"{result.source}: no rate could be given: {rates[0].reason}{hint}")
 

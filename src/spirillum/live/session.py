@@ -216,7 +216,7 @@ class _Log:
             learnt=self.learnt,
             latencies=tuple(self.latencies),
             trial=trial,
-            notes=(self._clocks,) if self._clocks else (),
+            notes=(*self.source.notes, *([self._clocks] if self._clocks else [])),
             stopped=self.stopped,
             interrupted=self.interrupted,
         )

@@ -71,12 +71,16 @@ class Source:
             InputError: if it cannot be opened, stops in the middle, or changes its format or size.
         """
         if self.kind == "film":
-            video = open_video(self.options["path"], self.options["rate"])
             start, end = self.options["between"]
-            for number, frame in enumerate(video.frames(start, end)):
+            for number, frame in enumerate(self.options["video"].frames(start, end)):
                 yield Arrived(number, frame.time, frame.image, time.perf_counter())
             return
         yield from _pictures(self)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was odd about a film while it was read, a sentence each: for example, that it breaks off."""
+        return tuple(flag.sentence for flag in self.options["video"].flags) if self.kind == "film" else ()
 
 
 def source_of(
@@ -121,7 +125,7 @@ def source_of(
             _without_secrets(word), "stream", {"file": address, "format": None, "options": wanted, "size": None}
         )
     video = open_video(word, rate)  # says what is wrong with a film
-    return Source(video.name, "film", {"path": word, "rate": rate, "between": between}, video.words)
+    return Source(video.name, "film", {"video": video, "between": between}, video.words)
 
 
 def _without_secrets(word: str) -> str:

@@ -81,7 +81,7 @@ class Video:
     size: tuple[int, int]
     """Width and height as shown, pixels."""
     duration: float | None
-    """Length as the file states it, s."""
+    """Length as the file states it, s; with a given rate, that of the frames that it states."""
     rate: float | None
     """Frames a second as the file states them, or as the setup gives them."""
     given_rate: float | None = None
@@ -165,7 +165,7 @@ class Video:
 
     def _film(self) -> Iterator[tuple[int, float, Any]]:
         """Index, time and a function that gives the picture, of every frame that can be decoded."""
-        last, origin, rgb = None, None, converter()
+        before, last, origin, rgb = None, None, None, converter()
         for index, frame in enumerate(self._decoded()):
             if (frame.width, frame.height)[:: _turn(frame)] != self.size:
                 self._note("unreadable-frames", "the film changes its size on the way: frames of another are left out")
@@ -178,10 +178,10 @@ class Video:
             if last is not None and time <= last:
                 self._note("unordered-times", "time stamps that do not rise were found: such frames are left out")
                 continue
-            last = time
+            before, last = last, time
             yield index, time, partial(rgb, frame)
-        if last is not None and self.duration and self.rate and not self.given_rate:
-            missing = self.duration - last - 1.0 / self.rate
+        if before is not None and last is not None and self.duration:
+            missing = self.duration - (2.0 * last - before)
             if missing > max(0.5, 0.02 * self.duration):
                 self._ends_early(f"it ends at {last:.2f} s, {missing:.1f} s are missing")
 
@@ -296,8 +296,8 @@ def _film(path: Path, frames_per_second: float | None) -> Video:
             duration = container.duration / av.time_base
         rate = frames_per_second or (float(stream.average_rate) if stream.average_rate else None)
         flags = _replaced(frames_per_second, float(stream.average_rate or 0.0))
-        if frames_per_second and stream.frames:
-            duration = stream.frames / frames_per_second
+        if frames_per_second:  # its own length is in its own times, which do not count
+            duration = stream.frames / frames_per_second if stream.frames else None
         words = [str(container.metadata.get(key, "")) for key in ("title", "comment", "description")]
     return Video(path, size, duration, rate, frames_per_second, words=one_line(" ".join(words)), flags=flags)
 
