@@ -15,9 +15,10 @@ import numpy as np
 
 from backlit_pictures import INKS, Backlit
 from flat_pictures import PAINTS, Flat
-from spirillum.robot.load import PAPER_ROBOTS, load
+from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.mesh import STRIPE_COLOURS
 from spirillum.robot.robot import Robot
+from spirillum.robot.text import robot_text
 from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances
@@ -26,7 +27,6 @@ from spirillum.virtual.framing import framed, lens_of, swimming_range
 from spirillum.virtual.motion import motion_of
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.solids import linear
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.troubles import Troubles, stripe_edges

@@ -52,3 +52,19 @@ def test_what_the_field_cannot_show_is_refused() -> None:
         sp.render(SMALL, "never.mp4")
     with pytest.raises(sp.InputError, match=r"field_of_view = 0\.5 mm; allowed: 1 to 1000 mm"):
         sp.render(SMALL, "never.mp4", camera={"field_of_view": "0.5 mm"})
+    with pytest.raises(sp.InputError, match=r"field_of_view = -5 mm; allowed: 1 to 1000 mm"):
+        sp.render(SMALL, "never.mp4", camera={"field_of_view": "-5 mm"})
+
+
+@pytest.mark.parametrize(
+    ("view", "lateral", "words"),
+    [
+        ("top", "1 m", "never in the picture, 1000 mm beside its middle; allowed: a lateral nearer to 0"),
+        ("top", "-20 mm", "never in the picture, -20 mm beside its middle; allowed: a lateral nearer to 0"),
+        ("side", "1 m", "under the floor|above the oil"),
+        ("side", "-1 m", "under the floor|above the oil"),
+    ],
+)
+def test_a_robot_beside_the_picture_is_refused(view: str, lateral: str, words: str) -> None:
+    with pytest.raises(sp.InputError, match=words):
+        sp.render(SMALL, "never.mp4", camera={"field_of_view": "6 mm", "view": view}, trial={"lateral": lateral})

@@ -88,12 +88,13 @@ def design(
     """
     from spirillum.cli import renderer
     from spirillum.designs.design import design as answer
-    from spirillum.files import PICTURES, output_target, whole_files
+    from spirillum.files import PICTURES, output_target, protected, whole_files
     from spirillum.robot.text import robot_text
 
-    target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
-    picture = None if plot is None else output_target(plot, PICTURES, "design.png")
-    printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
+    with protected(robot, posterior):
+        target = None if output is None else output_target(output, {".toml": "a robot file"}, "design.toml")
+        picture = None if plot is None else output_target(plot, PICTURES, "design.png")
+        printed = None if stl is None else output_target(stl, {".stl": "a body for a printer"}, "design.stl")
     loaded = loaded_robot(robot, settings, posterior=posterior)
     judged = {
         "statistic": statistic,

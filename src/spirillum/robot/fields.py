@@ -57,6 +57,7 @@ __all__ = [
     "Viscosity",
     "Voltage",
     "Yaw",
+    "default_of",
     "field_values",
     "kind_of",
     "quantity_schema",
@@ -154,11 +155,27 @@ def kind_of(section: Section, path: str) -> Kind | None:
         section: the section.
         path: dotted name of a field in it, whose tables are all given.
     """
-    *tables, name = path.split(".")
-    for table in tables:
-        section = getattr(section, table)
-    kinds = [item for item in _all_metadata(type(section).model_fields[name]) if isinstance(item, Kind)]
+    kinds = [item for item in _all_metadata(_info_of(section, path)) if isinstance(item, Kind)]
     return kinds[0] if kinds else None
+
+
+def default_of(section: Section, path: str) -> Any:
+    """What a field is where its file does not name it.
+
+    Args:
+        section: the section.
+        path: dotted name of a field in it, whose tables are all given.
+    """
+    return _info_of(section, path).default
+
+
+def _info_of(section: Section, path: str) -> FieldInfo:
+    *tables, name = path.split(".")
+    inner: Any = section
+    for table in tables:
+        inner = inner[table] if isinstance(inner, dict) else getattr(inner, table)
+    fields: dict[str, FieldInfo] = type(inner).model_fields
+    return fields[name]
 
 
 def _all_metadata(info: FieldInfo) -> list[Any]:

@@ -20,6 +20,7 @@ from spirillum.robot.robot import Robot
 __all__ = [
     "PAPER_ROBOTS",
     "PAPER_ROBOTS_TAKEN",
+    "is_preset",
     "load",
     "new_robot_file",
     "parse_setting",
@@ -46,6 +47,11 @@ _MOST_LAYERS = 8
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
 PAPER_ROBOTS_TAKEN = f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are taken"
 """Presets of the paper's robot, one for each of its channels."""
+
+
+def is_preset(robot: Robot) -> bool:
+    """Whether a robot is an unchanged preset."""
+    return robot.name in preset_names() and load(robot.name) == robot
 
 
 @lru_cache(maxsize=1)

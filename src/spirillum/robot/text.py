@@ -6,7 +6,8 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from spirillum.robot.fields import field_values
+from spirillum.files import MARK
+from spirillum.robot.fields import default_of, field_values
 from spirillum.robot.robot import Robot
 from spirillum.units import USUAL, Kind, for_people, parse_quantity, shown_in
 
@@ -24,7 +25,8 @@ def robot_text(robot: Robot, comment: str = "") -> str:
     for path, text in _fields(robot):
         section, _, name = path.rpartition(".")
         sections.setdefault(section, []).append(f"{name} = {text}")
-    lines = [f"# {line}" for line in comment.splitlines()] + sections.pop("")
+    head = [*comment.splitlines(), f"Every field that is set, {MARK}."]
+    lines = [f"# {line}" for line in head] + sections.pop("")
     for section, entries in sections.items():
         lines += ["", f"[{section}]", *entries]
     return "\n".join(lines) + "\n"
@@ -51,8 +53,9 @@ def _replaced(table: Any, names: list[str], value: float) -> Any:
 def _fields(robot: Robot) -> Iterator[tuple[str, str]]:
     for path, value, unit in field_values(robot):
         if value is None:
-            continue
-        if unit is None:
+            if default_of(robot, path) is not None:
+                yield path, '"none"'
+        elif unit is None:
             yield path, json.dumps(list(value) if isinstance(value, (tuple, list)) else value, ensure_ascii=False)
         else:
             yield path, f'"{_with_unit(float(value), unit)}"'

@@ -31,7 +31,7 @@ from spirillum.files import (
 )
 from spirillum.robot.arguments import in_range, whole
 from spirillum.robot.fields import Time
-from spirillum.robot.load import PAPER_ROBOTS, load
+from spirillum.robot.load import PAPER_ROBOTS, is_preset, load
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
 from spirillum.robot.seat import gap_of
@@ -43,7 +43,6 @@ from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import steady_rates
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, TrialOptions
-from spirillum.virtual.robot_file import is_preset
 from spirillum.virtual.trial import render
 from spirillum.virtual.truth import SYNTHETIC, rate_quantities
 

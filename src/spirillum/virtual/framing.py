@@ -58,7 +58,8 @@ def check_size(robot: Robot, tank: Tank, lens: Lens) -> None:
     width, length = ends[1] - ends[0], nose - rear
     low, high = _SHORTEST / lens.size[0] * width, _LONGEST * width
     if not low <= length <= high:
-        allowed = f"{1e3 * low:.3g} to {1e3 * high:.4g} mm, which this camera can show"
+        wide = f"which a picture {1e3 * width:.4g} mm wide can show, or another field_of_view"
+        allowed = f"{1e3 * low:.3g} to {1e3 * high:.4g} mm, {wide}"
         raise InputError(f"{robot.name} is {1e3 * length:.4g} mm long; allowed: {allowed}")
 
 
@@ -86,6 +87,7 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float |
     Raises:
         InputError: if the robot is never in the picture.
     """
+    _check_beside_axis(trajectory, robot, lens)
     x = trajectory.position[:, 0]
     low, high = _visible(lens, float(trajectory.position[:, 2].mean()))
     rear, nose = _extent(robot)
@@ -95,6 +97,26 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float |
         first = 1e3 * (float(x[0]) + shift)
         raise InputError(f"start = {first:.4g} mm: the robot is never in the picture; allowed: nearer to 0")
     return trajectory.shifted(shift)
+
+
+def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> None:
+    """The robot swims between the floor and the oil's surface, and between the upper and the lower edge of the picture.
+
+    Raises:
+        InputError: if it is on no frame.
+    """
+    radius = 0.5 * robot.body.diameter
+    _, y, z = trajectory.position.T
+    nearer = "allowed: a lateral nearer to 0, or a run that stays nearer to the axis"
+    inside = (z > 0.0) & (z < lens.surface)
+    if not inside.any():
+        where = "under the floor" if z[0] <= 0.0 else "above the oil"
+        raise InputError(f"the robot is {where} in this view ({1e3 * float(z[0]):.4g} mm above the floor); {nearer}")
+    middle = 0.5 * (lens.size[0] - 1)
+    rows = np.array([[middle, 0.0], [middle, lens.size[1] - 1.0]])
+    edges = lens.points(rows, float(z[inside].mean()))[:, 1]
+    if not np.any(inside & (y > edges.min() - radius) & (y < edges.max() + radius)):
+        raise InputError(f"the robot is never in the picture, {1e3 * float(y[0]):.4g} mm beside its middle; {nearer}")
 
 
 def _visible(lens: Lens, height: float) -> tuple[float, float]:

@@ -14,15 +14,15 @@ from spirillum.argument_kinds import as_number, check_kind, checked
 from spirillum.dynamics.poses import Pose, Poses
 from spirillum.errors import InputError, clipped
 from spirillum.files import write_text
-from spirillum.robot.load import load
+from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
+from spirillum.robot.text import robot_text
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.frames import Frames
 from spirillum.virtual.framing import check_size, lens_of, swimming_range
 from spirillum.virtual.options import CameraOptions, Seeded
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.trajectory import TrialTrajectory, trajectory_of
 from spirillum.virtual.truth import setup_text

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from spirillum.robot.arguments import Options, in_range, one_of, refusal, whole
-from spirillum.robot.fields import Angle, Length, LengthOrZero, Rate, SignedLength, Time, Velocity
+from spirillum.robot.fields import Angle, LengthOrZero, Rate, SignedLength, Time, Velocity
 
 __all__ = ["CameraOptions", "MotionOptions", "Seeded", "SetupErrors", "TrialOptions"]
 
@@ -108,7 +108,7 @@ class CameraOptions(Options):
     """Width and height in pixels, even numbers, or ``"640x480"``."""
     exposure: Time = 1.0 / 120.0
     """Of each frame."""
-    field_of_view: Annotated[Length, AfterValidator(_check_field)] | None = None
+    field_of_view: Annotated[SignedLength, AfterValidator(_check_field)] | None = None
     """Width of the picture at the reference plane, 1 mm to 1 m; None: 166.8 mm, about nine of the paper's bodies. In a
     smaller field, as a microscope's, the ruler and the structure of the floor are finer."""
     distortion: Annotated[float, BeforeValidator(in_range(-0.5, 0.5))] = -0.02

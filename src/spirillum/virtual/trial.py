@@ -14,8 +14,9 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.errors import InputError
 from spirillum.files import protected, whole_files, write_dataset
-from spirillum.robot.load import load
+from spirillum.robot.load import is_preset, load
 from spirillum.robot.robot import Robot
+from spirillum.robot.text import robot_text
 from spirillum.shown import Shown
 from spirillum.swimming.model_choice import AUTO
 from spirillum.version import versions
@@ -28,7 +29,6 @@ from spirillum.virtual.lens import Lens
 from spirillum.virtual.motion import motion_of, motion_of_run
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.painter import Painter
-from spirillum.virtual.robot_file import is_preset, robot_text
 from spirillum.virtual.tank import tank_of
 from spirillum.virtual.troubles import Troubles, View, even_times, stripe_edges, with_troubles
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
