@@ -8,14 +8,14 @@ run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from spirillum.arrays import Samples
 from spirillum.dynamics.integration import Reach
-from spirillum.dynamics.tube_integration import observed_at, range_left, step_sizes, watched_limits
+from spirillum.dynamics.tube_integration import TOLERANCE, observed_at, range_left, step_sizes, watched_limits
 from spirillum.dynamics.tube_robot import TubeRobot
 from spirillum.dynamics.tube_start import StartPlace, state_at
 from spirillum.errors import InputError
@@ -25,8 +25,9 @@ from spirillum.kernels.contacts import SITE_ROTOR
 
 __all__ = ["STEPS", "FixedPlace", "Turn", "TurnMap", "fixed_place"]
 
-_TOLERANCE = 1e-7
-"""Error of a step over the sizes of the state's components."""
+_SEARCHING = 10.0 * TOLERANCE
+"""Error of a step in time while a fixed place is looked for; it is settled at that of a run, as are its multipliers:
+one close to 1 says how slowly the place is approached."""
 _ON = False  # a step may go beyond where it is asked to stop
 _FIRST = 1e-3  # first step over the time of a turn
 _STALLED = 50.0  # turns at the steady rate in which the tail has to turn once
@@ -65,8 +66,8 @@ class TurnMap:
     """The robot, at its duty."""
     sign: float
     """Sense in which the tail turns in the lab."""
-    turns: int = 0
-    """Turns computed so far."""
+    tolerance: float = TOLERANCE
+    """Error of a step over the sizes of the state's components."""
 
     def after(self, state: Samples) -> Turn:
         """The next turn of the tail from a state, (19,).
@@ -74,7 +75,6 @@ class TurnMap:
         Raises:
             InputError: where the table's range is left, the motion cannot be followed, or the tail does not turn.
         """
-        self.turns += 1
         robot, data = self.robot, self.robot.data
         limits, sizes = watched_limits(robot, _NOWHERE), step_sizes(robot)
         y = state.copy()
@@ -89,7 +89,7 @@ class TurnMap:
         noted: list[tuple[float, ...]] = []
         while self._turned(y, data[kernel.TURN], begun) < 2.0 * np.pi or not noted:
             status, _ = tube_steps.advance(
-                np.inf, _ON, 1, _TOLERANCE, memory, y, before, increments, gaps, nothing, none, sizes,
+                np.inf, _ON, 1, self.tolerance, memory, y, before, increments, gaps, nothing, none, sizes,
                 limits, robot.roughness, data, robot.table,
             )  # fmt: skip
             time = float(memory[tube_steps.TIME])
@@ -154,7 +154,8 @@ class FixedPlace(NamedTuple):
 def fixed_place(turns: TurnMap, state: Samples, *, heavy: bool) -> FixedPlace | None:
     """The fixed place near a state by Newton's method, if it is found.
 
-    After each step some turns let go by what dies out within a few, such as gaps.
+    After each step some turns let go by what dies out within a few, such as gaps. It is looked for with longer
+    steps in time than those of a run, and settled with these.
 
     Args:
         turns: the map.
@@ -162,8 +163,31 @@ def fixed_place(turns: TurnMap, state: Samples, *, heavy: bool) -> FixedPlace | 
         heavy: whether the azimuth counts, too.
     """
     free = np.arange(0 if heavy else 1, 4)
-    place = _Place(turns, state)
-    x = place.coordinates(state)
+    place = _Place(replace(turns, tolerance=_SEARCHING), state)
+    near = _newton(place, place.coordinates(state), free)
+    if near is None:
+        return None
+    place = _Place(turns, place.state(near.x))
+    found = _newton(place, near.x, free)
+    if found is None:
+        return None
+    multipliers = _multipliers(place, found, free)
+    return FixedPlace(found.turn, place.state(found.x), multipliers[np.argsort(-np.abs(multipliers))])
+
+
+class _Found(NamedTuple):
+    """Where Newton's method has ended."""
+
+    x: Samples
+    """Coordinates of the place, (4,)."""
+    turn: Turn
+    """The turn from there."""
+    derivative: Samples
+    """Derivative of the map there, by differences to one side."""
+
+
+def _newton(place: _Place, x: Samples, free: np.ndarray) -> _Found | None:
+    """Newton's method for the place that a turn brings back, from coordinates (4,); None where it fails."""
     found = place.change(x)
     for _ in range(_ROUNDS):
         if found is None:
@@ -177,8 +201,7 @@ def fixed_place(turns: TurnMap, state: Samples, *, heavy: bool) -> FixedPlace | 
         step = np.zeros(4)
         step[free] = np.linalg.lstsq(np.eye(free.size) - derivative, change[free], rcond=None)[0]
         if size < _STILL or _size(step[free]) < _SMALLEST:
-            multipliers = _multipliers(place, x, turn, free, derivative)
-            return FixedPlace(turn, place.state(x), multipliers[np.argsort(-np.abs(multipliers))])
+            return _Found(x, turn, derivative)
         share = min(1.0, float(np.min(_LONGEST / np.maximum(np.abs(step), 1e-300))))
         for tried in (share, 0.25 * share):
             x_new, found = place.relaxed(x + tried * step)
@@ -213,10 +236,10 @@ def _derivative(place: _Place, x: Samples, turn: Turn, free: np.ndarray, *, sign
     return np.stack(columns, axis=1)
 
 
-def _multipliers(place: _Place, x: Samples, turn: Turn, free: np.ndarray, ahead: Samples) -> np.ndarray:
-    """Eigenvalues of the derivative: one close to 1 needs differences to both sides, `ahead` being those to one."""
-    behind = _derivative(place, x, turn, free, sign=-1.0)
-    return np.linalg.eigvals(ahead if behind is None else 0.5 * (ahead + behind))
+def _multipliers(place: _Place, found: _Found, free: np.ndarray) -> np.ndarray:
+    """Eigenvalues of the derivative: one close to 1 needs differences to both sides."""
+    behind = _derivative(place, found.x, found.turn, free, sign=-1.0)
+    return np.linalg.eigvals(found.derivative if behind is None else 0.5 * (found.derivative + behind))
 
 
 class _Place:
