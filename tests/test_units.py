@@ -50,6 +50,15 @@ def test_a_bare_reciprocal_second_is_no_rate(unit: str) -> None:
         parse_quantity(f"3 {unit}", KINDS["rate"])
 
 
+@pytest.mark.parametrize("unit", ["cSt", "mm^2/s", "St", "m**2/s"])
+def test_kinematic_viscosity_is_no_viscosity(unit: str) -> None:
+    """The labels of silicone oils give it."""
+    with pytest.raises(InputError, match=r"is a unit of kinematic viscosity; allowed: .*970 kg/m\^3 are 0\.97 Pa s"):
+        parse_quantity(f"1000 {unit}", KINDS["viscosity"])
+    with pytest.raises(InputError, match="is not a unit of length"):
+        parse_quantity(f"1000 {unit}", KINDS["length"])
+
+
 @pytest.mark.parametrize(
     ("kind", "text", "si"),
     [

@@ -212,6 +212,11 @@ def _factor_by_pint(unit: str, kind: Kind) -> float:
             return float(one.to(accepted).magnitude)
     if kind.unit == "rad/s" and one.is_compatible_with("1/s"):
         raise InputError(f'"{unit}" does not say what turns; allowed: rad/s, Hz, rpm, turn/s')
+    if kind.name == "viscosity" and one.is_compatible_with("m**2/s"):  # on the labels of silicone oils
+        raise InputError(
+            f'"{unit}" is a unit of kinematic viscosity; allowed: the dynamic one, which is that times the density: '
+            "1000 cSt of an oil of 970 kg/m^3 are 0.97 Pa s"
+        )
     raise InputError(f'"{unit}" is not a unit of {kind.name}; {hint}')
 
 
