@@ -324,7 +324,8 @@ def read_posterior(path: str | Path, *models: str) -> PosteriorFile:
         raise InputError(f"{path} is no posterior, or damaged (its checksum is another); allowed: {_WHAT}")
     if not content.converged:
         raise InputError(
-            f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0"
+            f"{path} has not converged, so that its intervals mean nothing; allowed: {_WHAT}, with exit code 0; "
+            "`spirillum calibrate` with more --doublings samples for longer"
         )
     if models and found.model not in models:
         asked = ", ".join(f"'{name}'" for name in models)
