@@ -102,7 +102,7 @@ def test_what_a_motion_does_not_read_is_refused(run: Callable[..., Any], argumen
     [
         (["--until", "1mm"], "until = 1 mm; allowed: less than 0.5 mm"),
         (["-o", "settling.nc"], "does not end in .png or .pdf or .svg"),
-        (["--set", "channel=none"], "there is no [channel]; allowed: a channel.diameter of at most"),
+        (["--set", "channel=none"], "there is no [channel]; allowed: a robot with a channel.diameter, because"),
         (["--gap", "15mm"], "placement.gap = 15 mm"),
         (["--friction", "ice"], "friction"),
     ],

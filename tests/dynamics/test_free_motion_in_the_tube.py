@@ -74,11 +74,11 @@ def test_run_that_goes_on_nears_the_steady_place_as_its_multiplier_says() -> Non
     state[1:3] = cos * state[1] - sin * state[2], sin * state[1] + cos * state[2]
     state[3:7] = _turned_about_x(state[3:7], 0.002)
     away, time = [], 0.0
-    for _ in range(70):
+    for _ in range(100):
         turn = turns.after(state)
         state, time = turn.state, time + turn.time
         away.append((time, float(observed_at(motion.robot, state)[kernel.AZIMUTH]) - rest))
-    late = np.array(away[45:])
+    late = np.array(away[75:])
     slope = np.polyfit(late[:, 0], np.log(np.abs(late[:, 1])), 1)[0]
     assert -1.0 / slope == pytest.approx(lying.approach_time, rel=0.02)
 

@@ -60,18 +60,25 @@ def test_shipped_table_is_near_the_direct_solution(table):
 
 
 def test_table_gives_back_the_films_that_it_was_made_of(monkeypatch):
-    """In single precision; but where a pitch was too steep to be solved for."""
-    made_of = []
+    """In single precision; but where a pitch was too steep to be solved for, or the body would have touched."""
+    made_of, moved = [], []
 
     def kept(body, radius, e, p, psi):
         made_of.append((e, p, psi, resistance_of(body, radius, e, p, psi)))
         return made_of[-1][-1]
 
-    resistance_of = film_module.resistance_of
+    def off_the_wall(body, radius, *place):
+        found = cleared(body, radius, *place)
+        if found != place:
+            moved.append(found)
+        return found
+
+    resistance_of, cleared = film_module.resistance_of, film_module._off_the_wall
     monkeypatch.setattr(film_module, "resistance_of", kept)
+    monkeypatch.setattr(film_module, "_off_the_wall", off_the_wall)
     table = FilmTable.of(CAPSULE, TUBE, intervals=2)
-    solved = [(place, film) for *place, film in made_of if abs(place[1]) < 0.45]
-    assert len(solved) > 0.7 * len(made_of)
+    solved = [(place, film) for *place, film in made_of if abs(place[1]) < 0.3 and tuple(place) not in moved]
+    assert len(solved) > 0.6 * len(made_of)
     for place, film in solved:
         roots = np.sqrt(np.diag(film))
         assert np.abs((table.at(*place)[0] - film) / np.outer(roots, roots)).max() < 1e-5

@@ -46,15 +46,12 @@ def plant_of(robot: Robot, arguments: Mapping[str, Any], drawn: Drawn, progress:
 
 
 def _with_friction(robot: Robot, factor: float) -> Robot:
-    """A robot whose friction is multiplied by a factor."""
+    """A robot whose friction, if it has any, is multiplied by a factor."""
     effective = robot.friction.effective
     if effective is None and robot.motor is not None:
         effective = robot.motor.joint_rotor_friction
     if not effective:
-        raise InputError(
-            f"unknown.friction_factor is given, but {robot.name} has no friction; allowed: a factor of 1, or a "
-            "friction.effective"
-        )
+        return robot
     return robot.model_copy(update={"friction": robot.friction.model_copy(update={"effective": factor * effective})})
 
 

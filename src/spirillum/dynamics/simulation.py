@@ -35,6 +35,7 @@ from spirillum.robot.load import load
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.swimming.cautions import speed_limit
 from spirillum.swimming.freedom import check_full, motion_of
 from spirillum.swimming.model_choice import AUTO, check_calibrated, posterior_alone
 from spirillum.swimming.prediction import Prediction, predict
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["simulate"]
+
+_SINKS = 0.2
+"""Way up or down over that along, from which a run is said to sink or rise."""
 
 
 def simulate(  # noqa: PLR0913 - the options of the command
@@ -234,7 +238,26 @@ def _free_run(
         more["wall_gap"] = run.observed[:, rigid_links.FILM] + links.wall[kernel.ROUGHNESS]
     attrs = free_attributes(steady, run, reach, title, INTEGRATOR, said)
     dataset = dataset_of(steady, links, run, on, more, attrs)
+    dataset.attrs["warnings"] = "\n".join([*_of_the_way(dataset, steady), *said])
     return dataset.isel(time=np.isin(run.time, time) | (run.time == run.time[-1]))
+
+
+def _of_the_way(dataset: xr.Dataset, steady: Prediction) -> list[str]:
+    """What the path shows that a held robot's speed does not: that it sinks or rises, and how fast it moves."""
+    velocity = dataset["velocity"].values
+    late = dataset.isel(time=slice(dataset.sizes["time"] // 3, None))
+    way = late["position"].values[-1] - late["position"].values[0]
+    upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
+    found = []
+    if abs(way[2]) > _SINKS * np.hypot(way[0], way[1]):
+        pitch = float(np.degrees(late["pitch"].values[-1]))
+        moves = "sinks" if upwards < 0 else "rises"
+        found.append(
+            f"it {moves} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the run, at last pitched by "
+            f"{pitch:.3g} deg: velocities are those along x"
+        )
+    limits = [speed_limit(steady.batch, float(np.linalg.norm(velocity, axis=-1).max()))]
+    return found + [limit.sentence() for limit in broken(limits)]
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:

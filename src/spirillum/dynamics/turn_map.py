@@ -44,7 +44,7 @@ _LONGEST = np.array([0.3, 1.0, 0.05, 0.1])
 """Longest steps of Newton's method."""
 _ROUNDS, _RELAXING = 10, 8
 _STILL, _SMALLEST = 1e-8, 2e-4
-"""Size of a turn's change below which nothing changes at all; of a step of Newton's method that need not be taken."""
+"""Size of a turn's change below which nothing changes at all; of a step of Newton's method that is the last."""
 
 
 class Turn(NamedTuple):
@@ -200,8 +200,11 @@ def _newton(place: _Place, x: Samples, free: np.ndarray) -> _Found | None:
             return None
         step = np.zeros(4)
         step[free] = np.linalg.lstsq(np.eye(free.size) - derivative, change[free], rcond=None)[0]
-        if size < _STILL or _size(step[free]) < _SMALLEST:
+        if size < _STILL:  # where many places are brought back, a step would go to another of them
             return _Found(x, turn, derivative)
+        if _size(step[free]) < _SMALLEST:
+            last = place.change(x + step)
+            return _Found(x, turn, derivative) if last is None else _Found(x + step, last[0], derivative)
         share = min(1.0, float(np.min(_LONGEST / np.maximum(np.abs(step), 1e-300))))
         for tried in (share, 0.25 * share):
             x_new, found = place.relaxed(x + tried * step)

@@ -11,7 +11,7 @@ import numpy as np
 from spirillum.arrays import Flags, PerRobot
 from spirillum.robot.batch import RobotBatch
 from spirillum.robot.geometry import coil_curvature, coil_spacing, shortest_body
-from spirillum.units import show, show_apart
+from spirillum.units import show_apart
 
 __all__ = ["Limit", "all_hold", "assembly_limits", "broken", "within"]
 
@@ -71,7 +71,7 @@ class Limit:
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))
         lack, colon, name = self.field.partition(": ")
         if colon and np.isinf(value):  # there is none
-            return f"{lack}; allowed: a {name} of {self.relation} {show(bound, self.unit)}, because {self.why}"
+            return f"{lack}; allowed: a robot with a {name}, because {self.why}"
         said, allowed = show_apart(float(value), float(bound), self.unit)
         return f"{self.field} = {said}; allowed: {self.relation} {allowed}, because {self.why}"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from spirillum.arrays import Samples
 from spirillum.fluid.model import SwimmerModel
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.fluid.tube.announced import TABLE_TAKES
@@ -26,15 +27,7 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
     return [
         *model.cautions(batch),
         flow_limit(batch, abs(batch.placement.flow or 0.0)),
-        Limit.of(
-            "Reynolds number (body diameter)",
-            result.reynolds_number,
-            "at most",
-            _LARGEST_REYNOLDS,
-            "1",
-            _INERTIA,
-            "reynolds-number",
-        ),
+        _reynolds_limit("body diameter", result.reynolds_number),
         Limit.of(
             "Reynolds number (tail amplitude)",
             result.tail_reynolds_number,
@@ -45,6 +38,16 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
             "tail-reynolds-number",
         ),
     ]
+
+
+def _reynolds_limit(what: str, value: Samples) -> Limit:
+    return Limit.of(f"Reynolds number ({what})", value, "at most", _LARGEST_REYNOLDS, "1", _INERTIA, "reynolds-number")
+
+
+def speed_limit(batch: RobotBatch, speed: float) -> Limit:
+    """What has to hold of the largest speed of a run, m/s, in any direction, for the answer to be accurate."""
+    value = batch.density * speed * batch.body_diameter / batch.viscosity
+    return _reynolds_limit(f"body diameter, at the largest speed of the run, {1e3 * speed:.4g} mm/s", value)
 
 
 def flow_limit(batch: RobotBatch, flow: float) -> Limit:

@@ -38,7 +38,7 @@ from spirillum.swimming.lying import Lying
 from spirillum.swimming.model_choice import AUTO, ModelChoice, choose_model, posterior_alone
 from spirillum.swimming.other_models import OtherModels, other_models
 from spirillum.swimming.steady import calibrated_balance, friction_reading, speed_difference
-from spirillum.units import KINDS, parse_option
+from spirillum.units import KINDS, parse_option, show
 
 __all__ = ["Prediction", "free_in_tube", "interval_statement", "predict", "with_middles"]
 
@@ -450,6 +450,15 @@ def _check_band(model: str) -> None:
 
 def _free_warnings(robot: Robot, motion: str) -> list[str]:
     """What a free motion leaves out."""
-    if motion == "held" or robot.channel is None:
+    if motion == "held":
         return []
-    return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]
+    if robot.channel is not None:
+        return ["motion 'free': the robot swims without weight and without walls, which the channel's floor would bear"]
+    weight = robot.derived().get("submerged_weight")
+    if weight is None or not weight.value:
+        return []
+    moves = "sinks" if weight.value > 0 else "rises"
+    return [
+        f"motion 'free': the robot swims without its submerged weight of {show(weight.value, 'N')}, with which it "
+        f"{moves}: `spirillum simulate` lets that act"
+    ]

@@ -43,14 +43,20 @@ __all__ = ["FilmTable", "film_resistance"]
 
 _EXTRA = 3
 """Gauss points of an element beyond its polynomials' degree."""
+_ROUNDING = 1e-13
+"""What is added to the stiffness's diagonal, over it: where mobilities differ by 1e15 in one element, rounding leaves
+it without a Cholesky factor."""
 _SHEARED = 0.2
 """Thickness, over the body's radius, above which what shears in the tube is no film: its shear is left out there."""
 _THINNEST, _INTERVALS, _YAWS = 2e-5, 15, 5
 """Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
 _LEAST_YAW = 0.03
 """Coordinate of the smallest yaw at the nodes of a table."""
-_STEEPEST = 0.5
-"""Largest sine of pitch at the nodes of a table."""
+_STEEPEST = 0.35
+"""Largest sine of pitch at the nodes of a table, half as much again as that of its robots: clearances of steeper bodies
+that yaw, too, may be those of one that touches."""
+_LESS = 0.97
+"""Ratio of one inclination to the one before where the body touches."""
 _SHORTEST = 0.3
 """Shortest straight side over the body's radius for which a table's coordinates serve."""
 _SPHEROID_PITCH = 0.6
@@ -111,8 +117,8 @@ def _halves(degree: int) -> _Basis:
 class _Resolution(NamedTuple):
     """Degree of polynomials along and around the body; elements of equal length in the stretched coordinates."""
 
-    along: int = 8
-    around: int = 13
+    along: int = 10
+    around: int = 16
     rounded: int = 2
     side: int = 4
 
@@ -155,6 +161,7 @@ def resistance_of(body: FilmBody, radius: float, e: float, p: float, psi: float,
     inner = (rows - 2) * columns  # unknowns that no other element has
     size = rows * columns
     stiffness, loads = stiffness.reshape(elements, size, size), loads.reshape(elements, size, 6)
+    stiffness[:, np.arange(size), np.arange(size)] *= 1.0 + _ROUNDING
     # What the ends of the elements are left with when their insides are eliminated; 0 at both edges.
     ends = np.zeros((elements + 1, columns, elements + 1, columns))
     push = np.zeros((elements + 1, columns, 6))
@@ -261,7 +268,7 @@ class FilmTable:
         for i, first in enumerate(grids[0]):
             for j, second in enumerate(grids[1]):
                 for k, eta in enumerate(etas):
-                    e, p, psi = _place_of(head, first, second, eta)
+                    e, p, psi = _off_the_wall(body, radius, *_place_of(head, first, second, eta))
                     found = np.empty(5)
                     table.film_coordinates(head, e, p, psi, found)
                     nodes[i, j, k] = _factors(resistance_of(body, radius, e, p, psi), body.radius, found[4])
@@ -352,6 +359,17 @@ def _place_of(head: Samples, first: float, second: float, eta: float) -> tuple[f
         change = np.linalg.solve(np.column_stack([by_e, by_lift]), error)
         e, lift = e - change[0], float(np.clip(lift - change[1], -0.9, 0.9))
     return float(e), float(np.arcsin(lift)), float(np.arcsin(sine))
+
+
+def _off_the_wall(body: FilmBody, radius: float, e: float, p: float, psi: float) -> tuple[float, float, float]:
+    """A place of a table, less inclined where the body would touch: some clearances at largest angles are no body's.
+
+    Robots do not come there: only the splines know these nodes.
+    """
+    least = _THINNEST * body.radius
+    while not body.half and Place(body, radius, e, frame(p, psi)).ends().min() < 0.5 * least:
+        e, p, psi = min(e, radius - body.radius - least), _LESS * p, _LESS * psi
+    return e, p, psi
 
 
 def _clearances(head: Samples, e: float, lift: float, sine: float) -> Samples:

@@ -24,6 +24,11 @@ PATCH = 1.2
 """Half-width of a spheroid's film, rad of the unit sphere that the spheroid is stretched from."""
 _LEAST = 1e-12
 """Thinnest film over the tube's radius."""
+_FADE = 0.3
+"""Depth of the body's axis below the tube's, over the room, at which no side is nearer to the wall any more."""
+_TURNED = (0.62, 0.14)
+"""Angle up to which coordinates follow the side that is nearest, and how much further they turn at most, rad: from a
+quarter of a half turn on they would fold."""
 TOUCHES = "the body touches the wall of the tube"
 _HALF = 0.5 * np.pi
 _AXIS = np.array([1.0, 0.0, 0.0])
@@ -166,23 +171,51 @@ class Place:
         along = np.where(outward > 0.0, room / (outward + root), root - outward)
         return np.asarray(np.sqrt(np.maximum((self.tube - distance) * along, 0.0)))
 
-    def bottom(self, x: Samples) -> tuple[Samples, Samples]:
-        """Angle at which the straight side faces the wall at x, rad, and its derivative by x.
+    def bottom(self, x: Samples, ring: float) -> tuple[Samples, Samples]:
+        """Angle at which a ring about the body's axis is nearest to the wall, rad, and its derivative by the ring's x.
 
-        It is 0 near the tube's axis, where no side does.
+        Thin films are narrow: an angle that is a hundredth off misses one of a ten-thousandth of the radius. It fades
+        to 0 towards the tube's axis, where no side is nearer, and is bounded: thin films are not that far around.
         """
-        side, height = x * self.axes[1, 0], self.offset - x * self.axes[2, 0]
-        size = side**2 + height**2 + (0.1 * self.body.radius) ** 2
-        angle = side * height / size
-        d_size = 2.0 * (side * self.axes[1, 0] - height * self.axes[2, 0])
-        slope = (self.axes[1, 0] * height - side * self.axes[2, 0] - angle * d_size) / size
-        return angle, slope
+        along, lift, deepest = self.axes[1, 0], self.axes[2, 0], _FADE * (self.tube - self.body.radius)
+        across, depth = x * along, np.maximum(self.offset - x * lift, _LEAST * self.tube)
+        away = np.hypot(across, depth)
+        # of a circle across the tube; derivatives by x behind
+        sin, cos, turn = across / away, depth / away, (along * depth + lift * across) / away**2
+        sin_x, cos_x = cos * turn, -sin * turn
+        # one step of Newton's method for the ellipse that an inclined ring is across the tube
+        to_side, up_to_side, to_depth = self.axes[1, 1], -self.axes[1, 2], self.axes[2, 2]
+        side, deep = across + ring * (to_side * sin + up_to_side * cos), depth + ring * to_depth * cos
+        side_x, deep_x = along + ring * (to_side * sin_x + up_to_side * cos_x), -lift + ring * to_depth * cos_x
+        turned, turned_x = to_side * cos - up_to_side * sin, to_side * cos_x - up_to_side * sin_x
+        error = side * turned - deep * to_depth * sin
+        error_x = side_x * turned + side * turned_x - to_depth * (deep_x * sin + deep * sin_x)
+        away_x = sin * along - cos * lift
+        angle = np.arctan2(across, depth) + error / away
+        slope = turn + (error_x - error * away_x / away) / away
+        share = np.where(self.offset > x * lift, depth / deepest, 0.0)
+        left = np.exp(-(share**2))
+        angle, slope = angle * (1.0 - left), slope * (1.0 - left) - angle * left * 2.0 * share * lift / deepest
+        beyond = np.tanh(np.maximum(np.abs(angle) - _TURNED[0], 0.0) / _TURNED[1])
+        return np.clip(angle, -_TURNED[0], _TURNED[0]) + np.sign(angle) * _TURNED[1] * beyond, slope * (1.0 - beyond**2)
 
-    def gap(self, x: float) -> float:
-        """H of the straight side at x."""
-        angle = float(self.bottom(np.array([x]))[0][0])
+    def ends(self) -> Samples:
+        """Gaps under the ends of the straight side, each a ring with a ball on it, or an edge; negative: it touches."""
+        found = []
+        for x, rounded in (self.body.rear, self.body.front):
+            ring = self.body.radius - rounded
+            angle = float(self.bottom(np.array([x]), ring)[0][0])
+            point = np.array([x, ring * np.sin(angle), -ring * np.cos(angle)])
+            found.append(min(float(self.clearance(point)) - rounded, self.gap(x)[0]))
+        return np.array(found)
+
+    def gap(self, x: float) -> tuple[float, float]:
+        """H of the straight side at x, and its derivative by x."""
+        angle = float(self.bottom(np.array([x]), self.body.radius)[0][0])
         point = np.array([x, self.body.radius * np.sin(angle), -self.body.radius * np.cos(angle)])
-        return float(self.clearance(point))
+        side, height = point @ self.axes[1], point @ self.axes[2] - self.offset
+        slope = -(side * self.axes[1, 0] + height * self.axes[2, 0]) / np.hypot(side, height)
+        return float(self.clearance(point)), float(slope)
 
 
 def film_surface(place: Place, cuts: Cuts) -> Surface:
@@ -199,32 +232,29 @@ def film_surface(place: Place, cuts: Cuts) -> Surface:
 def _with_side(place: Place, cuts: Cuts) -> Surface:
     """The film of a body with a straight side, from the rear to the front."""
     body = place.body
-    a, lift = body.radius, place.axes[2, 0]
+    a = body.radius
     reduced = a * place.tube / (place.tube - a)
     shoulders = (body.rear, body.front)
-    gaps = [place.gap(x) for x, _ in shoulders]
+    gaps, slopes = zip(*(place.gap(x) for x, _ in shoulders), strict=True)
     # of the rounded ends too, which may be turned to the wall
-    nearest = [
-        gap - f * (1.0 - np.sqrt(1.0 - min(outward * lift, 0.0) ** 2))
-        for (_, f), gap, outward in zip(shoulders, gaps, (-1.0, 1.0), strict=True)
-    ]
-    if not min(*gaps, *nearest) > _LEAST * place.tube:
+    nearest = place.ends()
+    if not nearest.min() > _LEAST * place.tube:
         raise InputError(TOUCHES)
     thinnest = 1.0 / np.hypot(1.0 / nearest[0], 1.0 / nearest[1])
     width = float(np.sqrt(2.0 * thinnest * reduced) / a)
     around = _gathered(cuts.around, -_HALF, _HALF, 0.0, width)
     rear, front = (
-        (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(lift) / gap)))
-        for (x, _), gap in zip(shoulders, gaps, strict=True)
+        (x, float(1.0 / (1.0 / np.sqrt(2.0 * gap * reduced) + abs(slope) / gap)))
+        for (x, _), gap, slope in zip(shoulders, gaps, slopes, strict=True)
     )
     x = _gathered_twice(cuts.side, (rear, front))
     zero, one = np.zeros_like(cuts.side), np.ones_like(cuts.side)
     parts = [_revolved(place, around, x.slope / cuts.sides, (x.at, a * one), (one, zero), (zero, one), (zero, zero))]
-    for (joint, f), gap, outward in zip(shoulders, nearest, (-1.0, 1.0), strict=True):
+    for (joint, f), gap, slope, outward in zip(shoulders, nearest, slopes, (-1.0, 1.0), strict=True):
         if f == 0:
             continue
         low, high = (0.0, ROUNDED) if outward > 0 else (-ROUNDED, 0.0)
-        angle = _gathered(cuts.rounded, low, high, -float(np.arcsin(lift)), float(np.sqrt(2.0 * gap / f)))
+        angle = _gathered(cuts.rounded, low, high, -float(np.arcsin(slope)), float(np.sqrt(2.0 * gap / f)))
         sin, cos = np.sin(angle.at), np.cos(angle.at)
         outline = (joint + f * sin, a - f + f * cos)
         end = _revolved(place, around, angle.slope / cuts.rounds, outline, (f * cos, -f * sin), (sin, cos), (cos, -sin))
@@ -242,7 +272,7 @@ def _revolved(
     turning: tuple[Samples, Samples],
 ) -> Surface:
     """Surface of revolution of an outline (x, rho): tangent by s, unit normal, its derivative by s; `rate` is ds/du."""
-    turn, turn_rate = place.bottom(outline[0])
+    turn, turn_rate = place.bottom(outline[0], place.body.radius)
     fade = 1.0 - (around.at / _HALF) ** 2  # the edges stay where they are
     theta = around.at + turn[:, None] * fade
     by_v = around.slope * (1.0 - turn[:, None] * 2.0 * around.at / _HALF**2)

@@ -21,6 +21,8 @@ __all__ = ["packed_from", "to_bytes"]
 _REST = 3e-6
 _FILM = np.where(np.arange(film_table.ENTRIES) < len(film_table.ORDER), 2e-5, 1e-6)
 """What numbers are multiples of."""
+_MOST_STEPS = 2.0**31 - 1.0
+"""Coefficients of a film beyond it belong to angles at which no robot fits into its tube."""
 _FILTER = {"id": lzma.FILTER_LZMA2, "preset": 6, "pb": 0, "lc": 4}
 """Single bytes, whose place in a word says nothing: those of a plane follow each other."""
 _LARGEST, _MOST_MEMORY = 2**23, 2**26  # bytes: not compressed, and to get there
@@ -102,7 +104,7 @@ class _Reader:
 
 def _coded(values: Samples) -> bytes:
     """Values, rounded, as changes along their first two axes: small ones, whose upper bytes are alike."""
-    whole = np.rint(values).astype(np.int32)
+    whole = np.rint(np.clip(values, -_MOST_STEPS, _MOST_STEPS)).astype(np.int32)
     for axis in (0, 1):
         whole = np.diff(whole, axis=axis, prepend=np.int32(0))
     ordered = np.ascontiguousarray(np.moveaxis(whole, -1, 0)).astype("<i4")
