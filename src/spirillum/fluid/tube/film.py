@@ -52,9 +52,8 @@ _THINNEST, _INTERVALS, _YAWS = 2e-5, 15, 5
 """Thinnest clearance of a table over the body's radius, intervals of its splines, polynomials in yaw."""
 _LEAST_YAW = 0.03
 """Coordinate of the smallest yaw at the nodes of a table."""
-_STEEPEST = 0.35
-"""Largest sine of pitch at the nodes of a table, half as much again as that of its robots: clearances of steeper bodies
-that yaw, too, may be those of one that touches."""
+_STEEPEST = 0.5
+"""Largest sine of pitch at the nodes of a table."""
 _LESS = 0.97
 """Ratio of one inclination to the one before where the body touches."""
 _SHORTEST = 0.3
