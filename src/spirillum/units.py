@@ -150,6 +150,7 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "length": Kind("length", "m", "18 mm", "1 nm", "100 m"),
     "length or zero": Kind("length", "m", "10 mm", "0 m", "100 m"),
+    "length of either sign": Kind("length", "m", "10 mm", "-100 m", "100 m"),
     "mass": Kind("mass", "kg", "10.7 g", "1e-21 kg", "1e6 kg"),
     "density": Kind("density", "kg/m**3", "985 kg/m^3", "1e-3 kg/m^3", "1e5 kg/m^3"),
     "viscosity": Kind("viscosity", "Pa s", "3.5 Pa s", "1e-6 Pa s", "1e6 Pa s"),

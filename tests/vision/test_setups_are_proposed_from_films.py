@@ -8,6 +8,7 @@ import pytest
 import spirillum as sp
 from spirillum.errors import InputError
 from spirillum.measurement.setup_template import setup_answer
+from spirillum.units import KINDS, parse_option
 from spirillum.vision.setup import load_setup
 from spirillum.vision.track import scouting
 
@@ -71,6 +72,16 @@ def test_a_filled_in_proposal_is_a_setup_that_fits_the_film(film, proposed, tmp_
 def test_a_wrong_spacing_is_named(film):
     warnings = sp.propose_setup(film, spacing="3 mm").warnings
     assert any("spacing = 3 mm does not fit: by the robot's size the lines are 1.8" in one for one in warnings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("spacing", ["1 nm", "0.05 mm", "20 m"])
+def test_a_spacing_of_another_order_is_named(film, spacing):
+    """By it the robot would be a dot, or kilometres away."""
+    assert any(
+        f"spacing = {1e3 * parse_option('', spacing, KINDS['length']):.4g} mm" in one
+        for one in sp.propose_setup(film, spacing=spacing).warnings
+    )
 
 
 @pytest.mark.slow

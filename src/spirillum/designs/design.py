@@ -27,7 +27,9 @@ from spirillum.fitted.warnings import fitted_of
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.limits import all_hold, broken
 from spirillum.robot.load import load
+from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.robot.seat import gap_of
 from spirillum.robot.text import with_numbers
 from spirillum.swimming.answer import LEVEL, STEADY, Swimming
 from spirillum.swimming.cautions import calibration_warnings
@@ -343,9 +345,10 @@ def _warnings(
     found = list(given.warnings)
     known, built = unknowns.robot, _built(unknowns.robot, stated.space, best)
     if given.channel is not None and stated.model.name == "tube":
+        gap = gap_of(Placement(), given.body.diameter, 0.5 * given.channel.diameter)
         found.append(
-            "all designs lie at the reference place (a gap of 0.5 mm for the paper's body, level): `spirillum predict` "
-            "gives the band over gap and pitch"
+            f"all designs lie at the reference place (a gap of {1e3 * gap:.4g} mm, level): `spirillum predict` gives "
+            "the band over gap and pitch"
         )
     elif given.channel is not None:
         name = stated.model.name

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Any
 
 from spirillum.errors import InputError
@@ -43,11 +42,22 @@ class Datagrams:
         except (OSError, UnicodeError) as error:  # the latter for a name that can be none
             raise InputError(f"udp = {address[:60]!r}: the host is not known ({error}); allowed: {_WHAT}") from error
         self._socket, self._to = socket.socket(found[0], socket.SOCK_DGRAM), found[4]
+        self._address, self._lines, self._unsent, self._reason = address, 0, 0, ""
 
     def send(self, line: str) -> None:
         """Send a line."""
-        with suppress(OSError):
+        self._lines += 1
+        try:
             self._socket.sendto(line.encode(), self._to)
+        except OSError as error:
+            self._unsent, self._reason = self._unsent + 1, error.strerror or str(error)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence if the network took some of the lines not."""
+        if not self._unsent:
+            return ()
+        return (f"udp = {self._address}: {self._unsent} of {self._lines} lines could not be sent ({self._reason})",)
 
     def close(self) -> None:
         """No more lines."""

@@ -92,7 +92,8 @@ def track(
                 on_observation(observation, latency)
 
         log.run(report)
-    return log.answer()
+        sent = () if out is None else out.notes
+    return log.answer(sent)
 
 
 def observation_line(observation: Observation, latency: float | None) -> dict[str, Any]:
@@ -199,13 +200,13 @@ class _Log:
             return "; a shorter --learn needs less of it, and `spirillum measure` looks at a film as a whole"
         return "; a film this short is tracked with --pace fast, which waits for the learning"
 
-    def answer(self) -> Tracked:
-        """The answer."""
+    def answer(self, more: tuple[str, ...] = ()) -> Tracked:
+        """The answer, with further notes."""
         trial = None
         try:
             trial = self.tracker.summary()
         except InputError as error:
-            said = f"{error}{self._hint()}"
+            said = "; ".join([*self.source.notes, f"{error}{self._hint()}"])
             self.stopped = f"{self.stopped}; {said}" if self.stopped else said
         return Tracked(
             source=self.source.name,
@@ -216,7 +217,7 @@ class _Log:
             learnt=self.learnt,
             latencies=tuple(self.latencies),
             trial=trial,
-            notes=(*self.source.notes, *([self._clocks] if self._clocks else [])),
+            notes=(*self.source.notes, *more, *([self._clocks] if self._clocks else [])),
             stopped=self.stopped,
             interrupted=self.interrupted,
         )

@@ -204,6 +204,7 @@ def _findings(
             f"no robot like '{robot.name}' was found at any scale: give the right ROBOT, or a film in which all of it "
             "is in view and moves"
         )
+        words += "" if spacing is None else f", or check spacing = {1e3 * spacing:.4g} mm"
         yield Finding("robot", None, "", "not found", words)
         return
     sure = known.wire.readable > IDENTITY.sure_share

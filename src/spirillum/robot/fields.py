@@ -13,9 +13,7 @@ from pydantic import (
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
-    ValidatorFunctionWrapHandler,
     WithJsonSchema,
-    WrapValidator,
 )
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
@@ -184,15 +182,9 @@ def _all_metadata(info: FieldInfo) -> list[Any]:
     return [*info.metadata, *inside]
 
 
-def _read_signed(value: Any, read: ValidatorFunctionWrapHandler) -> float:
-    """A length of either sign; the sign is not a part of the quantity."""
-    negative = isinstance(value, str) and value.strip().startswith("-")
-    return -float(read(value.strip()[1:])) if negative else float(read(value))
-
-
 Length = Annotated[float, *_quantity("length")]
 LengthOrZero = Annotated[float, *_quantity("length or zero")]
-SignedLength = Annotated[LengthOrZero, WrapValidator(_read_signed)]
+SignedLength = Annotated[float, *_quantity("length of either sign")]
 Mass = Annotated[float, *_quantity("mass")]
 Density = Annotated[float, *_quantity("density")]
 Viscosity = Annotated[float, *_quantity("viscosity")]

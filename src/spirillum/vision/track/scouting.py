@@ -32,6 +32,9 @@ from spirillum.vision.video.pictures import reduction
 
 __all__ = ["Scouted", "Walls", "scouted"]
 
+_WRONG = 4.0
+"""Ratio beyond the usual lengths per pixel at which a stated spacing is wrong."""
+
 
 class Walls(NamedTuple):
     """Two edges along the channel on either side of the robot."""
@@ -180,12 +183,16 @@ def _setup(robot: Robot, size: tuple[int, int], pixel: float, direction: str) ->
 
 
 def _guesses(robot: Robot, size: tuple[int, int], lines: Lines | None, spacing: float | None) -> list[float]:
-    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m."""
-    guesses = []
-    if lines is not None:
-        guesses.append(SCOUTING.nearer * (SCOUTING.spacing if spacing is None else spacing) / lines.distance)
+    """Lengths per pixel to try: by the ruler, then by what share of the picture the robot may fill, m.
+
+    A spacing by which the robot would be a dot, or far larger than the picture, is wrong and is not tried.
+    """
     length = robot.body.length + robot.coupling.length + robot.tail.length
     wide = [length / (share * max(size)) for share in SCOUTING.shares]
+    guesses = []
+    if lines is not None:
+        by_ruler = SCOUTING.nearer * (SCOUTING.spacing if spacing is None else spacing) / lines.distance
+        guesses += [by_ruler] if min(wide) / _WRONG < by_ruler < _WRONG * max(wide) else []
     return guesses + [guess for guess in wide if all(abs(np.log(guess / other)) > np.log(1.5) for other in guesses)]
 
 
