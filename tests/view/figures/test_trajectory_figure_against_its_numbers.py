@@ -124,7 +124,7 @@ def test_magnetic_run_shows_wobble_and_lag_but_no_motor(run: Any) -> None:
     shown = panels(run.assign(friction_power=0.0 * run["friction_power"]))
     assert not {"motor current (A)", "motor current (mA)"} & set(shown)
     (power,) = (axes for label, axes in shown.items() if label.startswith("power"))
-    assert [line.get_label() for line in power.lines[:2]] == ["shaft power", "dissipated power"]
+    assert [line.get_label() for line in power.lines[:2]] == ["shaft", "dissipated"]
     assert shown["wobble angle (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.1) + 0 * TIME)
     assert shown["phase lag (deg)"].lines[0].get_ydata() == pytest.approx(np.degrees(0.5) + 0 * TIME)
 
