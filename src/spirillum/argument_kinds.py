@@ -49,6 +49,10 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping))
 
 
+def _is_named(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+
+
 _BASIC = {
     "str": _Kind("text", lambda value: isinstance(value, str)),
     "Path": _Kind("a path", lambda value: isinstance(value, os.PathLike)),
@@ -56,7 +60,7 @@ _BASIC = {
     "float": _Kind("a number", lambda value: isinstance(value, Real) and not _is_true_or_false(value)),
     "bool": _Kind("True or False", _is_true_or_false),
     "None": _Kind("None", lambda value: value is None),
-    "Mapping": _Kind("a mapping", lambda value: isinstance(value, Mapping)),
+    "Mapping": _Kind("a mapping of names", _is_named),
     "Callable": _Kind("a function", callable),
     "Samples": _Kind("an array", lambda value: hasattr(value, "ndim")),
     "PerRobot": _Kind("an array", lambda value: hasattr(value, "ndim")),

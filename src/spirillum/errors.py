@@ -43,5 +43,5 @@ def clipped(value: object, longest: int = 60) -> str:
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return `` (did you mean X?)`` for the nearest allowed name, or an empty string."""
-    near = get_close_matches(name.lower(), list(allowed), n=1, cutoff=0.5)
+    near = get_close_matches(str(name).lower(), list(allowed), n=1, cutoff=0.5)
     return f" (did you mean {near[0]}?)" if near else ""

@@ -91,6 +91,21 @@ def test_sphere_sinks_at_its_weight_over_its_drag() -> None:
     assert -float(run["velocity"][0, 2]) == pytest.approx(speed, rel=2e-3)
 
 
+def test_a_robot_that_sinks_is_said_to_and_its_speed_is_that_of_the_reynolds_number() -> None:
+    """Without a channel; forward it swims far more slowly than it sinks."""
+    run = sp.simulate(sp.load("biorob2012-wide", channel="none"), timing={"duration": "2 s"})
+    said = run.attrs["warnings"]
+    fastest = float(np.linalg.norm(run["velocity"].values, axis=-1).max())
+    number = 985 * fastest * 18e-3 / 3.5
+    assert number > 0.1
+    assert f"{1e3 * fastest:.4g} mm/s) = {number:.4g}; allowed: at most 0.1" in said
+    late = run.isel(time=slice(run.sizes["time"] // 3, None))
+    sinking = float(late["position"][0, 2] - late["position"][-1, 2]) / float(late["time"][-1] - late["time"][0])
+    assert f"it sinks at {1e3 * sinking:.4g} mm/s" in said
+    free = sp.predict(sp.load("biorob2012-wide", channel="none"), motion="free")
+    assert any("without its submerged weight" in line and "with which it sinks" in line for line in free.warnings)
+
+
 def test_films_against_reynolds_equation() -> None:
     """Force of the film's pressure, integrated over the gap of a sphere in a tube, at two thicknesses."""
     from scipy.integrate import dblquad
@@ -304,7 +319,7 @@ def test_wrong_types_get_a_sentence_too() -> None:
 
     wrong: list[tuple[dict[str, Any], str]] = [
         ({"timing": {"turn": 3.0}}, "timing.turn is not a known field (did you mean turns?)"),
-        ({"timing": 3.0}, "timing = 3.0; allowed: a Timing, a mapping or None"),
+        ({"timing": 3.0}, "timing = 3.0; allowed: a Timing, a mapping of names or None"),
         ({"timing": {"turns": "many"}}, "turns = many"),
         ({"timing": {"turns": 10**400}}, "turns = inf"),
         ({"timing": {"duration": 10**400}}, 'duration = "inf s" is not finite'),

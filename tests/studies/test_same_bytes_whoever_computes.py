@@ -210,6 +210,9 @@ def test_a_store_never_leads_out_of_its_folder(tmp_path: Path) -> None:
     with pytest.raises(sp.InputError, match="is a link"):
         write_pieces(tmp_path / "study.zarr", {"a/c/0": b"x"})
     assert list((tmp_path / "elsewhere").iterdir()) == []
+    (tmp_path / "study.zarr" / "b" / "c" / "0").mkdir(parents=True)
+    with pytest.raises(sp.InputError, match=r"b.c.0 is a folder; allowed: a file of the store"):
+        write_pieces(tmp_path / "study.zarr", {"b/c/0": b"x"})
 
 
 def test_what_cannot_be_stored_gets_a_sentence(tmp_path: Path) -> None:

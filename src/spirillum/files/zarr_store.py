@@ -184,9 +184,12 @@ def write_pieces(folder: Path, pieces: Mapping[str, bytes]) -> None:
         pieces: paths within it with what stands there, in the order in which they take their places.
 
     Raises:
-        InputError: where a folder in it is a link, or cannot be written to.
+        InputError: where a folder in it is a link or cannot be written to, or a file is a folder.
         OSError: if there is no space.
     """
+    for key in pieces:
+        if (folder / key).is_dir():
+            raise InputError(f"{folder / key} is a folder; allowed: a file of the store, or nothing: remove it")
     with private_folder(folder) as hidden:
         for number, content in enumerate(pieces.values()):
             with (hidden / str(number)).open("wb") as stream:

@@ -128,7 +128,7 @@ def choose_model(
     batch = RobotBatch.of(robot, placement or Placement())
     outside = broken(requirements(batch, find_swimmer_model(WALLED)))
     if outside and (placement is None or not placement.is_given):
-        why = f"model '{WALLED}' does not know this robot: {outside[0].sentence()}"
+        why = f"model '{WALLED}' has no answer for this robot on the floor of its channel: {outside[0].sentence()}"
     elif not outside and (tables_only or motion == "free") and not has_table(batch):
         lacks = f"all robots need a table for their tubes, and one ({robot.with_tail}) has none"
         lacks = lacks if among else "the robot has no table for its tube"
