@@ -158,6 +158,17 @@ def test_tables_agree_with_the_flow_solved_for(name: str, gap: float, pitch: flo
     assert np.all(response_errors(found, true, over_a_turn(table, seat)) < allowed)
 
 
+def test_a_yawed_place_agrees_with_the_flow_solved_for() -> None:
+    """To the right, where the nodes are those of the mirror image; far from the glass, where few modes do."""
+    table, places = shipped("biorob2012-narrow")
+    g = places.geometry
+    seat = Seat.at_gap(g.body, places.radius, 4e-3, np.radians(1.0), yaw=-np.radians(3.0))
+    true = matrix_of(solved(g, seat, Fineness("standard", 0.1), 4.0))
+    found, left = table.at(seat.offset, seat.pitch, seat.yaw, 4.0)
+    assert left == INSIDE
+    assert np.all(response_errors(found, true, over_a_turn(table, seat)) < 5e-3)
+
+
 def test_nose_down_nothing_is_said_beyond_the_last_node() -> None:
     """The glass does not end the pitch there, so that no slack is the tail's way to its contact."""
     table, places = shipped("biorob2012-wide")
