@@ -138,12 +138,14 @@ def test_slipping_robot_dissipates_what_the_field_gives() -> None:
 
 
 def test_sweep_finds_step_out_and_swims_like_the_held_robot_below() -> None:
-    sweep = sp.magnetic_sweep("magnetic-helix", ["0.5 Hz", "1.5 Hz", "2.1 Hz", "3 Hz"], turns=30.0)
+    sweep = sp.magnetic_sweep("magnetic-helix", ["0.5 Hz", "1.5 Hz", "1.7 Hz", "3 Hz"], turns=30.0)
     follows = np.isfinite(sweep["phase_lag"].values)
     assert sweep["settled"][:3].values.tolist() == [1.0, 1.0, 1.0]
     assert follows.tolist() == [True, True, True, False]
     np.testing.assert_allclose(sweep["tail_rotation_rate"][:3], sweep["field_rate"][:3], rtol=1e-4)
     np.testing.assert_allclose(sweep["forward_velocity"][:3], sweep["held_forward_velocity"][:3], rtol=0.02)
+    told = sp.predict("magnetic-helix").step_out_rate
+    assert float(sweep["step_out_rate"]) == pytest.approx(told, rel=1e-9)
     back = sp.magnetic_sweep("magnetic-helix", ["-0.5 Hz", "-1.5 Hz"], turns=30.0)
     np.testing.assert_allclose(back["forward_velocity"], -sweep["forward_velocity"][:2], rtol=0.02)
 

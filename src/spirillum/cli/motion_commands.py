@@ -309,8 +309,9 @@ def magnetic_sweep(
         typer.Option(metavar="RATE", help="Rate of the field, such as 2Hz; repeatable, increasing; else 40 of them."),
     ] = None,
     model: Annotated[
-        str, typer.Option(autocompletion=complete_models, help="Hydrodynamic model: rft or slender.")
-    ] = "rft",
+        str,
+        typer.Option(autocompletion=complete_models, help="Hydrodynamic model: slender, as `predict` takes, or rft."),
+    ] = "slender",
     turns: Annotated[float, typer.Option(help="Turns of the field at each rate; the second half is averaged.")] = 60.0,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it too: .png, .pdf or .svg.")] = None,
     accuracy: Accuracy = None,

@@ -78,7 +78,7 @@ def magnetic_sweep(
     robot: str | Path | Mapping[str, Any] | Robot,
     rates: Sequence[str | float] | Samples | None = None,
     *,
-    model: str = "rft",
+    model: str = "slender",
     turns: float = 30.0,
     resolution: Resolution | Mapping[str, Any] | None = None,
     progress: Callable[[str, int, int], None] | None = None,
@@ -89,7 +89,7 @@ def magnetic_sweep(
         robot: a preset's name, a robot file, its tables, or a loaded robot, with a `magnetic` drive.
         rates: rotation rates of the field in increasing size, each with its unit (``"2 Hz"``) or a float in rad/s;
             None: 40 rates up to one and a half times the step-out rate of the held robot.
-        model: `rft` or `slender`.
+        model: `slender`, as `spirillum.predict` takes for a robot without a channel, or `rft`.
         turns: turns of the field in a stretch; stretches follow each other until speed and wobble no longer change,
             at most 25, and the last is averaged, over whole slips where the robot slips.
         resolution: of the model `slender`: `accuracy`, `standard` or `high`; None: the robot's own.
