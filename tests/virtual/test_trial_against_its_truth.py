@@ -13,6 +13,7 @@ import spirillum as sp
 from spirillum.robot.load import load
 from spirillum.units import Hz
 from spirillum.virtual.degradation import Degradation
+from spirillum.virtual.framing import swimming_range
 from spirillum.virtual.motion import motion_of_run, steady_rates
 from spirillum.virtual.options import CameraOptions, MotionOptions, TrialOptions
 from spirillum.virtual.trajectory import lab_to_camera, run_trajectory, steady_trajectory
@@ -285,6 +286,19 @@ def test_robots_that_this_camera_cannot_show_are_refused(tmp_path: Path) -> None
     with pytest.raises(sp.InputError, match="a tube under the oil"):
         render(load(ROBOT, **{"channel.diameter": "60 mm"}), tmp_path / "a.mp4", **SMALL)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_robot_that_swims_out_of_the_picture_is_said_to(tmp_path: Path) -> None:
+    fast = {"forward_velocity": "600 mm/s", "tail_rate": "1.2 Hz", "body_rate": "-0.1 Hz"}
+    found = render(ROBOT, tmp_path / "a.mp4", **small(motion=fast, trial={"duration": "1 s"}))
+    (said,) = (line for line in found.warnings if "in the picture for" in line)
+    length = load(ROBOT).body.length + load(ROBOT).coupling.length + load(ROBOT).tail.length
+    low, high = swimming_range(load(ROBOT), CameraOptions.of({"size": SMALL["camera"]["size"]}))
+    # from the moment at which the nose comes in to that at which the tail is gone
+    wanted = (high - low + 2.0 * length) / 0.6
+    assert float(said.split("for ")[1].split(" of")[0]) == pytest.approx(wanted, rel=0.01)
+    still = render(ROBOT, tmp_path / "b.mp4", **small(trial={"duration": "0.1 s"}))
+    assert not any("in the picture for" in line for line in still.warnings)
 
 
 def test_an_interrupted_trial_leaves_nothing(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from spirillum.virtual.options import CameraOptions
 from spirillum.virtual.tank import Tank, tube_height
 from spirillum.virtual.trajectory import TrialTrajectory
 
-__all__ = ["check_size", "framed", "lens_of", "swimming_range"]
+__all__ = ["check_size", "framed", "lens_of", "out_of_picture", "swimming_range"]
 
 _SURFACE = 60e-3
 """Height of the oil's surface above the reference plane, m; assumed."""
@@ -25,6 +25,8 @@ _FOCAL = 740.0 / 640.0
 """Focal length over the width of the usual picture; assumed."""
 _SHORTEST, _LONGEST = 24, 2.0
 """Shortest robot in pixels, longest in widths of the picture."""
+_LOOKS = 1001
+"""Moments at which it is asked whether the robot is in the picture."""
 
 
 def lens_of(camera: CameraOptions, tilt: tuple[float, float]) -> Lens:
@@ -97,6 +99,19 @@ def framed(trajectory: TrialTrajectory, robot: Robot, lens: Lens, start: float |
         first = 1e3 * (float(x[0]) + shift)
         raise InputError(f"start = {first:.4g} mm: the robot is never in the picture; allowed: nearer to 0")
     return trajectory.shifted(shift)
+
+
+def out_of_picture(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> tuple[str, ...]:
+    """A sentence if the robot is beyond the left or the right edge of the picture for a part of the film."""
+    times = np.linspace(trajectory.time[0], trajectory.time[-1], _LOOKS)
+    x = np.interp(times, trajectory.time, trajectory.position[:, 0])
+    low, high = _visible(lens, float(trajectory.position[:, 2].mean()))
+    rear, nose = _extent(robot)
+    seen = float(np.mean((x + nose > low) & (x + rear < high)))
+    if seen == 1.0:
+        return ()
+    length = trajectory.duration
+    return (f"the robot is in the picture for {seen * length:.3g} of {length:.3g} s: it swims out of it",)
 
 
 def _check_beside_axis(trajectory: TrialTrajectory, robot: Robot, lens: Lens) -> None:

@@ -24,7 +24,7 @@ from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.disturbances import Disturbances, tilt_of
 from spirillum.virtual.film import FrameWriter, video_target, video_writer
 from spirillum.virtual.frames import Frames
-from spirillum.virtual.framing import check_size, framed, lens_of
+from spirillum.virtual.framing import check_size, framed, lens_of, out_of_picture
 from spirillum.virtual.lens import Lens
 from spirillum.virtual.motion import motion_of, motion_of_run
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
@@ -189,7 +189,7 @@ def render(
         size=camera.size,
         fps=camera.fps,
         seed=seed,
-        warnings=shown.warnings,
+        warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens)),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
     attributes = {"title": tags["title"], "synthetic": "yes", "robot": robot.name}
