@@ -295,9 +295,9 @@ def test_a_robot_that_swims_out_of_the_picture_is_said_to(tmp_path: Path) -> Non
     (said,) = (line for line in found.warnings if "in the picture for" in line)
     length = load(ROBOT).body.length + load(ROBOT).coupling.length + load(ROBOT).tail.length
     low, high = swimming_range(load(ROBOT), CameraOptions.of(camera))
-    # from the moment at which the nose comes in to that at which the tail is gone
+    # from the moment at which the nose comes in to that at which the tail is gone; lower in the tube more is in view
     wanted = (high - low + 2.0 * length) / 0.6
-    assert float(said.split("for ")[1].split(" of")[0]) == pytest.approx(wanted, rel=0.01)
+    assert float(said.split("for ")[1].split(" of")[0]) == pytest.approx(wanted, rel=0.04)
     still = render(ROBOT, tmp_path / "b.mp4", **small(trial={"duration": "0.1 s"}))
     assert not any("in the picture for" in line for line in still.warnings)
 
