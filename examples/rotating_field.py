@@ -7,7 +7,7 @@ import numpy as np
 
 import spirillum as sp
 
-held = sp.predict("magnetic-helix", model="rft")
+held = sp.predict("magnetic-helix")
 step_out = held.step_out_rate / (2 * np.pi)
 print(f"step-out at {step_out:.3f} Hz, lag {np.degrees(held.phase_lag):.1f} deg at 1 Hz")
 assert np.isclose(np.sin(held.phase_lag), 1.0 / step_out)
