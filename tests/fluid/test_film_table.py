@@ -24,7 +24,7 @@ MIRROR = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 @pytest.fixture(scope="module")
 def table():
-    """The film in the table that is shipped for the paper's robot: to make one takes some fifteen seconds."""
+    """The film in the table that is shipped for the paper's robot: to make one takes half a minute."""
     geometry = RobotGeometry.of(RobotBatch.of(sp.load("biorob2012-wide")))
     assert geometry.body == CAPSULE
     return FilmTable(parts_of(find_table(geometry, TUBE).packed).film)

@@ -245,7 +245,7 @@ class FilmTable:
         intervals: int = _INTERVALS,
         step: Callable[[float], None] | None = None,
     ) -> FilmTable:
-        """Tabulate the film of a body, in some fifteen seconds of one core.
+        """Tabulate the film of a body, in half a minute of one core.
 
         Args:
             outline: outline of the body.

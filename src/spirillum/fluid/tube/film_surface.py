@@ -27,8 +27,8 @@ _LEAST = 1e-12
 _FADE = 0.3
 """Depth of the body's axis below the tube's, over the room, at which no side is nearer to the wall any more."""
 _TURNED = (0.62, 0.14)
-"""Angle up to which coordinates follow the side that is nearest, and how much further they turn at most, rad: from a
-quarter of a half turn on they would fold."""
+"""Angle up to which coordinates follow the side that is nearest, and how much further they turn at most, rad: beyond
+pi/4 they would fold."""
 TOUCHES = "the body touches the wall of the tube"
 _HALF = 0.5 * np.pi
 _AXIS = np.array([1.0, 0.0, 0.0])
