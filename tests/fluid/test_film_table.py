@@ -31,7 +31,7 @@ def table():
 
 
 def offset_at(packed, gap, p, psi):
-    low, high = 0.0, TUBE
+    low, high = 0.0, packed[0]  # R
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if smallest_gap(packed, middle, p, psi) > gap else (low, middle)
@@ -106,11 +106,8 @@ def test_film_is_resolved_where_the_papers_robots_come_to_rest(tube, pitch, yaw)
     """As thin as asperities, at the largest yaw: the line that is nearest to the wall winds around the body."""
     head = _head(FilmBody.of(CAPSULE), tube, 0.2, 0.2, 15)
     for gap in (0.4e-6, 4e-6):
-        low, high = 0.0, tube
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if smallest_gap(head, middle, pitch, yaw) > gap else (low, middle)
-        coarse, fine = (film_resistance(CAPSULE, tube, low, pitch, yaw, fineness=f) for f in (1.0, 1.5))
+        e = offset_at(head, gap, pitch, yaw)
+        coarse, fine = (film_resistance(CAPSULE, tube, e, pitch, yaw, fineness=f) for f in (1.0, 1.5))
         roots = np.sqrt(np.diag(fine))
         assert np.abs((coarse - fine) / np.outer(roots, roots)).max() < 2e-3
 

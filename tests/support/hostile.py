@@ -394,7 +394,9 @@ _MAKERS: list[tuple[int, _Maker]] = [
 ]
 _LONGEST = 20.0
 _LARGEST = 1500 << 10
-"""Growth of the largest memory so far, kB: other tests of the process may have needed more."""
+"""Memory, kB."""
+_GROWTH = 256 << 10
+"""Growth of the largest memory so far that counts, kB: other tests of the process may have needed much."""
 _PRECIOUS = ("mine.txt", "out/mine.txt", "out/mine.png", "joined.txt")
 
 
@@ -483,7 +485,7 @@ def check(case: Case, folder: Path) -> None:
         ("printed on failure", code == 2 and out.getvalue() != ""),
         ("ignored errors", bool(unraisable)),
         ("too slow", seconds > _LONGEST),
-        ("too much memory", memory - largest > _LARGEST),
+        ("too much memory", memory > _LARGEST and memory - largest > _GROWTH),
         (
             "changed a user's file",
             any(after.get(name) != before[name] for name in before if not name.startswith(("out/", "out.zarr/"))),

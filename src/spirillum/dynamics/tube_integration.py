@@ -35,7 +35,7 @@ __all__ = [
 
 TOLERANCE = 1e-7
 """Error of a step over the sizes of the state's components: path and place of a minute in contact are then good to some
-parts in 1e7, energies to 1e-6; a hundredth of it takes five times as long."""
+parts in 1e7, energies to 1e-6; a tenth of it takes two and a half times as long."""
 INTEGRATOR = f"Rodas5P, tolerance {TOLERANCE:g}"
 _LITTLE_WORK = 1e-3  # of a robot that only sinks over that of a drive
 _STEPS = 64  # between two signs of life

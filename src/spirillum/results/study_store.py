@@ -107,6 +107,9 @@ class _Note(NamedTuple):
     unanswered: int
 
 
+_NOTE = TypeAdapter(_Note)
+
+
 class _Outcome(NamedTuple):
     """What is known once all regions are there."""
 
@@ -142,7 +145,7 @@ def _note_of(path: Path) -> _Note:
     what = "a note of a study"
     found = read_json(path, what)
     try:
-        return TypeAdapter(_Note).validate_python(found)
+        return _NOTE.validate_python(found)
     except ValidationError as error:
         raise InputError(f"{path} is damaged; allowed: {what}") from error
 

@@ -28,20 +28,12 @@ def accuracy_limits(batch: RobotBatch, model: SwimmerModel, result: Swimming) ->
         *model.cautions(batch),
         flow_limit(batch, abs(batch.placement.flow or 0.0)),
         _reynolds_limit("body diameter", result.reynolds_number),
-        Limit.of(
-            "Reynolds number (tail amplitude)",
-            result.tail_reynolds_number,
-            "at most",
-            _LARGEST_REYNOLDS,
-            "1",
-            _INERTIA,
-            "tail-reynolds-number",
-        ),
+        _reynolds_limit("tail amplitude", result.tail_reynolds_number, "tail-reynolds-number"),
     ]
 
 
-def _reynolds_limit(what: str, value: Samples) -> Limit:
-    return Limit.of(f"Reynolds number ({what})", value, "at most", _LARGEST_REYNOLDS, "1", _INERTIA, "reynolds-number")
+def _reynolds_limit(what: str, value: Samples, flag: str = "reynolds-number") -> Limit:
+    return Limit.of(f"Reynolds number ({what})", value, "at most", _LARGEST_REYNOLDS, "1", _INERTIA, flag)
 
 
 def speed_limit(batch: RobotBatch, speed: float) -> Limit:
@@ -52,15 +44,8 @@ def speed_limit(batch: RobotBatch, speed: float) -> Limit:
 
 def flow_limit(batch: RobotBatch, flow: float) -> Limit:
     """What has to hold of an imposed flow of `flow` m/s, at its fastest, for the answer to be accurate."""
-    return Limit.of(
-        "Reynolds number (imposed flow, body diameter)",
-        batch.density * flow * batch.body_diameter / batch.viscosity,
-        "at most",
-        _LARGEST_REYNOLDS,
-        "1",
-        _INERTIA,
-        "flow-reynolds-number",
-    )
+    value = batch.density * flow * batch.body_diameter / batch.viscosity
+    return _reynolds_limit("imposed flow, body diameter", value, "flow-reynolds-number")
 
 
 def calibration_warnings(robot: Robot, model: str) -> list[str]:
