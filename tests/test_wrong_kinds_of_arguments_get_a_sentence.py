@@ -15,6 +15,7 @@ from spirillum.argument_kinds import checked
 from spirillum.calibration.posterior import Sampling
 from spirillum.dynamics.timing import Timing
 from spirillum.dynamics.tube_options import InTube
+from spirillum.dynamics.turning_field import Field
 from spirillum.robot.arguments import Options
 from spirillum.robot.options import Resolution
 from spirillum.robot.placement import Placement
@@ -94,6 +95,29 @@ def test_no_number_is_too_long_for_a_sentence() -> None:
         plant.reset(3)  # type: ignore[arg-type]
     with pytest.raises(sp.InputError, match=r"foo is no argument of Plant\(\).*; allowed: robot"):
         sp.Plant("biorob2012-wide", foo=1)  # type: ignore[call-arg]
+
+
+def test_a_plant_refuses_odd_flows_and_fields() -> None:
+    plant = sp.Plant("biorob2012-wide", model="rft")
+    for wrong in (float("nan"), float("inf"), "1 mm/s", True, 10**400):
+        with pytest.raises(sp.InputError, match=r"velocity = .*; allowed: "):
+            plant.impose_flow(wrong)  # type: ignore[arg-type]
+    with pytest.raises(sp.InputError, match="asked = 3; allowed: a Field"):
+        plant.impose_field(3)  # type: ignore[arg-type]
+    with pytest.raises(sp.InputError, match="no field turns it"):
+        plant.impose_field(Field.of({"yaw": 0.1}))
+
+
+@pytest.mark.parametrize("long", ["a" * 300, "a" * 5000, "folder/" + "é" * 200])
+def test_no_name_is_too_long_for_a_sentence(long: str) -> None:
+    for call in (
+        sp.load,
+        sp.propose_setup,
+        lambda name: sp.measure("film.mp4", name),
+        lambda name: sp.study(output=name),
+    ):
+        with pytest.raises(sp.InputError, match=r"(bytes|characters); allowed: "):
+            call(long)
 
 
 def test_sampler_wants_whole_numbers() -> None:

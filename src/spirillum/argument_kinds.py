@@ -10,6 +10,7 @@ import ast
 import inspect
 import math
 import os
+import sys
 import types
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache, wraps
@@ -184,9 +185,11 @@ def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:
     """Refuse a value of none of these kinds.
 
     Raises:
-        InputError: if it is of none.
+        InputError: if it is of none, or a whole number that no float can hold.
     """
     fitting = [kind for kind in kinds if kind.holds(value)]
+    if fitting == [_BASIC["float"]] and isinstance(value, Integral) and abs(int(value)) > sys.float_info.max:
+        raise InputError(f"{name} = {clipped(value)}; allowed: at most {sys.float_info.max:.2g} in size")
     if not fitting:
         allowed = list(dict.fromkeys(kind.words for kind in kinds))
         words = allowed[0] if len(allowed) == 1 else f"{', '.join(allowed[:-1])} or {allowed[-1]}"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import spirillum as sp
 from spirillum.controllers.lab import Lab
 from spirillum.controllers.loop import SILENCE, run_loop
 from spirillum.controllers.sensors import FlowPulse, draw
@@ -167,3 +168,13 @@ def test_the_end_of_the_channel_ends_the_run(toy: Any) -> None:
     run = run_loop(toy(SPEED, end=2e-3), Always(), lab(), 10.0)
     assert run.ended == "end of the channel"
     assert run.moments[-1].time == pytest.approx(2.0, abs=0.2)
+
+
+def test_a_robot_without_walls_is_said_to_sink() -> None:
+    task = {"kind": "stop-at", "at": "5 mm", "duration": "1 s"}
+    robot = sp.load("biorob2012-wide", channel="none")
+    answer = sp.control(robot, task, plant={"model": "slender"})
+    height = answer.dataset["position"].values[:, 2]
+    assert height[-1] < height[0] - 1e-3
+    assert any(line.startswith("it sinks at ") for line in answer.warnings)
+    assert "it sinks at " in answer.dataset.attrs["warnings"]

@@ -22,6 +22,7 @@ from spirillum.controllers.run_record import record
 from spirillum.controllers.scores import Scores, scored
 from spirillum.controllers.sensors import Drawn, Senses
 from spirillum.controllers.task import CONTROLLERS, FEEDBACK, Score, Task
+from spirillum.dynamics.averages import vertical_drift
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.plant import Plant
 from spirillum.errors import InputError, clipped, did_you_mean
@@ -171,7 +172,9 @@ def control(
     senses = None if bench is None else bench(actual, lab, seed)
     run = run_job(job, actual, drawn, learner, senses=senses, pace=pace, progress=progress)
     scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
-    warnings = (*actual.warnings, *cautions, *cut_short, *_warnings_of(run))
+    dataset = _dataset(job, run, actual)
+    drift = None if actual.model == "tube" else vertical_drift(dataset)
+    warnings = (*actual.warnings, *([] if drift is None else [drift]), *cautions, *cut_short, *_warnings_of(run))
     return Control(
         robot=robot,
         model=actual.model,
@@ -183,7 +186,7 @@ def control(
         drawn=drawn,
         score=task.score(run, job.brief),
         run=run,
-        dataset=_dataset(job, run, actual, warnings),
+        dataset=dataset.assign_attrs(warnings="\n".join(warnings)),
         late=None if pace is None else pace.late,
         learnt=None if learner is None else learner.learnt,
         scores=scores,
@@ -233,7 +236,7 @@ def _scores(job: Job, seeds: int, workers: int, progress: Progress | None) -> tu
     return scored(job.task, outcomes) if outcomes else None, [] if complete else [sentence]
 
 
-def _dataset(job: Job, run: LoopRun, plant: Plant, warnings: tuple[str, ...]) -> xr.Dataset:
+def _dataset(job: Job, run: LoopRun, plant: Plant) -> xr.Dataset:
     """The run as a dataset, with all that it can be done again from."""
     settings = {
         "task": {"kind": job.task.kind, **job.task.model_dump()},
@@ -246,7 +249,6 @@ def _dataset(job: Job, run: LoopRun, plant: Plant, warnings: tuple[str, ...]) ->
         task=job.task.kind,
         controller=job.controller,
         seed=job.seed,
-        warnings="\n".join(warnings),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,12 +11,17 @@ from spirillum.arrays import Samples
 from spirillum.dynamics.remote import Switch
 from spirillum.quantities import attributes
 
-__all__ = ["STEADY", "Stretch", "run_averages", "stretches_on"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["STEADY", "Stretch", "run_averages", "stretches_on", "vertical_drift"]
 
 _WITHIN = 0.01
 """Relative difference from the end of a stretch below which a motion is steady."""
 _LEAST_TURNS = 2
 """Turns for which a motion that changes within a turn has to be steady."""
+_SINKS = 0.2
+"""Way up or down over that along, from which on a robot is said to sink or rise."""
 STEADY = (
     "from the time on at which speed and tail rate (of a free run: averaged over a turn of the tail) stay within 1 % "
     "of what they are at the end of their time on at constant duty, for at least half of that time (and two turns)"
@@ -136,3 +141,21 @@ def _turn(time: Samples, angle: Samples, stretch: Stretch) -> float:
     middle = 0.5 * (stretch.start + stretch.end)
     turned = abs(float(np.diff(np.interp([middle, stretch.end], time, angle))[0])) / (2.0 * np.pi)
     return (stretch.end - middle) / turned if turned > 0 else float("inf")
+
+
+def vertical_drift(run: xr.Dataset) -> str | None:
+    """A sentence on a robot that sinks or rises over the last two thirds of a run; None where it hardly does.
+
+    Args:
+        run: with `position` and `pitch` over `time`.
+    """
+    late = run.isel(time=slice(run.sizes["time"] // 3, None))
+    way = late["position"].values[-1] - late["position"].values[0]
+    if not abs(way[2]) > _SINKS * np.hypot(way[0], way[1]):
+        return None
+    upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
+    pitch = float(np.degrees(late["pitch"].values[-1]))
+    return (
+        f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the "
+        f"run, at last pitched by {pitch:.3g} deg: velocities are those along x"
+    )

@@ -7,6 +7,7 @@ continued from where the last piece ended.
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -310,6 +311,7 @@ class Plant:
         switches = [Switch(now.time, now.duty)]
         return self._moment(integrate(self._links, state[0], np.array([now.time]), switches, self._reach))
 
+    @checked
     def impose_flow(self, velocity: float | None) -> None:
         """From now on another mean flow is imposed.
 
@@ -317,21 +319,28 @@ class Plant:
             velocity: m/s; None: none is, and the ends of the tube decide.
 
         Raises:
-            InputError: for a model that knows none.
+            InputError: for a velocity that is not finite, or a model that knows none.
         """
+        if velocity is not None and not math.isfinite(as_number(velocity)):
+            raise InputError(f"velocity = {velocity}; allowed: a finite number of m/s, or None")
         if velocity == self._now.flow:
             return
         self._impose(velocity)
         self._now = replace(self._now, flow=velocity, checkpoint=self._begun_anew())
 
+    @checked
     def impose_field(self, asked: Field) -> None:
         """From now on the field of a magnetic robot is another one; its angle does not jump.
 
         Args:
             asked: what changes of it.
+
+        Raises:
+            InputError: for a robot that no field turns.
         """
         old = self._now.field
-        assert old is not None  # noqa: S101 - the robot is magnetic
+        if old is None:
+            raise InputError(f"{self.robot.name} has no drive.kind = 'magnetic': no field turns it")
         field = old.changed(asked, self._now.time)
         if field != old:
             self._links = field.on(self._links)

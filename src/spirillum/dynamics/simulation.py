@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from spirillum.dynamics.averages import stretches_on
+from spirillum.dynamics.averages import stretches_on, vertical_drift
 from spirillum.dynamics.fitted_runs import chosen_run, drawn_number, with_intervals
 from spirillum.dynamics.free_start import links_without_walls, resting_state
 from spirillum.dynamics.held import held_run
@@ -47,9 +47,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["simulate"]
-
-_SINKS = 0.2
-"""Way up or down over that along, from which a run is said to sink or rise."""
 
 
 def simulate(  # noqa: PLR0913 - the options of the command
@@ -244,20 +241,10 @@ def _free_run(
 
 def _of_the_way(dataset: xr.Dataset, steady: Prediction) -> list[str]:
     """What the path shows that a held robot's speed does not: that it sinks or rises, and how fast it moves."""
+    drift = vertical_drift(dataset)
     velocity = dataset["velocity"].values
-    late = dataset.isel(time=slice(dataset.sizes["time"] // 3, None))
-    way = late["position"].values[-1] - late["position"].values[0]
-    upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
-    found = []
-    if abs(way[2]) > _SINKS * np.hypot(way[0], way[1]):
-        pitch = float(np.degrees(late["pitch"].values[-1]))
-        moves = "sinks" if upwards < 0 else "rises"
-        found.append(
-            f"it {moves} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the run, at last pitched by "
-            f"{pitch:.3g} deg: velocities are those along x"
-        )
     limits = [speed_limit(steady.batch, float(np.linalg.norm(velocity, axis=-1).max()))]
-    return found + [limit.sentence() for limit in broken(limits)]
+    return [*([] if drift is None else [drift]), *(limit.sentence() for limit in broken(limits))]
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:

@@ -8,6 +8,7 @@ __all__ = [
     "LARGEST_TABLE",
     "LARGEST_TEXT",
     "LONGEST_CELL",
+    "LONGEST_NAME",
     "LONGEST_PATH",
     "MOST_CELLS",
     "MOST_COLUMNS",
@@ -47,3 +48,5 @@ MOST_IMAGES = 1_000_000
 """Images in a folder."""
 LONGEST_PATH = 4096
 """A file's name with its folders, characters."""
+LONGEST_NAME = 255
+"""A file or folder by itself, bytes: what the usual file systems hold."""

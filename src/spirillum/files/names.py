@@ -8,7 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from spirillum.errors import InputError
-from spirillum.files.limits import LONGEST_PATH
+from spirillum.files.limits import LONGEST_NAME, LONGEST_PATH
 
 __all__ = ["checked_path", "file_name", "is_text", "text_cell"]
 
@@ -37,7 +37,7 @@ def checked_path(path: str | os.PathLike[str], what: str) -> Path:
         what: what it should be, for the sentence of an error.
 
     Raises:
-        InputError: if it is empty, holds a null byte, is absurdly long, or is not text in UTF-8.
+        InputError: if it is empty, holds a null byte, is longer than a file system allows, or is not text in UTF-8.
     """
     name = os.fspath(path)
     if not name:
@@ -47,6 +47,11 @@ def checked_path(path: str | os.PathLike[str], what: str) -> Path:
         raise InputError(f"{name[:80]!r} {wrong}; allowed: {what}")
     if not is_text(name):
         raise InputError(f"{name[:200]!a} is not text; allowed: a name that is text in UTF-8, as results carry it")
+    longest = max(len(part.encode()) for part in Path(name).parts or ("",))
+    if longest > LONGEST_NAME:
+        raise InputError(
+            f"{name[:80]!r} has a name of {longest} bytes; allowed: {what}, at most {LONGEST_NAME} bytes a name"
+        )
     return Path(path)
 
 

@@ -114,8 +114,18 @@ class LiveTracker:
         self._collect(now)
         return Observation(now.index, now.time, "learning", self._reason)
 
+    @checked
     def left_out(self, frames: int) -> None:
-        """Count frames that were not handed over, as the tracker was busy."""
+        """Count frames that were not handed over, as the tracker was busy.
+
+        Args:
+            frames: how many, from 0.
+
+        Raises:
+            InputError: for a number that is none.
+        """
+        if frames < 0:
+            raise InputError(f"frames = {frames}; allowed: a whole number from 0")
         self._count += frames
 
     def summary(self) -> Trial:

@@ -12,7 +12,7 @@ import numpy as np
 
 from spirillum.answer import envelope
 from spirillum.errors import InputError
-from spirillum.files import new_file, output_target
+from spirillum.files import checked_path, new_file, output_target
 from spirillum.measurement.setup_template import KNOWN, setup_text, toml_value
 from spirillum.robot.load import PAPER_ROBOTS, load
 from spirillum.robot.robot import Robot
@@ -141,7 +141,9 @@ def propose_setup(
         raise InputError(f"fps = {fps:g}; allowed: 0.01 to 100000 frames a second")
     name = PAPER_ROBOTS[0] if robot is None else str(robot)
     loaded = load(name)
-    video = open_video(film, fps or (_USUAL_RATE if Path(film).is_dir() else None))
+    video = open_video(
+        film, fps or (_USUAL_RATE if checked_path(film, "a film, or a folder of images").is_dir() else None)
+    )
     seen_there = scouted(video, loaded, apart, progress)
     if seen_there.known is None and seen_there.lines is None:
         raise InputError(
