@@ -15,9 +15,11 @@ from spirillum.errors import InputError
 WIDE = "biorob2012-wide"
 
 
-def simulated(duration: str, robot: Mapping[str, Any] | None = None, **more: Any) -> xr.Dataset:
+def simulated(
+    duration: str, robot: Mapping[str, Any] | None = None, on: tuple[str, str] = ("0.1 s", "0.5 s"), **more: Any
+) -> xr.Dataset:
     loaded = sp.load(WIDE, **(robot or {}))
-    return sp.simulate(loaded, model="tube", timing={"duration": duration, "on": [("0.1 s", "0.5 s")]}, **more)
+    return sp.simulate(loaded, model="tube", timing={"duration": duration, "on": [on]}, **more)
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +80,8 @@ def test_only_a_run_of_the_same_robot_is_continued(early: Path, tmp_path: Path) 
         ({"roughness": "30 um"}, "a run with roughness 9e-07, and not 3e-05"),
         ({"in_tube": {"friction_coefficient": 0.2}}, r"a run with friction coefficient 0\.1, and not 0\.2"),
         ({"robot": {"fluid.viscosity": "1 Pa s"}}, r"a run with another fluid\.viscosity"),
+        ({"weight": False}, "a run with weight acts, and not left out"),
+        ({"on": ("0.2 s", "0.5 s")}, r"a run with duty 1 at 0\.\d+ s, and not 0"),
     ],
     ids=str,
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from spirillum.arrays import Samples
-from spirillum.dynamics.earlier_run import earlier_run
+from spirillum.dynamics.earlier_run import earlier_run, weight_words
 from spirillum.dynamics.integration import Progress
 from spirillum.dynamics.start import start_phase, turning_rate
 from spirillum.dynamics.table_check import held_against_check
@@ -72,8 +72,9 @@ def run_in_tube(
     links, start = links_in_tube(steady, table, placed, asked, roughness, weight=weight)
     links = in_tilted_field(links, field)
     turn = links.turn
-    begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links)
-    dataset = tube_run(steady, links, begun, times.timetable(turn, own), wait=asked.wait or 0.0, progress=progress)
+    timetable = times.timetable(turn, own)
+    begun = start if asked.continued is None else earlier_run(asked.continued, steady, table, links, timetable.switches)
+    dataset = tube_run(steady, links, begun, timetable, wait=asked.wait or 0.0, progress=progress)
     error = table.error["forward_velocity"]
     places = {name: dataset[of].values for name, of in _PLACES.items()}
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
@@ -90,6 +91,7 @@ def run_in_tube(
         error_estimate=error if checked.known else np.nan,
         known_error=free_in_tube(steady.fitted_by),
         table=table.key,
+        weight=weight_words(links),
         error_against=TabledTube.error_against,
     )
 
