@@ -35,13 +35,17 @@ def test_numbers_are_those_of_the_page(model: str) -> None:
 
 def test_sentence_is_about_the_robots_own_tail() -> None:
     said = sp.predict("biorob2012-wide", model="rft").known_error
-    assert said.startswith("against a resolved wire of this tail (25, 2.5 mm): drag +56 %")
+    assert said.startswith("against a resolved wire of this tail (wavelength 25 mm, amplitude 2.5 mm): drag +56 %")
     wide = sp.load("biorob2012-wide", **{"tail.wavelength": "10 mm", "tail.amplitude": "3.4 mm"})
     said = sp.predict(wide, model="rft").known_error
-    assert "much like this one (10, 3.5 mm" in said
+    assert "much like this one (wavelength 10 mm, amplitude 3.5 mm" in said
     assert "+271 %" in said
     thick = sp.load("biorob2012-wide", **{"tail.wire_diameter": "2 mm"})
     assert "was not held against a resolved wire" in sp.predict(thick, model="sbt").known_error
+    late = sp.load("biorob2012-wide", **{"tail.taper": 0.1})
+    assert "on average 4.8 % of the amplitude) was not held" in sp.predict(late, model="sbt").known_error
+    plain = sp.load("biorob2012-wide", **{"tail.taper": None})
+    assert "much like this one" in sp.predict(plain, model="sbt").known_error
 
 
 def test_walls_are_named_where_there_are_some() -> None:

@@ -66,6 +66,7 @@ def test_a_value_taken_out() -> None:
     assert robot.channel is not None
     assert robot.channel.length is None
     assert robot.tail.taper is None
+    assert load("biorob2012-wide", **{"tail.taper": robot.tail.taper}).tail.taper is None
 
 
 @pytest.mark.parametrize(

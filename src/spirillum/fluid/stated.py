@@ -14,9 +14,9 @@ from spirillum.robot.batch import RobotBatch
 
 __all__ = ["CHECKED", "TailError", "said_of_tail", "walls_left_out"]
 
-_WIRE, _LENGTH = 1.0, 60.0  # mm
+_WIRE, _LENGTH, _TAPER = 1.0, 60.0, 100.0  # mm, mm, c of the envelope
 _ALIKE = 1.5
-"""Largest ratio of wavelength, wire and number of turns between tails that count as alike."""
+"""Largest ratio of wavelength, wire, number of turns and mean envelope between tails that count as alike."""
 
 
 class TailError(NamedTuple):
@@ -65,15 +65,16 @@ def said_of_tail(batch: RobotBatch, errors: Mapping[tuple[float, float], TailErr
     apart = {tail: _apart(own, _checked_shape(*tail)) for tail in errors}
     nearest = min(apart, key=lambda tail: apart[tail])
     drag, thrust, torque = (f"{value:+.{3 if abs(value) >= 100 else 2}g} %" for value in errors[nearest])
-    name = "{:g}, {:g} mm".format(*nearest)
+    name = "wavelength {:g} mm, amplitude {:g} mm".format(*nearest)
     if apart[nearest] == 0:
         of = f"against a resolved wire of this tail ({name})"
     elif apart[nearest] <= math.log(_ALIKE):
         of = f"against a resolved wire of a tail much like this one ({name}, 1 mm thick)"
     else:
         of = (
-            f"this tail (wavelength {own[0]:.2g} and wire {own[1]:.2g} amplitudes, {own[2]:.2g} turns) was not held "
-            f"against a resolved wire; the nearest that was ({name}, 1 mm thick, 60 mm long) says"
+            f"this tail (wavelength {own[0]:.2g} and wire {own[1]:.2g} amplitudes, {own[2]:.2g} turns, on average "
+            f"{100 * own[3]:.2g} % of the amplitude) was not held against a resolved wire; the nearest that was "
+            f"({name}, 1 mm thick, 60 mm long) says"
         )
     return f"{of}: drag {drag}, thrust {thrust}, axial torque {torque} of the tail"
 
@@ -92,16 +93,22 @@ def walls_left_out(batch: RobotBatch) -> str:
     return "; the walls of its channel are not computed" if math.isfinite(float(batch.channel_diameter[0])) else ""
 
 
-Shape = tuple[float, float, float]
-"""Wavelength and wire's diameter over the amplitude, and number of turns."""
+Shape = tuple[float, float, float, float]
+"""Wavelength and wire's diameter over the amplitude, number of turns, and mean of the envelope over the amplitude."""
 
 
 def _shape(wavelength: float, amplitude: float, wire: float, batch: RobotBatch) -> Shape:
-    return wavelength / amplitude, wire / amplitude, float(batch.tail_length[0]) / wavelength
+    turns = float(batch.tail_length[0]) / wavelength
+    return wavelength / amplitude, wire / amplitude, turns, _mean_envelope(float(batch.taper[0]))
 
 
 def _checked_shape(wavelength: float, amplitude: float) -> Shape:
-    return wavelength / amplitude, _WIRE / amplitude, _LENGTH / wavelength
+    return wavelength / amplitude, _WIRE / amplitude, _LENGTH / wavelength, _mean_envelope(_TAPER)
+
+
+def _mean_envelope(taper: float) -> float:
+    """Mean of 1 - exp(-c xi/L_t) over the tail; 1 for a plain helix."""
+    return 1.0 if math.isinf(taper) else 1.0 + math.expm1(-taper) / taper
 
 
 def _apart(own: Shape, other: Shape) -> float:

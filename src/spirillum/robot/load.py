@@ -268,8 +268,12 @@ def _nested(path: str, value: Any) -> dict[str, Any]:
     return table
 
 
+_NONE_IS_A_VALUE = ("tail.taper",)
+"""Fields whose None, a plain helix, is another thing than their default."""
+
+
 def _put(table: dict[str, Any], names: list[str], value: Any, path: str) -> None:
-    """Set one dotted field; a table merges into a table, None takes the field out."""
+    """Set one dotted field; a table merges into a table, None takes the field out, but where None is a value."""
     if len(names) > _DEEPEST or not all(names):
         raise InputError(f"{path[:80]!r} is no field; allowed: a dotted field such as tail.wavelength")
     for name in names[:-1]:
@@ -278,7 +282,7 @@ def _put(table: dict[str, Any], names: list[str], value: Any, path: str) -> None
             # `channel = "none"` gives way to `channel.diameter`; other text is left for the check to name.
             below = table[name] = {}
         table = below
-    if value is None:
+    if value is None and path not in _NONE_IS_A_VALUE:
         table.pop(names[-1], None)
     elif isinstance(value, Mapping) and isinstance(table.get(names[-1]), dict):
         table[names[-1]] = _merged(table[names[-1]], value)
