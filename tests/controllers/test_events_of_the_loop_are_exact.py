@@ -178,3 +178,10 @@ def test_a_robot_without_walls_is_said_to_sink() -> None:
     assert height[-1] < height[0] - 1e-3
     assert any(line.startswith("it sinks at ") for line in answer.warnings)
     assert "it sinks at " in answer.dataset.attrs["warnings"]
+
+
+def test_pictures_that_come_after_the_end_are_said_to() -> None:
+    task = {"kind": "stop-at", "at": "5 mm", "duration": "1 s"}
+    for latency, said in (("10 s", True), ("100 ms", False)):
+        answer = sp.control("biorob2012-wide", task, lab={"camera": {"latency": latency}}, plant={"model": "rft"})
+        assert any(line.startswith("no picture reached the controller") for line in answer.warnings) is said

@@ -174,7 +174,7 @@ def control(
     scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
     dataset = _dataset(job, run, actual)
     drift = None if actual.model == "tube" else vertical_drift(dataset)
-    warnings = (*actual.warnings, *([] if drift is None else [drift]), *cautions, *cut_short, *_warnings_of(run))
+    warnings = (*actual.warnings, *([] if drift is None else [drift]), *cautions, *cut_short, *_warnings_of(run, lab))
     return Control(
         robot=robot,
         model=actual.model,
@@ -270,9 +270,15 @@ def _check(controller: str, seed: int, seeds: int, workers: int, arguments: Mapp
             raise InputError(f"plant.{str(name)[:60]} is not known{hint}; allowed: {', '.join(_ALLOWED)}")
 
 
-def _warnings_of(run: LoopRun) -> list[str]:
+def _warnings_of(run: LoopRun, lab: Lab) -> list[str]:
     """What to be careful about in a run."""
     warnings = []
+    end, latency = run.moments[-1].time, lab.camera.latency
+    if latency >= end:
+        warnings.append(
+            f"no picture reached the controller: camera.latency = {show(latency, 's')}, and the run lasted "
+            f"{show(end, 's')}"
+        )
     if run.silent is not None:
         warnings.append(f"the camera was silent: the drive was first switched off for it at {show(run.silent, 's')}")
     if run.ended:
