@@ -23,6 +23,7 @@ from spirillum.swimming.steady import swim
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.options import CameraOptions, MotionOptions, SetupErrors, TrialOptions
 
+WIDE = "biorob2012-wide"
 FUNCTIONS = [name for name in sp.__all__ if inspect.isfunction(getattr(sp, name)) and name != "citation"]
 OF_A_KIND: dict[str, Any] = {
     "str": "text",
@@ -151,12 +152,44 @@ def test_numbers_and_lists_of_numpy_are_numbers_and_lists() -> None:
         checked(function)(2.0, True, names, False)
 
 
+@pytest.mark.parametrize("time", [np.timedelta64(1, "s"), np.timedelta64(1, "ns")], ids=str)
+def test_lengths_of_time_of_numpy_are_no_numbers(time: Any) -> None:
+    """They pass for whole numbers, and their count depends on their unit."""
+    for call in (
+        lambda: sp.predict(WIDE, tail_rate=time),
+        lambda: sp.resistance(WIDE, phase=time, part="tail"),
+        lambda: sp.study(workers=time),
+        lambda: sp.simulate(WIDE, timing={"duration": time}),
+        lambda: sp.simulate(WIDE, timing={"samples_per_turn": time}),
+        lambda: sp.simulate(WIDE, in_tube={"wait": time}),
+        lambda: sp.simulate(WIDE, in_tube={"friction_coefficient": time}),
+    ):
+        with pytest.raises(sp.InputError, match=r"; allowed: "):
+            call()
+
+
+@pytest.mark.parametrize("value", [np.array("a"), np.ma.masked, np.array(3)], ids=["text", "masked", "number"])
+def test_an_array_of_one_value_is_no_list(value: Any) -> None:
+    with pytest.raises(sp.InputError, match=r"models = .*; allowed: a list"):
+        sp.compare_models(WIDE, models=value)
+    with pytest.raises(sp.InputError, match=r"size = .*; allowed: "):
+        sp.show(WIDE, size=value)
+
+
+@pytest.mark.parametrize("size", [np.array([]), {1}, range(3), {640, 480}], ids=str)
+def test_sizes_are_pairs(size: Any) -> None:
+    with pytest.raises(sp.InputError, match=r"size = .*; allowed: WIDTHxHEIGHT"):
+        sp.show(WIDE, size=size)
+
+
 def test_public_functions_can_be_sent_to_another_process() -> None:
     assert pickle.loads(pickle.dumps(sp.predict)) is sp.predict
 
 
 @pytest.mark.parametrize("name", ["tail_rate", "motor_rate"])
-@pytest.mark.parametrize("wrong", [np.array(["a"]), "1", True, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str)
+@pytest.mark.parametrize(
+    "wrong", [np.array(["a"]), "1", True, np.ma.masked, [None], np.array([1j]), [[1.0], [2.0, 3.0]]], ids=str
+)
 def test_rates_have_to_be_numbers(name: str, wrong: Any) -> None:
     with pytest.raises(sp.InputError, match=rf"{name} = .*; allowed: numbers in rad/s"):
         swim(sp.RobotBatch.of(sp.load("biorob2012-wide")), **{name: wrong})

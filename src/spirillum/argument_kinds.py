@@ -14,10 +14,10 @@ import sys
 import types
 from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import cache, wraps
-from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
 from spirillum.errors import InputError, clipped, did_you_mean
+from spirillum.scalars import is_number, is_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -46,8 +46,10 @@ def _is_true_or_false(value: Any) -> bool:
 
 
 def _is_list(value: Any) -> bool:
-    """Several values whose number is known, but no text and no mapping."""
-    return isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping))
+    """Several values whose number is known, but no text, no mapping, and no array of one value without a length."""
+    return (
+        isinstance(value, Collection) and not isinstance(value, (str, bytes, Mapping)) and getattr(value, "ndim", 1) > 0
+    )
 
 
 def _is_named(value: Any) -> bool:
@@ -57,8 +59,8 @@ def _is_named(value: Any) -> bool:
 _BASIC = {
     "str": _Kind("text", lambda value: isinstance(value, str)),
     "Path": _Kind("a path", lambda value: isinstance(value, os.PathLike)),
-    "int": _Kind("a whole number", lambda value: isinstance(value, Integral) and not _is_true_or_false(value)),
-    "float": _Kind("a number", lambda value: isinstance(value, Real) and not _is_true_or_false(value)),
+    "int": _Kind("a whole number", is_whole),
+    "float": _Kind("a number", is_number),
     "bool": _Kind("True or False", _is_true_or_false),
     "None": _Kind("None", lambda value: value is None),
     "Mapping": _Kind("a mapping of names", _is_named),
@@ -124,7 +126,7 @@ def check_kind(name: str, value: Any, annotation: str) -> None:
 
 def as_number(value: Any) -> float:
     """A value as a number; NaN, which is in no range, for what is none, and for one too large to be a float."""
-    if not isinstance(value, Real) or _is_true_or_false(value):
+    if not is_number(value):
         return math.nan
     try:
         return float(value)
@@ -176,7 +178,7 @@ def _array_of(name: str, value: Any, kinds: str, allowed: str) -> np.ndarray:
         found = np.asarray(value)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}") from error
-    if found.dtype.kind not in kinds:
+    if found.dtype.kind not in kinds or np.any(np.ma.getmask(value)):
         raise InputError(f"{name} = {clipped(value)}; allowed: {allowed}")
     return found
 
@@ -188,7 +190,7 @@ def _check(name: str, value: Any, kinds: Iterable[_Kind]) -> None:
         InputError: if it is of none, or a whole number that no float can hold.
     """
     fitting = [kind for kind in kinds if kind.holds(value)]
-    if fitting == [_BASIC["float"]] and isinstance(value, Integral) and abs(int(value)) > sys.float_info.max:
+    if fitting == [_BASIC["float"]] and is_whole(value) and abs(int(value)) > sys.float_info.max:
         raise InputError(f"{name} = {clipped(value)}; allowed: at most {sys.float_info.max:.2g} in size")
     if not fitting:
         allowed = list(dict.fromkeys(kind.words for kind in kinds))

@@ -12,10 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import as_file, files
-from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 from spirillum.errors import InputError
+from spirillum.scalars import is_number
 
 if TYPE_CHECKING:
     import pint
@@ -281,10 +281,9 @@ def parse_option(name: str, value: str | float, kind: Kind) -> float:
         InputError: if there is no unit, one of another kind, or a number out of range; the sentence starts with the
             option's name.
     """
-    given: Any = value  # numbers of other libraries are real numbers too
-    if not isinstance(given, bool) and isinstance(given, Real):
+    if is_number(value):
         try:
-            value = f"{float(given)!r} {kind.unit}"
+            value = f"{float(value)!r} {kind.unit}"
         except OverflowError:
             value = f"inf {kind.unit}"
     try:

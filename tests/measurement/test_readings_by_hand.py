@@ -191,6 +191,7 @@ def test_trackpy_and_deeplabcut_give_the_same_speed(
         ("frame,x_px\n1,2,3\n", "row 2: 3 cells; allowed: 2"),
         ("frame,time_s,x_px\n,,3\n", "row 2: neither frame nor time_s"),
         ("time_s,x_px\n0,1\n-5,1\n", "row 3, column time_s: '-5'; allowed: 0 or later"),
+        ("frame,x_px,x_mm\n1,2,\n2,3,0.5\n", "row 3: x_px = 3 and x_mm = 0.5 in one row; allowed: one of them"),
         ("frame,x_px\n", "holds no readings"),
         ("", "is empty"),
     ],
@@ -241,3 +242,5 @@ def test_frame_and_time_of_a_reading_have_to_agree(tmp_path: Path, make_track: C
     marks = read_marks(written(tmp_path, f"frame,time_s,x_mm\n0,0,0\n{frame},{time + 2:.3f},1\n"))[""]
     with pytest.raises(InputError, match=f"row 3: frame {frame} is at .* s, but time_s is"):
         corrected(track, marks, None)
+    with pytest.raises(InputError, match=f"row 3: frame {frame} is at .* s, but time_s is"):
+        track_of_marks(marks, track.setup, "a.mp4", RULED, seconds)  # the film alone knows the times of its frames

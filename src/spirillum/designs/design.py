@@ -101,7 +101,7 @@ def design(
     """
     given, options = load(robot), Judged.of(judged)
     unknowns = unknowns_of(given, unknown, posterior, model)
-    options.check_read(known=unknowns.known, conditions=bool(subject_to))
+    options.check_read(known=unknowns.known, conditions=len(subject_to) > 0)
     space = space_of(unknowns.robot, vary)
     choice = chosen_model(model, given, space, unknowns)
     chosen = find_swimmer_model(choice.model)

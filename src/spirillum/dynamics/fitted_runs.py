@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,7 @@ from spirillum.fitted.posterior_file import PosteriorFile
 from spirillum.fluid.registry import find_swimmer_model
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.scalars import is_whole
 from spirillum.swimming.answer import LEVEL
 from spirillum.swimming.discrepancy import drawn_discrepancy
 from spirillum.swimming.model_choice import ModelChoice, choose_model, fitted_models
@@ -97,7 +97,7 @@ def drawn_number(draws: int | None, posterior: PosteriorFile | None) -> int:
         InputError: for a number that tells nothing or takes too long, or one without a posterior.
     """
     given: Any = _DRAWS if draws is None else draws
-    if isinstance(given, bool) or not isinstance(given, Integral) or not _FEWEST <= int(given) <= _MOST:
+    if not is_whole(given) or not _FEWEST <= int(given) <= _MOST:
         raise InputError(f"draws = {str(draws)[:40]}; allowed: a whole number from {_FEWEST} to {_MOST}")
     if draws is not None and posterior is None:
         raise InputError(f"draws = {draws} without a posterior, whose draws they are; allowed: with one")

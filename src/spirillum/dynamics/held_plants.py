@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from spirillum.errors import InputError, clipped
 from spirillum.kernels import held_motor as kernel
 from spirillum.robot.placement import Placement
 from spirillum.robot.robot import Robot
+from spirillum.scalars import is_whole
 from spirillum.swimming.model_choice import AUTO
 
 __all__ = ["HeldPlants"]
@@ -202,7 +202,7 @@ class HeldPlants:
 
 
 def _check_whole(name: str, value: Any, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
+    if not is_whole(value) or not low <= int(value) <= high:
         raise InputError(f"{name} = {clipped(value)}; allowed: a whole number from {low} to {high}")
 
 

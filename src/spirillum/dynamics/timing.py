@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from numbers import Integral, Real
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, NamedTuple
 
@@ -15,23 +14,24 @@ from spirillum.dynamics.remote import Switch, Window, schedule, windows_of
 from spirillum.dynamics.sampling import check_samples, duration_of, sample_times, stated_duration
 from spirillum.errors import InputError
 from spirillum.robot.arguments import Options
+from spirillum.scalars import is_number, is_whole
 
 __all__ = ["Timetable", "Timing"]
 
 
 def _whole(value: Any) -> Any:
-    if isinstance(value, bool) or not isinstance(value, Integral):
+    if not is_whole(value):
         raise InputError(f"samples-per-turn = {str(value)[:40]}; allowed: a whole number from 1 to 10000")
     return int(value)
 
 
 def _number_of_turns(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if not is_number(value):
         raise InputError(f"turns = {str(value)[:40]}; allowed: a number of turns")
     return _float(value)
 
 
-def _float(value: Real) -> float:
+def _float(value: float) -> float:
     """A number; infinity where it is too large for one, which the next check refuses."""
     try:
         return float(value)
@@ -40,9 +40,9 @@ def _float(value: Real) -> float:
 
 
 def _length(value: Any) -> Any:
-    if isinstance(value, bool) or not (value is None or isinstance(value, (str, Real))):
+    if not (value is None or isinstance(value, str) or is_number(value)):
         raise InputError(f"duration = {str(value)[:40]}; allowed: a time, as in 2 s, or a float in s")
-    return _float(value) if isinstance(value, Real) else value
+    return _float(value) if is_number(value) else value
 
 
 def _duty_file(value: Any) -> Any:

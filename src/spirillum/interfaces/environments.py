@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from numbers import Integral
 from typing import Any
 
 import gymnasium
@@ -16,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from spirillum.errors import InputError, clipped
 from spirillum.interfaces.tasks import TASKS, HoldSpeed, Task
+from spirillum.scalars import is_whole
 
 __all__ = ["BatchEnvironment", "Environment"]
 
@@ -150,7 +150,7 @@ class BatchEnvironment(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):
 
 
 def _check_seed(seed: Any) -> None:
-    if seed is not None and (isinstance(seed, bool) or not isinstance(seed, Integral) or int(seed) < 0):
+    if seed is not None and (not is_whole(seed) or int(seed) < 0):
         raise InputError(f"seed = {clipped(seed)}; allowed: a whole number from 0, or None")
 
 

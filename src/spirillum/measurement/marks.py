@@ -150,6 +150,12 @@ def _marks(table: Table, rows: list[Row]) -> Marks:
         raise InputError(f"{table.path}, rows {first} and {second} are of the same frame; allowed: once a frame")
     pixels = np.stack([column("x_px"), column("y_px")], axis=1)
     position = 1e-3 * np.stack([column("x_mm"), column("y_mm")], axis=1)
+    for place, axis in np.argwhere(np.isfinite(pixels) & np.isfinite(position)):
+        name = "xy"[axis]
+        raise InputError(
+            f"{table.path}, row {rows[place].line}: {name}_px = {pixels[place, axis]:g} and {name}_mm = "
+            f"{1e3 * position[place, axis]:g} in one row; allowed: one of them"
+        )
     read = {name: np.radians(column(name)[order]) for name in ("body_angle_deg", "tail_phase_deg")}
     angles = {name: _unwrapped(values) for name, values in read.items()}
     counted = tuple(name for name in read if not np.array_equal(read[name], angles[name], equal_nan=True))
@@ -256,8 +262,13 @@ def track_of_marks(
                 "in the setup"
             )
         time[missing] = time_of(marks.frame[missing])
+    numbered = np.isfinite(marks.frame)
     if setup.camera.frames_per_second is not None:
         _check_agreement(marks, marks.frame / setup.camera.frames_per_second)
+    elif time_of is not None and numbered.any():
+        of_frames = np.full(marks.frame.shape, np.nan)
+        of_frames[numbered] = time_of(marks.frame[numbered])
+        _check_agreement(marks, of_frames)
     order = np.argsort(time, kind="stable")
     if np.any(np.diff(time[order]) <= 0):
         raise InputError(f"{marks.path}: two readings are of the same time; allowed: rising times")

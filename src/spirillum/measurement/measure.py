@@ -253,7 +253,8 @@ def _loaded(
     if overrides:
         beside = Path(setup).parent / chosen.robot.file
         robot = load(beside if beside.is_file() else chosen.robot.file, **overrides)
-    first, last = chosen.start if start is None else start, chosen.end if end is None else end
+    first = chosen.start if start is None else float(start)
+    last = chosen.end if end is None else float(end)
     if not (math.isfinite(first) and first >= 0):
         raise InputError(f"start = {first:g} s; allowed: 0 s or later")
     if last is not None and not last > first:

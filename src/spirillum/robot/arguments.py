@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
 from pydantic import AfterValidator
@@ -12,6 +11,7 @@ from pydantic_core import PydanticCustomError
 from spirillum.errors import InputError, clipped, did_you_mean
 from spirillum.robot.fields import Section, field_values
 from spirillum.robot.problems import problems_in, refused_table
+from spirillum.scalars import is_number, is_whole
 
 __all__ = ["Options", "in_range", "one_of", "refusal", "whole", "within"]
 
@@ -75,7 +75,7 @@ class Options(Section):
 
 def _with_unit(value: Any, unit: str | None) -> Any:
     """A number as text with its SI unit, where the field is a quantity."""
-    if unit is None or isinstance(value, bool) or not isinstance(value, Real):
+    if unit is None or not is_number(value):
         return value
     try:
         return f"{float(value)!r} {unit}"
@@ -92,8 +92,7 @@ def in_range(low: float, high: float, unit: str = "") -> Callable[[Any], float]:
     """A check of numbers from `low` to `high`; `unit` is for the sentence of an error."""
 
     def check(value: Any) -> float:
-        number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (number and low <= value <= high):
+        if not (is_number(value) and low <= value <= high):
             raise refusal(f"= {clipped(value)}; allowed: {low:g} to {high:g}{unit}")
         return float(value)
 
@@ -115,7 +114,7 @@ def whole(low: int, high: int) -> Callable[[Any], int]:
     """A check of whole numbers from `low` to `high`."""
 
     def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
+        if not is_whole(value) or not low <= int(value) <= high:
             raise refusal(f"= {clipped(value)}; allowed: a whole number from {low} to {high}")
         return int(value)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ import numpy as np
 from spirillum.answer import envelope, quantity
 from spirillum.arrays import Samples
 from spirillum.dynamics.poses import Pose
-from spirillum.errors import InputError
+from spirillum.errors import InputError, clipped
 from spirillum.files import MARK, output_target, whole_file
 from spirillum.robot.load import load
 from spirillum.robot.robot import Robot
@@ -78,7 +78,10 @@ def checked_size(size: str | tuple[int, int]) -> tuple[int, int]:
             raise InputError(f"size = {size[:40]!r}; allowed: {allowed}")
         width, height = int(found[1]), int(found[2])
     else:
-        width, height = (int(value) for value in size)
+        pair: Any = size  # any list of Python or NumPy
+        if isinstance(pair, Set) or len(pair) != 2:
+            raise InputError(f"size = {clipped(size)}; allowed: {allowed}")
+        width, height = (int(value) for value in pair)
     if not all(SMALLEST <= value <= LARGEST for value in (width, height)):
         raise InputError(f"size = {width}x{height}; allowed: {allowed}")
     return width, height

@@ -1,0 +1,22 @@
+"""What counts as a number: not True and False, which Python takes for 1 and 0, nor NumPy's lengths of time."""
+
+from __future__ import annotations
+
+from numbers import Integral, Real
+from typing import Any, TypeGuard
+
+__all__ = ["is_number", "is_whole"]
+
+
+def is_number(value: Any) -> TypeGuard[float]:
+    """Whether a value is a real number of Python or NumPy."""
+    return isinstance(value, Real) and not _is_another_kind(value)
+
+
+def is_whole(value: Any) -> TypeGuard[int]:
+    """Whether a value is a whole number of Python or NumPy."""
+    return isinstance(value, Integral) and not _is_another_kind(value)
+
+
+def _is_another_kind(value: Any) -> bool:
+    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_", "timedelta64")
