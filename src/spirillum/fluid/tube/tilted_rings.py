@@ -16,8 +16,8 @@ from spirillum.robot.seat import Seat
 
 __all__ = ["TiltedRings"]
 
-_FINER = 2
-"""Nodes that average waves over a panel, over its own: bodies come close to the wall in one place only."""
+_FINER = 3
+"""Nodes that average waves over a panel, over its own: with 2, normal resistance was 9 % low at a gap of 0.04 radii."""
 _TIER = 1.6
 """Ratio of the distances from the wall in one tier of panels."""
 _AVERAGED_TIERS = 3
