@@ -125,6 +125,15 @@ def test_the_papers_method_says_by_how_much_it_misses(made: Callable[..., Path])
     assert any("misses the body rate by" in warning for warning in found.warnings)
 
 
+def test_one_tail_alone_is_not_said_to_be_missed(made: Callable[..., Path]) -> None:
+    """There the discrepancy is its prior, which says nothing of the model."""
+    one = {"wavelengths": (25.0,), "amplitudes": (2.5,), "presets": (WIDE,)}
+    for free in ("body_drag", None):
+        found = sp.calibrate(made(**one, seed=7), WIDE, free=free, method="least-squares")
+        assert not any("from tail to tail, beyond" in warning for warning in found.warnings)
+        assert any("the intervals take what models of this kind miss by" in warning for warning in found.warnings)
+
+
 def test_a_number_far_from_its_prior_is_named(made: Callable[..., Path]) -> None:
     found = sp.calibrate(made(**FOUR, seed=5, drag=(60.0,)), WIDE, method="least-squares")
     assert any(w.startswith("body_drag = ") and "from the middle of its prior" in w for w in found.warnings)

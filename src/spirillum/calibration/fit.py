@@ -171,7 +171,7 @@ def _by_least_squares(problem: Problem, fit: LeastSquares, report: Identifiabili
     }
     warnings = [
         *_of_the_fit(problem, fit, report, reading),
-        *misfit_warnings(problem, discrepancy, fit.left),
+        *misfit_warnings(problem, discrepancy, fit),
         *narrow_channel_warnings(problem, values),
         *common_warnings(problem, friction),
     ]
@@ -219,7 +219,7 @@ def _by_posterior(
     warnings = [
         *wrong,
         *_of_the_fit(problem, fit, report, reading),
-        *misfit_warnings(problem, discrepancy, fit.left),
+        *misfit_warnings(problem, discrepancy, fit),
         *narrow_channel_warnings(problem, values),
         *common_warnings(problem, friction),
     ]

@@ -11,7 +11,7 @@ from spirillum.arrays import Samples
 from spirillum.calibration.estimate import Estimate
 from spirillum.calibration.experiment import Quantity
 from spirillum.calibration.identifiability import FAR
-from spirillum.calibration.least_squares import FEWEST_LEFT
+from spirillum.calibration.least_squares import FEWEST_LEFT, LeastSquares
 from spirillum.calibration.likelihood import ERROR_SCALE
 from spirillum.calibration.problem import Problem
 from spirillum.errors import InputError
@@ -118,22 +118,25 @@ def outlier_warnings(problem: Problem, z: Samples) -> list[str]:
     return found
 
 
-def misfit_warnings(
-    problem: Problem, discrepancy: Mapping[Quantity, Estimate], left: Mapping[Quantity, float] | None = None
-) -> list[str]:
+def misfit_warnings(problem: Problem, discrepancy: Mapping[Quantity, Estimate], fit: LeastSquares) -> list[str]:
     """State the model's discrepancy, so that a wrong model does not look certain.
 
     Args:
         problem: the fit.
         discrepancy: relative misfit by quantity.
-        left: degrees of freedom that the fit leaves each quantity; None: enough.
+        fit: its best fit, with the degrees of freedom that are left and what the residuals say of the misfit.
     """
     found = []
     for name, size in discrepancy.items():
-        if left is not None and left[name] < FEWEST_LEFT:
+        if fit.left[name] < FEWEST_LEFT:
             found.append(
                 f"the fit has as many free numbers as the {CALLED[name]} has means: nothing is left to tell by how "
                 f"much model '{problem.model.name}' misses, and the intervals take what models of this kind miss by"
+            )
+        elif np.count_nonzero(problem.ratio(name).seen) == 1:
+            found.append(
+                f"the {CALLED[name]} of one tail does not tell by how much model '{problem.model.name}' misses that of "
+                "others: the intervals take what models of this kind miss by"
             )
         elif not problem.ratio(name).freedom.sum() > 0:
             once = not np.any(problem.ratio(name).trials > 1)
@@ -142,13 +145,13 @@ def misfit_warnings(
                 f"the {CALLED[name]} {why}: the errors of trials and of the model cannot be told apart, and the "
                 "discrepancy holds both"
             )
-            if size.value > _BEYOND_TRIALS and problem.ratio(name).trials.size > 1:
+            if size.value > _BEYOND_TRIALS:
                 found.append(
                     f"the discrepancy of the {CALLED[name]}, {percent(size.value)}, is more than trials are off by: "
                     f"model '{problem.model.name}' misses the {CALLED[name]} from tail to tail, its fitted numbers "
                     "stand for what it lacks, and hold for these tails"
                 )
-        elif size.value > _LARGE_MISFIT:
+        elif size.value > _LARGE_MISFIT and fit.discrepancy[name] > 0:  # else the middle of what may be
             found.append(
                 f"model '{problem.model.name}' misses the {CALLED[name]} by {percent(size.value)} from tail to tail, "
                 "beyond the scatter of the trials: its fitted numbers stand for what the model lacks, and hold for "

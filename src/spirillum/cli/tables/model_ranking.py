@@ -24,7 +24,8 @@ def table(answer: Answer, console: Console) -> None:
     rows = grid("", "model", "log density", "difference", *(f"misses {CALLED[name]} by" for name in compared))
     for item in answer["models"]:
         apart = _apart(item["difference"])
-        misses = [item["discrepancy"].get(name) for name in compared]
+        one = answer["robots"] == 1  # a single tail does not tell by how much a model misses others
+        misses = [None if one else item["discrepancy"].get(name) for name in compared]
         shares = ["-" if miss is None else f"{100 * miss['value']:.2g} %" for miss in misses]
         rows.add_row(item["model"], f"{item['expected_log_density']['value']:.1f}", apart, *shares)
     console.print(rows)

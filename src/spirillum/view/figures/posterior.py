@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
+from spirillum.calibration.least_squares import FEWEST_LEFT
 from spirillum.view.figures.sheet import Sheet, add_letters, width_of
 from spirillum.view.figures.style import COLOURS, PAGE, Scale, look_of_model, plain, styled
 
@@ -146,8 +147,12 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
     columns = min(len(profiles), 4)
     rows = -(-len(profiles) // columns)
     assert found.least_squares is not None  # noqa: S101 - profiles are those of a fit by least squares
-    shares = found.least_squares.discrepancy.items()
-    held = " and ".join(f"{100.0 * share:.2g} % of the {name.replace('_', ' ')}" for name, share in shares)
+    fit = found.least_squares
+    held = " and ".join(
+        f"{100.0 * share:.2g} % of the {name.replace('_', ' ')} "
+        f"({'middle of its prior' if fit.left[name] < FEWEST_LEFT else 'moments of the residuals'})"
+        for name, share in fit.discrepancy.items()
+    )
     synthetic = " (synthetic)" if found.experiment.synthetic else ""
     with styled():
         sheet = Sheet(
@@ -159,7 +164,7 @@ def profile_figure(found: Calibrated, profiles: Sequence[LikelihoodProfile]) -> 
             columns=columns,
             notes=[
                 "Dotted: limit of the 95 % interval. A profile that stays below it on a side says that the number has "
-                f"no limit there. The model's discrepancy is held at {held}, which the moments of the residuals give; "
+                f"no limit there. The model's discrepancy is held at {held}; "
                 "the table's intervals let it vary, and are wider where it may be larger.",
             ],
         )
