@@ -138,6 +138,23 @@ def test_a_measured_robot_is_predicted_at_its_own_mean(fitted: Any) -> None:
         json.dumps(answer, allow_nan=False)
 
 
+def test_the_own_drive_of_a_measured_robot_gives_back_its_rates(made: Callable[..., Path], tmp_path: Path) -> None:
+    """B_eff was inferred with the body rate that was seen, and not with that of a draw, which the model misses."""
+    one = {"presets": (WIDE,), "wavelengths": (25.0,), "amplitudes": (2.5,), "error": 0.002, "pace": 0.0005}
+    found = sp.calibrate(made(**one, seed=6), WIDE, sampling=SHORT)
+    write_calibration(found, tmp_path / "fitted", figures=False)
+    answer = sp.predict(
+        found.experiment.robots[0], posterior=tmp_path / "fitted" / "posterior.nc", posterior_for="measured"
+    )
+    assert answer.intervals is not None
+    seen = float(found.experiment.tail_rate[0])
+    low, high = (side["tail_rotation_rate"] for side in (answer.intervals.low, answer.intervals.high))
+    assert low < seen < high
+    assert high - low < 0.005 * seen  # with the body rates of the draws it was 6 % wide
+    motor = answer.intervals.high["motor_rotation_rate"] - answer.intervals.low["motor_rotation_rate"]
+    assert motor < 0.01 * seen
+
+
 def test_only_what_was_measured_has_intervals_of_its_own(fitted: Any) -> None:
     path = fitted[1] / "posterior.nc"
     other = load(WIDE, **{"tail.wavelength": "20 mm"})

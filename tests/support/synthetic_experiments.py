@@ -27,6 +27,7 @@ def synthetic(
     rotation: Sequence[float] = (0.6, 0.6),
     friction: float = 1e-5,
     error: float = 0.02,
+    pace: float = 0.03,
     discrepancy: float = 0.0,
     trials: int = 5,
     seed: int = 1,
@@ -54,11 +55,11 @@ def synthetic(
         for place, (wavelength, amplitude) in enumerate(tails):
             off = 1.0 + discrepancy * rng.normal(size=2)
             for trial in range(trials):
-                pace = 1.0 + 0.03 * rng.normal() if error else 1.0
+                faster = 1.0 + pace * rng.normal() if error else 1.0
                 noise = 1.0 + error * rng.normal(size=2)
-                speed = 1e3 * swum.forward_velocity[place] * pace * off[0] * noise[0]
-                tail = swum.tail_rotation_rate[place] * pace / (2 * np.pi)
-                body = swum.body_rotation_rate[place] * pace * off[1] * noise[1] / (2 * np.pi)
+                speed = 1e3 * swum.forward_velocity[place] * faster * off[0] * noise[0]
+                tail = swum.tail_rotation_rate[place] * faster / (2 * np.pi)
+                body = swum.body_rotation_rate[place] * faster * off[1] * noise[1] / (2 * np.pi)
                 lines.append(
                     f"{preset},{1e3 * robot.channel.diameter:g},{wavelength:g},{amplitude:g},{trial + 1},"
                     f"{speed:.17g},{tail:.17g},{body:.17g}"

@@ -102,7 +102,8 @@ def intervals_over(
         "motor_rate": swum.motor_rotation_rate,
     }
     off = drawn_discrepancy(posterior, predicted, rng, robot if posterior_for == "measured" else None)
-    values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction)
+    observed = posterior_for == "measured"
+    values = _with_discrepancy(swum, batch, off, own_drive=own_drive, friction=friction, observed=observed)
     ends = [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL, 0.5]
     limits = {name: np.quantile(column[np.isfinite(column)], ends) for name, column in values.items() if _known(column)}
     nan = float("nan")
@@ -224,6 +225,7 @@ def _with_discrepancy(
     *,
     own_drive: bool,
     friction: str,
+    observed: bool,
 ) -> dict[str, Samples]:
     """All quantities, (draws,), with the model's discrepancy on speed and rates, and on what follows from them."""
     values = {item.name: getattr(swum, item.name) for item in STEADY}
@@ -232,7 +234,9 @@ def _with_discrepancy(
     advance, turning, motor = off["advance"], off["turning"], off["motor_rate"]
     # A fixed joint turns body and tail alike, and a drive that prescribes the rate is not missed by the model.
     turning = one if batch.joint == "fixed" else turning
-    pace = motor if own_drive and batch.drive == "dc-motor" else one
+    pace = one
+    if own_drive and batch.drive == "dc-motor":
+        pace = motor * _pace_at(swum, batch, turning) if observed and batch.joint != "fixed" else motor
     tail = values["tail_rotation_rate"] * pace
     body = values["body_rotation_rate"] * turning * pace
     speed = advance * pace
@@ -250,6 +254,30 @@ def _with_discrepancy(
         if batch.joint != "fixed":
             values |= _torques_and_powers(swum, values, batch, pace, own_drive=own_drive, friction=friction)
         return values | _over_speed(swum, values, speed)
+
+
+def _pace_at(swum: Swimming, batch: RobotBatch, turning: Samples) -> Samples:
+    """Tail rate of a motor whose body turns otherwise by a factor, over that before, (draws,).
+
+    The fluid's torque on the rotor grows with the tail's rate, what else loads the motor with that at the joint; (17)
+    with both gives the current. B_eff was inferred with the body rate that was observed: with that of a draw, which the
+    model misses, it would not give back the tail rate that was.
+    """
+    motor = batch.electrics
+    if motor is None:
+        return np.ones_like(turning)
+    tail, slip = swum.tail_rotation_rate, swum.motor_rotation_rate
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 1.0 - turning * swum.body_rotation_rate / tail  # of the joint's rate in the tail's
+        current = motor.polarity * steady_current(
+            motor, motor.joint_back_emf_constant * motor.polarity * slip, np.zeros(1)
+        )
+        rest = motor.joint_torque_constant * current - swum.drive_torque
+        load = swum.drive_torque / tail / share + rest / slip
+        across = motor.joint_back_emf_constant * motor.joint_torque_constant / load
+        found = motor.polarity * steady_current(motor, np.zeros_like(load), across) * motor.joint_torque_constant / load
+        pace = found / share / tail
+    return np.where(np.isfinite(pace), pace, 1.0)
 
 
 def _torques_and_powers(
