@@ -234,7 +234,7 @@ def _with_discrepancy(
     advance, turning, motor = off["advance"], off["turning"], off["motor_rate"]
     # A fixed joint turns body and tail alike, and a drive that prescribes the rate is not missed by the model.
     turning = one if batch.joint == "fixed" else turning
-    pace = one
+    pace: Samples = one
     if own_drive and batch.drive == "dc-motor":
         pace = motor * _pace_at(swum, batch, turning) if observed and batch.joint != "fixed" else motor
     tail = values["tail_rotation_rate"] * pace
