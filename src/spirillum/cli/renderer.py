@@ -123,14 +123,14 @@ def progress_bar(*, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=_PACE
     )
     task = bar.add_task("starting", total=None)
-    before = [0, 0]
+    before: list[int | None] = [0, 0]
 
-    def tell(what: str, done: int, total: int) -> None:
+    def tell(what: str, done: int, total: int | None) -> None:
         if what.startswith(lines):
             bar.console.print(what, highlight=False)
-            return
+            what, done, total = "at work", 0, None  # without an end, but with the time that goes by
         bar.start()  # not before there is work: an error in the input leaves nothing on the screen
-        if total != before[1] or done < before[0]:  # other work has another pace
+        if total != before[1] or done < (before[0] or 0):  # other work has another pace
             bar.reset(task)
         before[:] = done, total
         bar.update(task, description=escape(what), completed=done, total=total)
