@@ -150,6 +150,13 @@ def test_sweep_finds_step_out_and_swims_like_the_held_robot_below() -> None:
     np.testing.assert_allclose(back["forward_velocity"], -sweep["forward_velocity"][:2], rtol=0.02)
 
 
+def test_a_sweep_says_that_walls_are_left_out() -> None:
+    channel = {"diameter": "20 mm", "length": "200 mm"}
+    for robot, said in ((sp.load("magnetic-helix", channel=channel), True), (sp.load("magnetic-helix"), False)):
+        sweep = sp.magnetic_sweep(robot, ["0.5 Hz"], turns=4.0, model="rft")
+        assert ("the channel's walls are left out (model 'rft')" in sweep.attrs["warnings"]) is said
+
+
 @pytest.mark.parametrize(
     ("rates", "options", "words"),
     [

@@ -221,6 +221,16 @@ def _unsettled(rates: Samples, settled: Samples, turns: float) -> list[str]:
     ]
 
 
+def _without_walls(held: Prediction) -> list[str]:
+    """A sentence on the walls of a robot's channel, which a sweep leaves out; none without a channel."""
+    if held.robot.channel is None:
+        return []
+    return [
+        f"the channel's walls are left out (model '{held.model.name}'): near them the robot swims otherwise and "
+        "steps out at lower rates, which `spirillum predict` gives with model 'tube'"
+    ]
+
+
 def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: Samples, turns: float) -> xr.Dataset:
     import xarray as xr
 
@@ -261,7 +271,7 @@ def _dataset(held: Prediction, rates: Samples, found: Sequence[_Mean], settled: 
             "known_error": held.known_error,
             "integrator": INTEGRATOR,
             "references": " ".join(held.references),
-            "warnings": "\n".join([*held.robot.warnings, *_unsettled(rates, settled, turns)]),
+            "warnings": "\n".join([*_without_walls(held), *held.robot.warnings, *_unsettled(rates, settled, turns)]),
             "versions": versions(),
         },
     )
