@@ -138,6 +138,15 @@ def test_robot_files_are_made_shown_and_checked(run: Callable[..., Any], tmp_pat
     assert any("did you mean length?" in problem for problem in problems)
 
 
+def test_a_check_says_which_models_have_no_answer(run: Callable[..., Any]) -> None:
+    outcome = run("robot", "check", "biorob2012-wide", "--set", "coupling.length=0mm", "--json")
+    answer = json.loads(outcome.out)
+    assert (outcome.code, answer["valid"]) == (0, True)
+    said = [line.split(":")[0] for line in answer["warnings"] if line.startswith("model")]
+    assert said == [f"model '{name}' has no answer for it" for name in ("slender", "tube")]
+    assert json.loads(run("robot", "check", "biorob2012-wide", "--json").out)["warnings"] == []
+
+
 @pytest.mark.parametrize("name", ["robot", "study", "calibration", "setup"])
 def test_schemas_describe_the_files(run: Callable[..., Any], name: str) -> None:
     schema = json.loads(run("schema", name).out)

@@ -53,8 +53,11 @@ def robot_check(robot: RobotArgument, settings: Settings = None, json: Json = Fa
     """
     from spirillum.cli import renderer
     from spirillum.robot.answer import check_answer, checked
+    from spirillum.swimming.model_choice import models_without_answer
 
     problems, warnings = checked(robot, overrides_from(settings))
+    if not problems:
+        warnings = (*warnings, *models_without_answer(loaded_robot(robot, settings)))
     renderer.show(check_answer(robot, problems, warnings), json=json)
     if problems:
         raise typer.Exit(1)

@@ -13,7 +13,7 @@ from pathlib import Path
 from spirillum.errors import InputError
 from spirillum.fitted.calibration_file import read_calibration
 from spirillum.fitted.posterior_file import PosteriorFile, read_posterior
-from spirillum.fluid.registry import find_swimmer_model
+from spirillum.fluid.registry import SWIMMER_MODELS, find_swimmer_model
 from spirillum.fluid.tube.announced import TABLE_TAKES
 from spirillum.fluid.wire.robot_geometry import RobotGeometry
 from spirillum.robot.batch import RobotBatch
@@ -31,6 +31,7 @@ __all__ = [
     "choose_model",
     "fitted_models",
     "has_table",
+    "models_without_answer",
     "posterior_alone",
     "walls_left_out",
 ]
@@ -137,6 +138,23 @@ def choose_model(
         return ModelChoice(WALLED, "the robot is in a channel, whose walls this model computes")
     caution = walls_left_out(why, among=among)
     return ModelChoice(UNBOUNDED, why.partition(":")[0], caution, outside=bool(outside))
+
+
+def models_without_answer(robot: Robot) -> list[str]:
+    """A sentence on each model whose domain a robot lies outside of, lying level in its channel.
+
+    Args:
+        robot: the robot.
+    """
+    batch = RobotBatch.of(robot)
+    found = []
+    for name, model in SWIMMER_MODELS.items():
+        if model.placed and robot.channel is None:
+            continue
+        outside = broken(requirements(batch, model))
+        if outside:
+            found.append(f"model '{name}' has no answer for it: {outside[0].sentence()}")
+    return found
 
 
 def walls_left_out(why: str, *, among: bool) -> str:
