@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spirillum.vision.track.lost_frames import Reading, Restored, restored_times
+from spirillum.vision.track.multiples import multiples_of
 
 PIXEL, FPS = 2.5e-4, 30.0
 
@@ -141,3 +142,39 @@ def test_a_tail_that_steps_alone_is_not_believed() -> None:
     found, names = restored(time, (Reading(tail % (2 * np.pi), 2 * np.pi, 0.009), *readings[1:]))
     assert names != ["lost-frames"] or found.relative_error > 0
     assert names
+
+
+def many(kind: str) -> list[int]:
+    rng = np.random.default_rng(7)
+    if kind == "doubled":
+        return [k % 2 for k in range(600)]
+    if kind == "tripled":
+        return [int(k % 3 == 0) for k in range(600)]
+    if kind == "half repeated at random":
+        return list(rng.integers(0, 2, 400))
+    return list(np.diff(np.flatnonzero(rng.random(600) < 0.5)))  # half of the pictures of a camera
+
+
+@pytest.mark.parametrize("kind", ["doubled", "tripled", "half repeated at random", "half lost at random"])
+def test_where_most_steps_are_of_several_frames_or_none_nothing_is_given(kind: str) -> None:
+    """There is no usual step to hold them against, and rates are wrong by a factor."""
+    found, names = restored(*repeating(many(kind))[::2])
+    assert names == ["uneven-steps"]
+    assert found.flags[0].spoils
+
+
+@pytest.mark.parametrize("noise", [0.3, 1.0, 3.0, 10.0])
+def test_motors_that_stutter_make_no_multiples(noise: float) -> None:
+    """Rates that change by a third, evenly or at random, and films that are noisy or begin with a rest."""
+    time, _, readings = film(0, 6, noise=noise)
+    rng = np.random.default_rng(8)
+    for off in (0.05 * np.sin(2 * np.pi * time), np.cumsum(0.08 * rng.normal(size=time.size))):
+        tail = readings[0].values + off
+        assert multiples_of(time, tail % (2 * np.pi), 2 * np.pi, 1.0 / FPS) is None
+    for rate in (0.5, 2.0):  # a remote that halves or doubles the rate for a while
+        steps = 2 * np.pi * 1.2 / FPS * np.where((time > 3.0) & (time < 7.0), rate, 1.0)
+        tail = np.cumsum(steps) + 0.03 * noise * rng.normal(size=time.size)
+        assert multiples_of(time, tail % (2 * np.pi), 2 * np.pi, 1.0 / FPS) is None
+    resting = np.where(time < 3.0, readings[0].values[0], readings[0].values)
+    found = multiples_of(time, resting, 2 * np.pi, 1.0 / FPS)
+    assert found is None or found.repeated < 0.1 * found.steps

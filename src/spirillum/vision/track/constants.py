@@ -588,6 +588,26 @@ class LostFramesConstants:
 
 
 @dataclass(frozen=True)
+class MultiplesConstants:
+    """Steps that are multiples of one (`multiples`)."""
+
+    fewest: int = 30
+    """Fewest steps that tell it."""
+    most: float = 12.0
+    """Largest of them over the smallest."""
+    coherent: float = 0.4
+    """Mean cosine of the steps over the smallest one, in turns: 1 where all are multiples, 0 where they are any."""
+    share: float = 0.1
+    """Share of the steps from which on a multiple is frequent."""
+    changing: float = 0.2
+    """Share of the steps that are another multiple than the one before, below which the motor changed its rate."""
+    rest: int = 5
+    """Most steps without motion in a row; beyond it, the robot stands."""
+    largest_share: float = 0.3
+    """Lost or repeated frames over the steps from which on nothing is given: rates may be wrong by a factor."""
+
+
+@dataclass(frozen=True)
 class DirectionConstants:
     """Direction of the channel where no ruler tells it (`direction`)."""
 
@@ -691,6 +711,7 @@ UNWRAPPING = UnwrappingConstants()
 CUTS = CutConstants()
 ELSEWHERE = ElsewhereConstants()
 LOST_FRAMES = LostFramesConstants()
+MULTIPLES = MultiplesConstants()
 DIRECTION = DirectionConstants()
 SWAY = SwayConstants()
 VISIBILITY = VisibilityConstants()

@@ -20,7 +20,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
-from spirillum.vision.track.constants import LOST_FRAMES
+from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
+from spirillum.vision.track.multiples import Multiples, multiples_of
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["Reading", "Restored", "restored_times"]
@@ -97,6 +98,9 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
                 break
     found = _put_back(time, readings, frame, lost, odd) if lost.any() else none
     uneven = any(flag.spoils for flag in found.flags)
+    many = None if uneven else _in_multiples(found.time, readings, frame)
+    if many is not None and max(many.lost, many.repeated) > MULTIPLES.largest_share * many.steps:
+        return none._replace(flags=(_no_usual_step(many),))
     repeats = 0 if uneven else _repeated(found.time, readings, frame)
     change = _change_of_motion(time, readings)
     if change and (uneven or repeats):
@@ -110,6 +114,12 @@ def restored_times(time: Samples, readings: tuple[Reading, ...]) -> Restored:
         return found
     doubt = LOST_FRAMES.repeats_error * repeats * frame / float(found.time[-1] - found.time[0])
     return Restored(found.time, found.relative_error + doubt, (*found.flags, _repeats(repeats, lost.size)))
+
+
+def _in_multiples(time: Samples, readings: tuple[Reading, ...], frame: float) -> Multiples | None:
+    """Of the first series whose steps are multiples of one."""
+    found = (multiples_of(time, reading.values, reading.period, frame) for reading in readings)
+    return next((one for one in found if one is not None), None)
 
 
 def _put_back(
@@ -341,6 +351,20 @@ def _repeats(count: int, steps: int) -> Flag:
         "intervals hold both (record with the camera's own time stamps, at its own frame rate)"
     )
     return Flag("repeated-frames", sentence)
+
+
+def _no_usual_step(many: Multiples) -> Flag:
+    """Nothing is given where most steps are of several frames or of none."""
+    if many.lost > many.repeated:
+        what, wrong = f"some {many.lost} frames were lost between {many.steps} steps", "high"
+    else:
+        what, wrong = f"{many.repeated} of {many.steps} frames repeat the one before", "low"
+    sentence = (
+        f"{what}, although the times of the frames go on evenly: the motion goes on by whole multiples of one step, "
+        f"and the rates may be several times too {wrong}; nothing is given: record with the camera's own time stamps, "
+        "at its own frame rate"
+    )
+    return Flag("uneven-steps", sentence, EVERYTHING)
 
 
 def _stands(first: float, last: float, time: Samples) -> _Change:
