@@ -46,14 +46,17 @@ def test_damaged_files_are_made_again(tmp_path: Path) -> None:
     virtual_experiment(**options)
     folder = tmp_path / "e" / "biorob2012-wide"
     assert virtual_experiment(**options).kept == 1
+    film = (folder / "trial-1.mp4").read_bytes()
     for name, damage in (
-        ("trial-1.mp4", ""),
-        ("trial-1.truth.json", "{"),
-        ("trial-1.truth.nc", "nc"),
-        ("setup.toml", ""),
+        ("trial-1.mp4", b""),
+        ("trial-1.mp4", film[:-100]),
+        ("trial-1.mp4", film + b"more"),
+        ("trial-1.truth.json", b"{"),
+        ("trial-1.truth.nc", b"nc"),
+        ("setup.toml", b""),
     ):
         whole = (folder / name).read_bytes()
-        (folder / name).write_text(damage)
+        (folder / name).write_bytes(damage)
         assert virtual_experiment(**options).kept == 0
         assert (folder / name).read_bytes()[:8] == whole[:8]
     assert virtual_experiment(**options).kept == 1

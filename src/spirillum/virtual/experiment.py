@@ -284,8 +284,8 @@ def _finished(folder: Path, planned: Planned) -> bool:
     known = ["setup.toml"] if is_preset(planned.robot) else ["setup.toml", "robot.toml"]
     try:
         read_json(trial.with_name(f"{trial.name}.truth.json"), "the truth of a trial")
-        begins = {end: _first_bytes(trial.with_name(f"{trial.name}.{end}")) for end in ("mp4", "truth.nc")}
-        whole = begins["mp4"][4:] == b"ftyp" and begins["truth.nc"] == b"\x89HDF\r\n\x1a\n"
+        begins = _first_bytes(trial.with_name(f"{trial.name}.truth.nc"))
+        whole = _is_whole_film(trial.with_name(f"{trial.name}.mp4")) and begins == b"\x89HDF\r\n\x1a\n"
         return whole and all((trial.parent / name).stat().st_size > 0 for name in known)
     except (OSError, ValueError):
         return False
@@ -295,6 +295,23 @@ def _files_of(folder: Path, planned: Planned) -> list[Path]:
     trial = folder / planned.label
     beside = [trial.with_name(f"{trial.name}.{end}") for end in ("mp4", "truth.json", "truth.nc")]
     return [*beside, trial.parent / "setup.toml", trial.parent / "robot.toml"]
+
+
+def _is_whole_film(path: Path) -> bool:
+    """Whether a file is an MP4 film that is not cut off: its boxes, each of which begins with its length, fill it."""
+    size, place, kinds = path.stat().st_size, 0, set()
+    with opened(path, "a film of a trial", sys.maxsize) as file:
+        while place < size:
+            file.seek(place)
+            head = file.read(16)
+            length, kind = int.from_bytes(head[:4], "big"), head[4:8]
+            if length == 1:  # its length follows, in 64 bits
+                length = int.from_bytes(head[8:], "big")
+            if length < len(head[:8]) or len(head) < 8:
+                return False
+            kinds.add(kind)
+            place += length
+    return place == size and {b"ftyp", b"moov", b"mdat"} <= kinds
 
 
 def _first_bytes(path: Path) -> bytes:
