@@ -125,6 +125,30 @@ def test_the_papers_method_says_by_how_much_it_misses(made: Callable[..., Path])
     assert any("misses the body rate by" in warning for warning in found.warnings)
 
 
+def test_trials_that_are_equal_in_every_number_are_named(made: Callable[..., Path], tmp_path: Path) -> None:
+    lines = made(**FOUR, seed=5).read_text().splitlines()
+    header = next(line for line in lines if line.startswith("robot"))
+    place = header.split(",").index("trial")
+    rows = [
+        [cell for n, cell in enumerate(line.split(",")) if n != place] for line in lines if not line.startswith("#")
+    ]
+    copied = tmp_path / "copied.csv"
+    copied.write_text("\n".join(",".join(row) for row in [*rows, rows[1], rows[1]]) + "\n")
+    said = sp.calibrate(copied, WIDE, method="least-squares").warnings
+    assert any(line.startswith("rows 2, 22, 23 are equal in every number: copies of one trial") for line in said)
+
+
+def test_the_mean_of_a_robots_motor_has_the_errors_of_tail_and_body(tmp_path: Path) -> None:
+    names = "channel_diameter_mm,wavelength_mm,amplitude_mm,forward_velocity_mm_s,tail_rate_Hz,body_rate_Hz,trials"
+    file = tmp_path / "means.csv"
+    rows = [f"40,{w},{a},{0.3 * a + 0.01 * w},1.5,-0.067,5,0.02,0.01,0.001" for w in (15, 25) for a in (1.5, 2.5)]
+    file.write_text(
+        "\n".join([f"{names},forward_velocity_mm_s_ci95,tail_rate_Hz_ci95,body_rate_Hz_ci95", *rows]) + "\n"
+    )
+    found = sp.calibrate(file, WIDE, method="least-squares")
+    assert not any("states no error" in line for line in found.warnings)
+
+
 def test_one_tail_alone_is_not_said_to_be_missed(made: Callable[..., Path]) -> None:
     """There the discrepancy is its prior, which says nothing of the model."""
     one = {"wavelengths": (25.0,), "amplitudes": (2.5,), "presets": (WIDE,)}

@@ -85,6 +85,13 @@ def test_one_trial_keeps_the_interval_that_it_states(tmp_path: Path) -> None:
             "motor_rate_Hz: 5, but tail less body rate is 1.1",
         ),
         (
+            [
+                "channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,body_rate_Hz,motor_rate_Hz",
+                "40,25,2.5,1.5,-0.067,1.43",
+            ],
+            "motor_rate_Hz: 1.43 is tail plus body rate; allowed: tail less body rate, 1.567",
+        ),
+        (
             ["channel_diameter_mm,wavelength_mm,amplitude_mm,tail_rate_Hz,tail_rate_Hz_ci95", "40,25,2.5,1,-1"],
             "tail_rate_Hz_ci95",
         ),

@@ -119,6 +119,8 @@ class Experiment:
     """Whether the file says that its numbers were made by a program."""
     outliers: tuple[str, ...] = ()
     """Trials that are far off the others of their tail, a sentence each."""
+    copies: tuple[str, ...] = ()
+    """Trials of one tail that are equal in every number, a sentence each tail."""
 
     @property
     def size(self) -> int:
@@ -196,6 +198,7 @@ def read_experiment(path: str | Path, robots: Sequence[Robot]) -> Experiment:
         source=path.name,
         sha256=hashlib.sha256(read_bytes(path, "an observations file", LARGEST_TABLE)).hexdigest(),
         synthetic="synthetic" in " ".join(comments).lower(),
+        copies=tuple(sentence for group in items for sentence in _copies(group)),
         outliers=outlying_trials(items, [(found.advance.values, found.turning.values) for found in ratios]),
     )
 
@@ -245,6 +248,20 @@ def _check_variety(path: Path, observations: Sequence[Observation]) -> None:
             f"{path}, rows {rows[0].row} to {rows[-1].row}, column forward_velocity_mm_s: all are "
             f"{1e3 * rows[0].forward_velocity:g}; allowed: measured values, which differ"
         )
+
+
+def _copies(items: Sequence[Observation]) -> list[str]:
+    """A sentence on trials of one tail that are equal in every number; none where they differ."""
+    alike: dict[str, list[int]] = {}
+    for item in items:
+        numbers = (item.forward_velocity, item.tail_rate, item.body_rate, item.motor_rate)
+        alike.setdefault(repr(numbers), []).append(item.row)
+    return [
+        f"rows {', '.join(map(str, rows))} are equal in every number: copies of one trial make the scatter of trials, "
+        "and with it all intervals, too small"
+        for rows in alike.values()
+        if len(rows) > 1
+    ]
 
 
 def _check_direction(path: Path, items: Sequence[Observation]) -> None:

@@ -34,6 +34,9 @@ _NEEDED = tuple(_KEYS)
 _WHAT = "an observations file (CSV or Parquet)"
 _LARGEST = 64 << 20
 _CONTRADICTION = 0.2
+"""Largest difference between the motor's rate and tail less body rate, relative."""
+_CONFUSED = 0.25
+"""Distance of a motor's rate from tail plus body rate, over its other distances, below which it is that sum."""
 _LARGEST_NUMBER = 1e6
 _SMALLEST_RATE = 1e-6 * Hz
 
@@ -136,8 +139,8 @@ def _observation(row: Row) -> Observation:
     _check_trial(row)
     a, b, c, d = (_number(row, name, factor, least=0.0) for name, factor in _INTERVALS.items())
     trials = _trials(row)
-    if math.isnan(d) and trials == 1:  # of a trial, whose tail and body are read one by one
-        d = math.hypot(b, c)
+    if math.isnan(d):  # tail and body of a trial are read one by one; over trials they vary together
+        d = math.hypot(b, c) if trials == 1 else b + c
     return Observation(
         row=row.line,
         robot=row.text("robot"),
@@ -167,6 +170,11 @@ def _motor_rate(place: str, tail: float, body: float, motor: float) -> float:
     difference = tail - body
     if math.isnan(motor):
         return difference
+    if abs(tail + body - motor) < _CONFUSED * min(abs(body), abs(difference - motor)):
+        raise InputError(
+            f"{place}, column motor_rate_Hz: {motor / Hz:.4g} is tail plus body rate; allowed: tail less body rate, "
+            f"{difference / Hz:.4g}, for all rates are signed about the same axis"
+        )
     if abs(difference - motor) > _CONTRADICTION * abs(motor):
         raise InputError(
             f"{place}, column motor_rate_Hz: {motor / Hz:.4g}, but tail less body rate is {difference / Hz:.4g}; "
