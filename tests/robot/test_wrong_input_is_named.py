@@ -92,6 +92,7 @@ FIELDS: list[tuple[dict[str, Any], str, str]] = [
     ({"a.b.c.d.e.f.g.h.i.j.k": 1}, "is no field", "tail.wavelength"),
     # what cannot be built or does not fit
     ({"tail.amplitude": "20 mm"}, "tail.amplitude = 20 mm", "less than 19.5 mm"),
+    ({"body.length": "400 mm"}, "body.length = 400 mm", "less than 340 mm"),
     ({"body.diameter": "40 mm"}, "body.diameter = 40 mm", "less than 40 mm"),
     ({"coupling.diameter": "41 mm"}, "coupling.diameter = 41 mm", "less than 40 mm"),
     ({"channel.length": "100 mm"}, "tail.length = 60 mm", "at most 55 mm"),

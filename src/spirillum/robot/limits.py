@@ -133,6 +133,15 @@ def _channel_limits(b: RobotBatch) -> list[Limit]:
             "tail-wider-than-channel",
         ),
         Limit.of(
+            "body.length",
+            b.body_length,
+            "less than",
+            b.channel_length - b.coupling_length,
+            "mm",
+            "body and coupling have to fit into channel.length with a tail behind them",
+            "robot-longer-than-channel",
+        ),
+        Limit.of(
             "tail.length",
             b.tail_length,
             "at most",
