@@ -70,6 +70,18 @@ def test_a_value_taken_out() -> None:
 
 
 @pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        ({"body.mass": "10.7 kg"}, "body.mass = 10.7 kg makes body and coupling 1.27e+06 kg/m^3 dense"),
+        ({"friction.effective": "1e-9 N m s/rad"}, "is less than the rotor's own B_m = 7e-07 N m s/rad"),
+    ],
+)
+def test_numbers_that_no_robot_has_are_doubted(overrides: dict[str, str], said: str) -> None:
+    assert any(said in line for line in load("biorob2012-wide", **overrides).warnings)
+    assert load("biorob2012-wide").warnings == ()
+
+
+@pytest.mark.parametrize(
     ("hand", "polarity", "sign"),
     [("right", "forward", 1), ("left", "forward", -1), ("right", "reverse", -1), ("left", "reverse", 1)],
 )

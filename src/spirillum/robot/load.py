@@ -16,6 +16,7 @@ from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.robot.options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
 from spirillum.robot.robot import Robot
+from spirillum.units import show
 
 __all__ = [
     "PAPER_ROBOTS",
@@ -42,6 +43,8 @@ _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
 _MOST_LAYERS = 8
+_DENSEST = 22590.0
+"""Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
 """Robot files that lie over each other."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
@@ -345,9 +348,34 @@ def _floating(robot: Robot) -> tuple[str, ...]:
     )
 
 
+def _too_dense(robot: Robot) -> tuple[str, ...]:
+    """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
+    if robot.body.mass is None:
+        return ()
+    derived = robot.derived()
+    density = robot.body.mass / (derived["body_volume"].value + derived["coupling_volume"].value)
+    if density <= _DENSEST:
+        return ()
+    return (
+        f"body.mass = {show(robot.body.mass, 'kg')} makes body and coupling {density:.3g} kg/m^3 dense on average; the "
+        f"densest metal has {_DENSEST:.4g}",
+    )
+
+
+def _too_smooth(robot: Robot) -> tuple[str, ...]:
+    """Warn of an effective friction below the rotor's own, which it contains (18)."""
+    own, whole = None if robot.motor is None else robot.motor.joint_rotor_friction, robot.friction.effective
+    if own is None or whole is None or whole >= own:
+        return ()
+    return (
+        f"friction.effective = {show(whole, 'N m s/rad')} is less than the rotor's own B_m = {show(own, 'N m s/rad')}, "
+        "which it contains",
+    )
+
+
 def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> Robot:
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
-        problems._warnings = (*warnings, *_floating(problems))  # noqa: SLF001 - it is the loader's to set
+        problems._warnings = (*warnings, *_floating(problems), *_too_dense(problems), *_too_smooth(problems))  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)
