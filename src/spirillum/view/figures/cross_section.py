@@ -77,4 +77,4 @@ def draw_cross_section(axes: Axes, dataset: xr.Dataset, robot: Robot, path: Samp
     axes.grid(visible=False)
     axes.set_xlabel(f"$y$ ({lengths.unit})")
     axes.set_ylabel(f"$z$ ({lengths.unit})")
-    axes.set_title("from the front; start dashed", loc="right", pad=3, size=8, color="#555555")
+    axes.set_title("from the front; start dashed, end grey", loc="right", pad=3, size=8, color="#555555")

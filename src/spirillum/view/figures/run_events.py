@@ -19,8 +19,8 @@ __all__ = ["event_words", "events_of", "mark_events"]
 
 _MOST_EVENTS = 12
 """Events that are named."""
-_CROWDED = 0.05
-"""Distance of events over that of the axis below which they share a label."""
+_WIDE = (0.04, 0.08)
+"""Width of a label with one number and with two, over that of the axis: events without room share one."""
 _LETTER = 0.07
 """Share of a time axis above which the panel's letter stands."""
 
@@ -43,7 +43,7 @@ def events_of(dataset: xr.Dataset, time: Samples) -> list[tuple[float, str]]:
 
 def event_words(events: list[tuple[float, str]]) -> list[str]:
     """The events of `events_of` by number, in one note; none where there are none."""
-    words = [f"{number}: {what} ({when:.4g} s)" for number, (when, what) in enumerate(events[:_MOST_EVENTS], 1)]
+    words = [f"{number}: {what} ({when:.4g}\u00a0s)" for number, (when, what) in enumerate(events[:_MOST_EVENTS], 1)]
     if len(events) > _MOST_EVENTS:
         words.append(f"and {len(events) - _MOST_EVENTS} more")
     return [" · ".join(words)] if words else []
@@ -54,27 +54,35 @@ def mark_events(axes: Axes, events: list[tuple[float, str]], time: Samples, *, n
     first, span = float(time[0]), float(time[-1] - time[0])
     for when, _ in events:
         axes.axvline(when, color="#777777", linewidth=0.8, dashes=(3, 2), zorder=1)
-    for numbers in _close_together(events[:_MOST_EVENTS], span) if numbered else []:
-        middle = float(np.mean([events[number][0] for number in numbers]))
-        beside_letter = first + _LETTER * span
+    places = [(when - first) / span for when, _ in events[:_MOST_EVENTS]]
+    for numbers in _close_together(places) if numbered else []:
+        left = _left_end([places[number] for number in numbers])
         axes.annotate(
             str(numbers[0] + 1) if len(numbers) == 1 else f"{numbers[0] + 1}\u2013{numbers[-1] + 1}",
-            (max(middle, beside_letter), 1.0),
+            (first + (left + 0.5 * _WIDE[len(numbers) > 1]) * span, 1.0),
             xycoords=axes.get_xaxis_transform(),
             xytext=(0, 2),
             textcoords="offset points",
-            ha="center" if middle > beside_letter + 0.02 * span else "left",
+            ha="center",
             size=7,
             color="#555555",
         )
 
 
-def _close_together(events: list[tuple[float, str]], span: float) -> list[list[int]]:
+def _left_end(places: list[float]) -> float:
+    """Where the label of events begins that lie at these shares of the axis: beside the panel's letter at the least."""
+    return max(float(np.mean(places)) - 0.5 * _WIDE[len(places) > 1], _LETTER)
+
+
+def _close_together(places: list[float]) -> list[list[int]]:
     """Numbers of the events from 0, those together that have no room for a label each."""
     found: list[list[int]] = []
-    for number, (when, _) in enumerate(events):
-        if found and when - events[found[-1][0]][0] < _CROWDED * span:
-            found[-1].append(number)
-        else:
-            found.append([number])
+    for number in range(len(places)):
+        found.append([number])
+        while len(found) > 1:
+            before, after = ([places[one] for one in group] for group in found[-2:])
+            if _left_end(before) + _WIDE[len(before) > 1] <= _left_end(after):
+                break
+            last = found.pop()
+            found[-1] += last
     return found
