@@ -102,7 +102,7 @@ def test_time_axis_is_shared_and_spans_the_run(run: Any) -> None:
 @pytest.mark.usefixtures("unplaced")
 def test_events_are_marked_and_named(run: Any) -> None:
     figure = trajectory_figure(run)
-    words = " ".join(text.get_text() for text in figure.findobj(Text))
+    words = " ".join(text.get_text() for text in figure.findobj(Text)).replace("\u00a0", " ")
     assert "1: motor off (1 s)" in words
     assert "after the end" not in words
     assert "computed, nothing is measured" in words

@@ -16,6 +16,8 @@ from spirillum.view.figures.style import COLOURS, PAGE, Scale, plain, styled
 
 __all__ = ["settling_figure"]
 
+_SHORT = 0.2
+"""Time constant over the length of the run above which the way does not reach the steady motion."""
 _TILTS = {"pitch": "green", "yaw": "purple"}
 """Angles of the tilt, and their colours."""
 
@@ -38,6 +40,7 @@ def settling_figure(settling: Settling) -> Figure:
             columns=3,
             sharey=False,
             legend=_legend(settling),
+            notes=_notes(settling),
         )
         panels = sheet.panels[0]
         add_letters(panels)
@@ -45,6 +48,17 @@ def settling_figure(settling: Settling) -> Figure:
         _azimuth(panels[1], settling)
         _tilt(panels[2], settling)
         return sheet.finished()
+
+
+def _notes(settling: Settling) -> list[str]:
+    """That the way ends before the steady motion, where it does."""
+    slow, end = settling.lying.approach_time, float(settling.way("time")[-1])
+    if settling.lying.state != "steady" or not slow > _SHORT * end:
+        return []
+    return [
+        f"The run ends at {end:.3g} s; the rest of the way to the steady motion, which is solved for, decays with a "
+        f"time constant of {slow:.3g} s."
+    ]
 
 
 def _gap(axes: Axes, settling: Settling) -> None:
