@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from spirillum.view.figures.settling import settling_figure
 
@@ -18,7 +19,7 @@ WAY = {
 }
 
 
-def settling(state: str) -> Any:
+def settling(state: str, slow: float = 65.0) -> Any:
     """A made-up way in the place of an answer."""
     return SimpleNamespace(
         robot=SimpleNamespace(name="a robot with $ in its name"),
@@ -26,7 +27,7 @@ def settling(state: str) -> Any:
         weight=0.028,
         roughness=1e-6,
         friction_coefficient=0.1,
-        lying=SimpleNamespace(state=state, gap=6e-7, azimuth=-0.1, pitch=0.001, yaw=-0.03),
+        lying=SimpleNamespace(state=state, gap=6e-7, azimuth=-0.1, pitch=0.001, yaw=-0.03, approach_time=slow),
         way=WAY.__getitem__,
     )
 
@@ -48,3 +49,14 @@ def test_panels_show_gap_azimuth_and_tilt() -> None:
 def test_no_place_is_drawn_where_none_was_found() -> None:
     gap, azimuth, tilt = settling_figure(settling("changing")).axes
     assert [len(panel.lines) for panel in (gap, azimuth, tilt)] == [1, 1, 2]
+
+
+@pytest.mark.usefixtures("unplaced")
+def test_a_way_that_ends_before_the_steady_motion_is_said_to() -> None:
+    for made, said in (
+        (settling("steady"), True),
+        (settling("steady", 2.0), False),
+        (settling("drains", np.nan), False),
+    ):
+        words = " ".join(text.get_text() for text in settling_figure(made).findobj(Text))
+        assert ("The run ends at 30 s; the rest of the way" in words.replace("\n", " ")) is said
