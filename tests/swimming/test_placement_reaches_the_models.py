@@ -45,6 +45,7 @@ def test_a_tail_at_rest_is_carried_by_a_flow(walled: Any) -> None:
 def test_fast_flow_warns(walled: Any) -> None:
     answer = sp.predict(WIDE, model="walled", tail_rate="1 Hz", placement={"flow": "-50 mm/s"}, band=False)
     assert any("Reynolds number (imposed flow, body diameter) = 0.25" in sentence for sentence in answer.warnings)
+    assert any("the imposed flow does work on the robot too" in sentence for sentence in answer.warnings)
 
 
 def test_resistance(walled: Any) -> None:

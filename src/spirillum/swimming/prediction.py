@@ -178,6 +178,10 @@ class Prediction(Shown):
 
 
 _QUANTITIES: dict[str, tuple[str, str]] = {item.name: (item.unit, item.meaning) for item in STEADY}
+_IN_A_FLOW = (
+    "the imposed flow does work on the robot too: efficiencies and cost of transport are of its velocity in the lab, "
+    "and do not compare with those of a robot in fluid at rest"
+)
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
     "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
@@ -355,6 +359,7 @@ class _Case:
             *(limit.sentence() for limit in broken(accuracy_limits(self.batch, self.model, result))),
             *drive_warnings(known, self.model, self.friction, result, self.rate),
             *_free_warnings(self.robot, self.motion),
+            *([_IN_A_FLOW] if self.batch.placement.flow else []),
         ]
 
     def fitted_warnings(self) -> list[str]:
