@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 import spirillum as sp
+from spirillum.papers.biorob2012.study import paper_study
+from spirillum.papers.studies import study_of
 
 GRID = '[grid]\nwavelengths = ["20 mm"]\namplitudes = ["2 mm"]\n[grid.channels]\nwide = "biorob2012-wide"\n'
 
@@ -71,3 +73,9 @@ def test_observations_have_to_belong_to_the_study(small: dict[str, object], tmp_
     path.write_text(header + "40,25,2.5,-1\n")
     with pytest.raises(sp.InputError, match="row 2, column tail_rate_Hz: -1; allowed: positive"):
         sp.study(small, observations=path)
+
+
+def test_a_papers_study_goes_by_its_name() -> None:
+    assert study_of(None) == study_of("biorob2012") == paper_study()
+    assert study_of("biorob2012.toml") == "biorob2012.toml"
+    assert study_of({"robots": []}) == {"robots": []}

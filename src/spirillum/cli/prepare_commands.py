@@ -33,7 +33,7 @@ def prepare(
     """
     from spirillum.cli import renderer
     from spirillum.errors import InputError
-    from spirillum.papers.biorob2012.study import paper_study
+    from spirillum.papers.studies import study_of
     from spirillum.studies.loading import load_study
     from spirillum.swimming.preparation import preparations_answer, prepare_all
 
@@ -41,7 +41,7 @@ def prepare(
         raise InputError("no robot; allowed: a preset's name or a robot file, several of them, or --study FILE")
     asked = [loaded_robot(robot, settings) for robot in robots or []]
     if study is not None:
-        loaded = load_study(paper_study() if study == "biorob2012" else study, overrides_from(settings))
+        loaded = load_study(study_of(study), overrides_from(settings))
         asked += [loaded.robot_at(index) for index in range(loaded.count)]
     with renderer.progress_bar(quiet=json) as progress:
         found = prepare_all(asked, workers=workers, progress=progress)

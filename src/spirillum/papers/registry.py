@@ -1,7 +1,7 @@
 """Papers by the name that a study file gives as `claims`.
 
-A new paper is a folder beside `biorob2012`, one entry of `_PAPERS`, and its name in
-`spirillum.studies.spec.Study.claims`.
+A new paper is a folder beside `biorob2012`, one entry of `_PAPERS` and of `_STUDIES` in `spirillum.papers.studies`, and
+its name in `spirillum.studies.spec.Study.claims`.
 """
 
 from __future__ import annotations

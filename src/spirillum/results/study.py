@@ -13,8 +13,8 @@ from spirillum.answer import envelope
 from spirillum.crews import checked_crew
 from spirillum.errors import InputError
 from spirillum.files import output_folder, protected, results_folder, write_dataset
-from spirillum.papers.biorob2012.study import paper_study
 from spirillum.papers.registry import claims_of, predictions_of
+from spirillum.papers.studies import study_of
 from spirillum.results.study_report import write_report
 from spirillum.results.study_store import stored_study
 from spirillum.studies.dataset import read_dataset
@@ -52,7 +52,8 @@ def study(  # noqa: PLR0913 - the options of the command
     """Run a study of many robots.
 
     Args:
-        source: study file (see `spirillum schema study`) or its tables; None: the paper's study.
+        source: study file (see `spirillum schema study`) or its tables, or a paper's name; None: the study of
+            `biorob2012`.
         observations: observations file; the study then also runs at the observed rates and infers B_eff.
         output: folder for `dataset.nc`, `figures/`, `report.html`, `claims.json` and `ranking.csv`; a rerun resumes
             there.
@@ -86,9 +87,8 @@ def study(  # noqa: PLR0913 - the options of the command
     crew = checked_crew(1, workers) if isinstance(workers, str) else checked_crew(workers, None)
     if store is not None and output is not None:
         raise InputError(f"store = {str(store)[:80]!r} together with a folder for results; allowed: one of them")
-    question = paper_study() if source is None else source
     loaded = load_study(
-        question,
+        study_of(source),
         overrides,
         models=models,
         band=band,

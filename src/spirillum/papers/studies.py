@@ -1,0 +1,26 @@
+"""Studies of papers by the paper's name, as tables of a study file; apart from `registry`, which loads figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from spirillum.papers.biorob2012.study import paper_study
+
+__all__ = ["study_of"]
+
+_STUDIES: dict[str, Callable[[], dict[str, Any]]] = {"biorob2012": paper_study}
+
+
+def study_of(source: str | Path | Mapping[str, Any] | None) -> str | Path | Mapping[str, Any]:
+    """What a study is read from.
+
+    Args:
+        source: a study file or its tables, which come back as they are; a paper's name; or None: the study of the first
+            paper.
+    """
+    if source is None:
+        return next(iter(_STUDIES.values()))()
+    named = _STUDIES.get(source) if isinstance(source, str) else None
+    return source if named is None else named()
