@@ -13,6 +13,7 @@ from spirillum.shown import rows_of
 from spirillum.units import display_unit, in_unit
 
 __all__ = [
+    "LAID_DOWN",
     "Answer",
     "add_bands",
     "add_quantities",
@@ -57,8 +58,8 @@ def add_bands(table: Table, items: Mapping[str, Any], only: Iterable[str] | None
         table.add_row(row.name, row.value, row.low or "-", row.high or "-", row.unit)
 
 
-def show_placement(placement: Answer, console: Console) -> None:
-    """Where the model places the robot, unless nothing is around it."""
+def show_placement(placement: Answer, console: Console, head: str = "placement") -> None:
+    """Where the model places the robot, unless nothing is around it; `head` begins the line."""
     if len(placement) == 1:
         return
     said = [escape(str(placement["kind"]))]
@@ -68,7 +69,11 @@ def show_placement(placement: Answer, console: Console) -> None:
             said.append(f"{name.replace('_', ' ')} {value} {unit}".rstrip() + _band_words(item))
         elif name != "kind" and isinstance(item, str):
             said.append(f"{name.replace('_', ' ')} {escape(str(item))}")
-    console.print(f"placement: {', '.join(said)}", highlight=False, soft_wrap=True)
+    console.print(f"{head}: {', '.join(said)}", highlight=False, soft_wrap=True)
+
+
+LAID_DOWN = "laid down"
+"""Head of the line on the placement of a robot that is let go there."""
 
 
 def show_unsteady(answer: Answer, console: Console) -> None:
@@ -78,14 +83,14 @@ def show_unsteady(answer: Answer, console: Console) -> None:
 
 
 def show_lying(lying: Answer, console: Console) -> None:
-    """Where a free robot comes to lie."""
+    """How a free robot moves in the end; the line before it says where it was laid down."""
     said = []
     for name, item in lying.items():
         if name != "followed_time" and isinstance(item, Mapping) and item["value"] not in (None, 0.0):
             value = " ".join(friendly(item["value"], item["unit"]))
             said.append(f"{_WORDS.get(name, name.replace('_', ' '))} {value}{_range_words(item)}".rstrip())
     time = " ".join(friendly(lying["followed_time"]["value"], lying["followed_time"]["unit"]))
-    words = f"laid down there and followed for {time}, {_STATES[lying['state']]}: {', '.join(said)}"
+    words = f"{_STATES[lying['state']].format(time=time)}: {', '.join(said)}"
     console.print(words, highlight=False, soft_wrap=True)
 
 
@@ -94,10 +99,10 @@ _WORDS = {
     "contact_force": "borne by asperities with a contact force of",
 }
 _STATES = {
-    "steady": "from where its steady motion was solved for",
-    "orbits": "from where its orbit around the tube's axis was solved for",
-    "goes around": "until it had gone around the tube",
-    "changing": "and still changing",
+    "steady": "steady motion, solved for after {time} of its run",
+    "orbits": "orbit around the tube's axis, solved for after {time} of its run",
+    "goes around": "goes around the tube, followed for {time}",
+    "changing": "still changing after {time}, in its last turn",
 }
 
 

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import (
+    LAID_DOWN,
     Answer,
     add_bands,
     add_quantities,
@@ -39,7 +40,7 @@ def table(answer: Answer, console: Console, *, all_of_it: bool = False) -> None:
     more = len(rows_of(answer)) - rows.row_count
     if more:
         console.print(f"and {more} more quantities: --all", highlight=False)
-    show_placement(answer["placement"], console)
+    show_placement(answer["placement"], console, LAID_DOWN if "lying" in answer else "placement")
     if "lying" in answer:
         show_lying(answer["lying"], console)
     show_reason(answer, console)

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from spirillum.cli.tables.parts import (
+    LAID_DOWN,
     Answer,
     add_quantities,
     grid,
@@ -30,7 +31,7 @@ def table(answer: Answer, console: Console) -> None:
     rows = grid(f"{answer['robot']}: settling in its tube", "quantity", "value", "unit", "SI")
     add_quantities(rows, {name: item for name, item in answer.items() if name != "error_estimate"})
     console.print(rows)
-    show_placement(answer["placement"], console)
+    show_placement(answer["placement"], console, LAID_DOWN)
     show_lying(answer["lying"], console)
     drainage = answer["drainage_time"]
     if drainage["value"] is not None:
