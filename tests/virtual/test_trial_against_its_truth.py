@@ -313,3 +313,12 @@ def test_an_interrupted_trial_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         render(ROBOT, tmp_path / "frames", **SMALL, progress=interrupt)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_seed_of_which_nothing_is_drawn_is_said_to_change_nothing(tmp_path: Path) -> None:
+    short = {"trial": {"duration": "0.1 s"}, "camera": {"size": "320x240"}}
+    for number, (more, said) in enumerate(
+        (({"seed": 3}, True), ({"seed": 3, "degradation": {"noise": 2.0}}, False), ({}, False))
+    ):
+        found = sp.render("biorob2012-wide", tmp_path / f"{number}.mp4", **short, **more)
+        assert any(line.startswith("seed = 3 changes nothing") for line in found.warnings) is said

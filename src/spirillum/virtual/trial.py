@@ -189,7 +189,7 @@ def render(
         size=camera.size,
         fps=camera.fps,
         seed=seed,
-        warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens)),
+        warnings=(*shown.warnings, *out_of_picture(trajectory, robot, lens), *_idle_seed(seed, degradation, troubles)),
     )
     tags = {"title": f"{robot.name}, synthetic", "comment": SYNTHETIC}
     attributes = {"title": tags["title"], "synthetic": "yes", "robot": robot.name}
@@ -217,6 +217,17 @@ def render(
         _write_frames(writer, frames, (kept, counted), camera.fps, tell)
         tell("render: writing", len(kept), len(kept))
     return written
+
+
+def _idle_seed(seed: int, degradation: Degradation, troubles: Troubles) -> list[str]:
+    """A sentence on a seed of a film of which nothing is drawn at random; none without a seed."""
+    plain = Degradation(crf=degradation.crf)
+    if not seed or degradation != plain or troubles != Troubles():
+        return []
+    return [
+        f"seed = {seed} changes nothing: nothing of this film is drawn at random, and films of other seeds are its "
+        "copies; a degradation (noise, bubbles, ...) or a trouble is drawn from it"
+    ]
 
 
 def _stated_height(height: float, error: float, surface: float) -> float:
