@@ -76,6 +76,6 @@ def test_observations_have_to_belong_to_the_study(small: dict[str, object], tmp_
 
 
 def test_a_papers_study_goes_by_its_name() -> None:
-    assert study_of(None) == study_of("biorob2012") == paper_study()
+    assert study_of(None) == study_of("biorob2012") == study_of(Path("biorob2012")) == paper_study()
     assert study_of("biorob2012.toml") == "biorob2012.toml"
     assert study_of({"robots": []}) == {"robots": []}

@@ -276,7 +276,7 @@ def resistance(
 
 def study(
     context: typer.Context,
-    source: Annotated[Path | None, typer.Argument(help="Study file (TOML); without one, the paper's study.")] = None,
+    source: Annotated[Path | None, typer.Argument(help="A study file, or a paper's name; else biorob2012.")] = None,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", metavar="DIR", help="Folder for the results; else spirillum-study."),

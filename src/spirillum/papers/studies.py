@@ -22,5 +22,5 @@ def study_of(source: str | Path | Mapping[str, Any] | None) -> str | Path | Mapp
     """
     if source is None:
         return next(iter(_STUDIES.values()))()
-    named = _STUDIES.get(source) if isinstance(source, str) else None
+    named = None if isinstance(source, Mapping) else _STUDIES.get(str(source))
     return source if named is None else named()
