@@ -42,6 +42,13 @@ def test_a_tail_at_rest_is_carried_by_a_flow(walled: Any) -> None:
     assert "a tail at rest drives nothing" in refused(lambda: sp.predict(WIDE, model="walled", tail_rate=0.0))
 
 
+def test_a_robot_without_weight_is_not_known_to_lie_on_the_floor(walled: Any) -> None:
+    light = sp.load(WIDE, **{"body.mass": None})
+    for robot, placement, said in ((light, None, True), (light, {"gap": "1 mm"}, False), (sp.load(WIDE), None, False)):
+        answer = sp.predict(robot, model="walled", tail_rate="1 Hz", placement=placement, band=False)
+        assert any("nothing tells that its weight keeps" in sentence for sentence in answer.warnings) is said
+
+
 def test_fast_flow_warns(walled: Any) -> None:
     answer = sp.predict(WIDE, model="walled", tail_rate="1 Hz", placement={"flow": "-50 mm/s"}, band=False)
     assert any("Reynolds number (imposed flow, body diameter) = 0.25" in sentence for sentence in answer.warnings)

@@ -182,6 +182,10 @@ _IN_A_FLOW = (
     "the imposed flow does work on the robot too: efficiencies and cost of transport are of its velocity in the lab, "
     "and do not compare with those of a robot in fluid at rest"
 )
+_NO_WEIGHT = (
+    "body.mass or tail.density is unset: nothing tells that its weight keeps the robot on the floor, where it is taken "
+    "to lie; allowed: both of them, or its place (--gap, --eccentricity)"
+)
 _MORE = {
     "reynolds_number": {"length": "body diameter"},
     "tail_reynolds_number": {"length": "tail amplitude", "velocity": "rotation rate times amplitude"},
@@ -360,7 +364,14 @@ class _Case:
             *drive_warnings(known, self.model, self.friction, result, self.rate),
             *_free_warnings(self.robot, self.motion),
             *([_IN_A_FLOW] if self.batch.placement.flow else []),
+            *([_NO_WEIGHT] if self.model.placed and not self.has_weight_or_place() else []),
         ]
+
+    def has_weight_or_place(self) -> bool:
+        """Whether it is known that the robot's weight keeps it on the floor, or where else it is."""
+        place = self.batch.placement
+        known = "submerged_weight" in self.robot.derived()
+        return known or place.gap is not None or place.eccentricity is not None
 
     def fitted_warnings(self) -> list[str]:
         """What to be careful about in what was fitted."""
