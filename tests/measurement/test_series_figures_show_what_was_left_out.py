@@ -25,17 +25,14 @@ def test_the_first_frames_of_a_film_that_is_ahead_are_grey(
         track = replace(track, position=position, tail_phase=tail)
     assert (without_lead(track) is not track) is ahead
     axes = trial_figure(trial_of(track, robot)).axes
-    assert ("grey: left out" in axes[0].get_title(loc="left")) is ahead
-    words = [text.get_text() for text in axes[0].get_legend().get_texts()] if axes[0].get_legend() else []
-    assert words == (["left out: start of a compressed film, ahead of the rest"] if ahead else [])
+    assert ("\ngrey, left out: first frames" in axes[0].get_title(loc="left")) is ahead
     grey = next(line for line in axes[0].lines if line.get_color() == "#999999")
     assert np.isfinite(np.asarray(grey.get_ydata(), dtype=float)).sum() == (6 if ahead else 0)
 
 
-def test_stray_frames_have_a_legend_of_their_own(make_track: Callable[..., Track], robot: Any) -> None:
+def test_stray_frames_are_named(make_track: Callable[..., Track], robot: Any) -> None:
     track = make_track(span=3.0)
     position = track.position.copy()
     position[40, 0] += 5e-3
-    legend = trial_figure(trial_of(replace(track, position=position), robot)).axes[0].get_legend()
-    assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["left out: stray frames"]
+    title = trial_figure(trial_of(replace(track, position=position), robot)).axes[0].get_title(loc="left")
+    assert title.endswith("\ngrey, left out: stray frames")

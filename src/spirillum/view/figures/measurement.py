@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from spirillum.arrays import Samples
@@ -74,9 +73,7 @@ def trial_figure(trial: Trial) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel("time, s")
     left_out = {name: _left_out(values[name], trial.fits[name]) for name, _, _ in _SERIES}
-    grey = any(out.any() for out in left_out.values())
-    panels[0][0].set_title(f"measured{' (grey: left out)' if grey else ''}, with the fitted line", loc="left")
-    _why_left_out(panels[0][0], list(left_out.values()), rising=trial.fits["forward_velocity"].value > 0)
+    panels[0][0].set_title(f"measured, with the fitted line{_why_left_out(list(left_out.values()))}", loc="left")
     panels[0][1].set_title("residuals", loc="left")
     _say_synthetic(figure, synthetic=trial.synthetic)
     figure.align_ylabels()
@@ -124,15 +121,12 @@ def _left_out(values: Samples, rate: Rate) -> np.ndarray:
     return np.isfinite(values) & ~np.isfinite(rate.residual)
 
 
-def _why_left_out(axes: Axes, left_out: Sequence[np.ndarray], *, rising: bool) -> None:
-    """A legend of the grey dots: the first frames of a compressed film, which are left out together, and stray ones."""
+def _why_left_out(left_out: Sequence[np.ndarray]) -> str:
+    """What the grey dots are: the first frames of a compressed film, which are left out together, and stray ones."""
     lead = any(out.size > LEADING and out[:LEADING].all() for out in left_out)
     stray = any(out[LEADING if lead else 0 :].any() for out in left_out)
-    words = ["left out: start of a compressed film, ahead of the rest"] if lead else []
-    words += ["left out: stray frames"] if stray else []
-    if words:
-        dots = [Line2D([], [], color=_LEFT_OUT, marker=".", linestyle="none", label=text) for text in words]
-        axes.legend(handles=dots, loc="lower right" if rising else "upper right", fontsize=7.0, handletextpad=0.1)
+    words = [*(["first"] if lead else []), *(["stray"] if stray else [])]
+    return f"\ngrey, left out: {' and '.join(words)} frames" if words else ""
 
 
 def trials_figure(measurement: Measurement) -> Figure:
