@@ -98,7 +98,7 @@ def test_a_robot_that_sinks_is_said_to_and_its_speed_is_that_of_the_reynolds_num
     fastest = float(np.linalg.norm(run["velocity"].values, axis=-1).max())
     number = 985 * fastest * 18e-3 / 3.5
     assert number > 0.1
-    assert f"{1e3 * fastest:.4g} mm/s) = {number:.4g}; allowed: at most 0.1" in said
+    assert f"{1e3 * fastest:.4g} mm/s) = {number:.4g}; accurate: at most 0.1" in said
     late = run.isel(time=slice(run.sizes["time"] // 3, None))
     sinking = float(late["position"][0, 2] - late["position"][-1, 2]) / float(late["time"][-1] - late["time"][0])
     assert f"it sinks at {1e3 * sinking:.4g} mm/s" in said

@@ -31,7 +31,7 @@ def answer() -> Any:
 def test_an_answer_nearer_to_the_glass_than_its_table_was_checked_says_so() -> None:
     near, far = (sp.predict(WIDE, placement={"gap": gap, "pitch": "0 deg"}) for gap in ("0.05 mm", "0.3 mm"))
     assert any(
-        words.startswith("gap = 0.05 mm; allowed: at least 0.288 mm, because the table") for words in near.warnings
+        words.startswith("gap = 0.05 mm; accurate: at least 0.288 mm, because the table") for words in near.warnings
     )
     assert not any("the table was checked" in words for words in far.warnings)
 
@@ -41,7 +41,7 @@ def test_an_answer_beyond_the_yaws_at_which_its_table_was_checked_says_so_and_ha
     near, far = (
         sp.predict(NARROW, placement={"gap": "0.3 mm", "pitch": "0 deg", "yaw": yaw}) for yaw in ("7.1 deg", "6 deg")
     )
-    assert any(words.startswith("yaw = 7.1 deg; allowed: at most 6.8") for words in near.warnings)
+    assert any(words.startswith("yaw = 7.1 deg; accurate: at most 6.8") for words in near.warnings)
     assert not any(words.startswith("yaw") for words in far.warnings)
     assert near.to_dict(others=False).get("error_estimate", {}).get("value") is None
     with pytest.raises(InputError, match=r"clearance of tail and glass .* allowed: at least 0"):

@@ -244,7 +244,7 @@ def _of_the_way(dataset: xr.Dataset, steady: Prediction) -> list[str]:
     drift = vertical_drift(dataset)
     velocity = dataset["velocity"].values
     limits = [speed_limit(steady.batch, float(np.linalg.norm(velocity, axis=-1).max()))]
-    return [*([] if drift is None else [drift]), *(limit.sentence() for limit in broken(limits))]
+    return [*([] if drift is None else [drift]), *(limit.caution() for limit in broken(limits))]
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:

@@ -81,7 +81,7 @@ def run_in_tube(
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
     if asked.flow is not None:
         said += [
-            limit.sentence() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])
+            limit.caution() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])
         ]
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():

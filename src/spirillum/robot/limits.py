@@ -66,6 +66,10 @@ class Limit:
             holds = np.abs(value - limit) <= slack
         return cls(field, value, relation, limit, unit, why, holds, flag)
 
+    def caution(self, index: int = 0) -> str:
+        """The requirement in words where an answer is given although it is broken, for robot number `index`."""
+        return self.sentence(index).replace("; allowed: ", "; accurate: ", 1)
+
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))

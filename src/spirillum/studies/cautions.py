@@ -56,7 +56,7 @@ def cautions(task: Task, part: Part) -> list[Caution]:
         holds = np.broadcast_to(limit.holds, (size,)) | np.isnan(np.broadcast_to(limit.value, (size,)))
         count = int(np.count_nonzero(~holds))
         if count:
-            found.append(Caution(task.model, limit.flag, count, limit.sentence(int(np.argmin(holds)))))
+            found.append(Caution(task.model, limit.flag, count, limit.caution(int(np.argmin(holds)))))
     return found
 
 

@@ -360,7 +360,7 @@ class _Case:
         known = self.robot if names_friction or not self.rate else _without_fitted_friction(self.robot)
         return [
             *(calibration_warnings(self.robot, self.model.name) if self.calibrated else ()),
-            *(limit.sentence() for limit in broken(accuracy_limits(self.batch, self.model, result))),
+            *(limit.caution() for limit in broken(accuracy_limits(self.batch, self.model, result))),
             *drive_warnings(known, self.model, self.friction, result, self.rate),
             *_free_warnings(self.robot, self.motion),
             *([_IN_A_FLOW] if self.batch.placement.flow else []),
