@@ -17,7 +17,7 @@ from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec, TypeVar, get_args, get_origin
 
 from spirillum.errors import InputError, clipped, did_you_mean
-from spirillum.scalars import is_number, is_whole
+from spirillum.scalars import is_number, is_true_or_false, is_whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,10 +41,6 @@ class _Kind(NamedTuple):
     """Kinds of the items of a list; empty: any."""
 
 
-def _is_true_or_false(value: Any) -> bool:
-    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
-
-
 def _is_list(value: Any) -> bool:
     """Several values whose number is known, but no text, no mapping, and no array of one value without a length."""
     return (
@@ -61,7 +57,7 @@ _BASIC = {
     "Path": _Kind("a path", lambda value: isinstance(value, os.PathLike)),
     "int": _Kind("a whole number", is_whole),
     "float": _Kind("a number", is_number),
-    "bool": _Kind("True or False", _is_true_or_false),
+    "bool": _Kind("True or False", is_true_or_false),
     "None": _Kind("None", lambda value: value is None),
     "Mapping": _Kind("a mapping of names", _is_named),
     "Callable": _Kind("a function", callable),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from numbers import Integral, Real
 from typing import Any, TypeGuard
 
-__all__ = ["is_number", "is_whole"]
+__all__ = ["is_number", "is_true_or_false", "is_whole"]
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -18,5 +18,10 @@ def is_whole(value: Any) -> TypeGuard[int]:
     return isinstance(value, Integral) and not _is_another_kind(value)
 
 
+def is_true_or_false(value: Any) -> bool:
+    """Whether a value is True or False of Python or NumPy."""
+    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
+
+
 def _is_another_kind(value: Any) -> bool:
-    return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_", "timedelta64")
+    return is_true_or_false(value) or type(value).__name__ == "timedelta64"

@@ -173,8 +173,8 @@ def control(
     run = run_job(job, actual, drawn, learner, senses=senses, pace=pace, progress=progress)
     scores, cut_short = (None, []) if run.interrupted or not seeds else _scores(job, seeds, workers, progress)
     dataset = _dataset(job, run, actual)
-    drift = None if actual.model == "tube" else vertical_drift(dataset)
-    warnings = (*actual.warnings, *([] if drift is None else [drift]), *cautions, *cut_short, *_warnings_of(run, lab))
+    drift = [] if actual.model == "tube" else vertical_drift(dataset)
+    warnings = (*actual.warnings, *drift, *cautions, *cut_short, *_warnings_of(run, lab))
     return Control(
         robot=robot,
         model=actual.model,

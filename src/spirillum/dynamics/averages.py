@@ -143,8 +143,8 @@ def _turn(time: Samples, angle: Samples, stretch: Stretch) -> float:
     return (stretch.end - middle) / turned if turned > 0 else float("inf")
 
 
-def vertical_drift(run: xr.Dataset) -> str | None:
-    """A sentence on a robot that sinks or rises over the last two thirds of a run; None where it hardly does.
+def vertical_drift(run: xr.Dataset) -> list[str]:
+    """A sentence on a robot that sinks or rises over the last two thirds of a run; none where it hardly does.
 
     Args:
         run: with `position` and `pitch` over `time`.
@@ -152,10 +152,10 @@ def vertical_drift(run: xr.Dataset) -> str | None:
     late = run.isel(time=slice(run.sizes["time"] // 3, None))
     way = late["position"].values[-1] - late["position"].values[0]
     if not abs(way[2]) > _SINKS * np.hypot(way[0], way[1]):
-        return None
+        return []
     upwards = float(way[2]) / float(late["time"][-1] - late["time"][0])
     pitch = float(np.degrees(late["pitch"].values[-1]))
-    return (
+    return [
         f"it {'sinks' if upwards < 0 else 'rises'} at {1e3 * abs(upwards):.4g} mm/s over the last two thirds of the "
         f"run, at last pitched by {pitch:.3g} deg: velocities are those along x"
-    )
+    ]

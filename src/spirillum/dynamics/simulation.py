@@ -241,10 +241,9 @@ def _free_run(
 
 def _of_the_way(dataset: xr.Dataset, steady: Prediction) -> list[str]:
     """What the path shows that a held robot's speed does not: that it sinks or rises, and how fast it moves."""
-    drift = vertical_drift(dataset)
     velocity = dataset["velocity"].values
     limits = [speed_limit(steady.batch, float(np.linalg.norm(velocity, axis=-1).max()))]
-    return [*([] if drift is None else [drift]), *(limit.caution() for limit in broken(limits))]
+    return [*vertical_drift(dataset), *(limit.caution() for limit in broken(limits))]
 
 
 def _check_in_tube(asked: InTube, model: str, *, walled: bool, drawn: bool) -> None:

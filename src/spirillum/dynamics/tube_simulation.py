@@ -80,9 +80,7 @@ def run_in_tube(
     checked = held_against_check(links.table, **places, time=dataset["time"].values)
     said = [line for line in dataset.attrs["warnings"].split("\n") if line]
     if asked.flow is not None:
-        said += [
-            limit.caution() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])
-        ]
+        said += [limit.caution() for limit in broken([flow_limit(steady.batch, float(np.abs(links.flow[:, 1]).max()))])]
         said += _flow_beyond(links.flow, float(dataset["time"][-1]), asked.flow)
     if weight and not links.weight.any():
         said.append("body.mass or tail.density is unset: the robot has no weight in the fluid")

@@ -68,16 +68,19 @@ class Limit:
 
     def caution(self, index: int = 0) -> str:
         """The requirement in words where an answer is given although it is broken, for robot number `index`."""
-        return self.sentence(index).replace("; allowed: ", "; accurate: ", 1)
+        return self._said(index, "accurate")
 
     def sentence(self, index: int = 0) -> str:
         """The broken requirement in words, for robot number `index`."""
+        return self._said(index, "allowed")
+
+    def _said(self, index: int, word: str) -> str:
         value, bound = (a[index if a.size > 1 else 0] for a in (self.value, self.bound))
         lack, colon, name = self.field.partition(": ")
         if colon and np.isinf(value):  # there is none
-            return f"{lack}; allowed: a robot with a {name}, because {self.why}"
+            return f"{lack}; {word}: a robot with a {name}, because {self.why}"
         said, allowed = show_apart(float(value), float(bound), self.unit)
-        return f"{self.field} = {said}; allowed: {self.relation} {allowed}, because {self.why}"
+        return f"{self.field} = {said}; {word}: {self.relation} {allowed}, because {self.why}"
 
 
 def broken(limits: Iterable[Limit]) -> list[Limit]:

@@ -15,7 +15,7 @@ from spirillum.errors import InputError, did_you_mean
 from spirillum.files import new_file, parse_toml, read_toml
 from spirillum.robot.options import Resolution
 from spirillum.robot.problems import problems_in, refused_table
-from spirillum.robot.robot import Robot
+from spirillum.robot.robot import Derived, Robot
 from spirillum.units import show
 
 __all__ = [
@@ -43,9 +43,9 @@ _SIZE = ("body.diameter", "body.length")
 _WORDS = {"name", "description", "reference"}
 _DEEPEST = 8
 _MOST_LAYERS = 8
+"""Robot files that lie over each other."""
 _DENSEST = 22590.0
 """Density of osmium, kg/m^3 (CRC Handbook of Chemistry and Physics)."""
-"""Robot files that lie over each other."""
 
 PAPER_ROBOTS = ("biorob2012-wide", "biorob2012-narrow")
 PAPER_ROBOTS_TAKEN = f"no robot is named: those of the paper, {' and '.join(PAPER_ROBOTS)}, are taken"
@@ -337,9 +337,9 @@ def _left_over(table: Mapping[str, Any], changes: list[set[str]]) -> tuple[str, 
     return tuple(found)
 
 
-def _floating(robot: Robot) -> tuple[str, ...]:
+def _floating(derived: Mapping[str, Derived]) -> tuple[str, ...]:
     """Warn where buoyancy lifts the robot off the floor, which holds its lateral motion and tilt."""
-    weight = robot.derived().get("submerged_weight")
+    weight = derived.get("submerged_weight")
     if weight is None or weight.value > 0:
         return ()
     return (
@@ -348,11 +348,10 @@ def _floating(robot: Robot) -> tuple[str, ...]:
     )
 
 
-def _too_dense(robot: Robot) -> tuple[str, ...]:
+def _too_dense(robot: Robot, derived: Mapping[str, Derived]) -> tuple[str, ...]:
     """Warn of a mass that no metal has in the volume of body and coupling: most often it is another unit."""
     if robot.body.mass is None:
         return ()
-    derived = robot.derived()
     density = robot.body.mass / (derived["body_volume"].value + derived["coupling_volume"].value)
     if density <= _DENSEST:
         return ()
@@ -376,6 +375,8 @@ def _too_smooth(robot: Robot) -> tuple[str, ...]:
 def _checked(table: dict[str, Any], source: str, warnings: tuple[str, ...]) -> Robot:
     problems = problems_in(Robot, table)
     if isinstance(problems, Robot):
-        problems._warnings = (*warnings, *_floating(problems), *_too_dense(problems), *_too_smooth(problems))  # noqa: SLF001 - it is the loader's to set
+        derived = problems.derived()  # once: it integrates the solids
+        doubts = (*_floating(derived), *_too_dense(problems, derived), *_too_smooth(problems))
+        problems._warnings = (*warnings, *doubts)  # noqa: SLF001 - it is the loader's to set
         return problems
     raise refused_table(problems, source)

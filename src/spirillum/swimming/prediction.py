@@ -370,7 +370,7 @@ class _Case:
     def has_weight_or_place(self) -> bool:
         """Whether it is known that the robot's weight keeps it on the floor, or where else it is."""
         place = self.batch.placement
-        known = "submerged_weight" in self.robot.derived()
+        known = self.robot.body.mass is not None and self.robot.tail.density is not None
         return known or place.gap is not None or place.eccentricity is not None
 
     def fitted_warnings(self) -> list[str]:

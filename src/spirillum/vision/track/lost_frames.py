@@ -21,7 +21,7 @@ from spirillum.arrays import Samples
 from spirillum.robust import mad_scale, running_median, stretches_of
 from spirillum.vision.flag import Flag
 from spirillum.vision.track.constants import LOST_FRAMES, MULTIPLES
-from spirillum.vision.track.multiples import Multiples, multiples_of
+from spirillum.vision.track.multiples import Multiples, multiples_of, near_their_mean
 from spirillum.vision.track.warnings import EVERYTHING
 
 __all__ = ["Reading", "Restored", "restored_times"]
@@ -280,10 +280,7 @@ def _without_spikes(level: Samples, known: np.ndarray, far: float) -> None:
 
 def _usual_rate(steps: Samples, spans: Samples, period: float) -> float:
     """Median rate of the steps, each modulo the period about their circular mean."""
-    if np.isfinite(period):
-        middle = float(np.angle(np.mean(np.exp(2j * np.pi * steps / period)))) * period / (2.0 * np.pi)
-        steps = middle + _wrapped(steps - middle, period)
-    return float(np.median(steps / spans))
+    return float(np.median(near_their_mean(steps, period) / spans))
 
 
 def _local_slope(time: Samples, values: Samples) -> Samples:

@@ -15,7 +15,7 @@ from spirillum.arrays import Samples
 from spirillum.robust import stretches_of
 from spirillum.vision.track.constants import MULTIPLES
 
-__all__ = ["Multiples", "multiples_of"]
+__all__ = ["Multiples", "multiples_of", "near_their_mean"]
 
 
 class Multiples(NamedTuple):
@@ -42,10 +42,7 @@ def multiples_of(time: Samples, values: Samples, period: float, frame: float) ->
     if known.size <= MULTIPLES.fewest:
         return None
     steps, spans = np.diff(values[known]), np.diff(time[known])
-    if np.isfinite(period):
-        middle = float(np.angle(np.mean(np.exp(2j * np.pi * steps / period)))) * period / (2.0 * np.pi)
-        steps = steps - period * np.round((steps - middle) / period)
-    each = (steps * frame / spans)[np.diff(known) == 1]
+    each = (near_their_mean(steps, period) * frame / spans)[np.diff(known) == 1]
     if each.size <= MULTIPLES.fewest:
         return None
     each = each * np.sign(np.mean(each))
@@ -64,6 +61,20 @@ def multiples_of(time: Samples, values: Samples, period: float, frame: float) ->
         if len(rest) > MULTIPLES.rest:
             repeated[rest] = False
     return Multiples(int(repeated.sum()), int(np.sum(counts[far] - 1)), int(counts.size))
+
+
+def near_their_mean(steps: Samples, period: float) -> Samples:
+    """Steps of an angle, each the whole periods nearer to their circular mean; those of a position as they are.
+
+    Args:
+        steps: from one frame to the next, (m,).
+        period: of the angle; infinite for a position.
+    """
+    if not np.isfinite(period):
+        return steps
+    middle = float(np.angle(np.mean(np.exp(2j * np.pi * steps / period)))) * period / (2.0 * np.pi)
+    found: Samples = steps - period * np.round((steps - middle) / period)
+    return found
 
 
 def _unit(steps: Samples) -> float | None:
