@@ -93,6 +93,22 @@ def _lost(share: float, *, even: bool) -> Change:
     return change
 
 
+def _clock_jumps(film: Film, _scene: Scene, rng: np.random.Generator) -> Film:
+    late, half = round(rng.uniform(1.0, 4.0) * FPS), len(film.numbers) // 2
+    return replace(film, numbers=[number + late * (place >= half) for place, number in enumerate(film.numbers)])
+
+
+def _piece_missing(*, even: bool) -> Change:
+    """A second from the middle of the film."""
+
+    def change(film: Film, _scene: Scene, rng: np.random.Generator) -> Film:
+        count, gone = len(film.images), round(FPS)
+        start = int(rng.integers(count // 3, 2 * count // 3 - gone // 2))
+        return _kept(film, np.delete(np.arange(count), np.arange(start, start + gone)), even=even)
+
+    return change
+
+
 def _first(seconds: float) -> Change:
     return lambda film, _scene, _rng: _kept(film, np.arange(round(seconds * FPS) + 1), even=False)
 
@@ -280,6 +296,9 @@ TROUBLES = (
     ),
     Trouble("frames missing", "a tenth of the frames, with true times", _lost(0.1, even=False)),
     Trouble("frames lost, times even", "a twentieth of the frames, and the film counts on", _lost(0.05, even=True)),
+    Trouble("camera paused", "a second is missing, with true times", _piece_missing(even=False)),
+    Trouble("film cut", "a second is missing, and the film counts on", _piece_missing(even=True), known=()),
+    Trouble("clock jumps", "by 1 to 4 s in the middle, nothing is missing", _clock_jumps, known=()),
     Trouble("camera rolled", "by 2 to 8 degrees", _rolled, still=False),
     Trouble("portrait", "the camera is turned by 90 degrees", _portrait, still=False),
     Trouble("hand-held", "2 pixels of sway, 0.7 pixels from frame to frame", _handheld, still=False),

@@ -10,20 +10,38 @@ from spirillum.errors import InputError
 from spirillum.robot.load import load
 from spirillum.virtual.degradation import Degradation
 from spirillum.virtual.solids import solids_of
-from spirillum.virtual.troubles import NAMES, Shake, Troubles, View, even_times, repainted, stripe_edges, with_troubles
+from spirillum.virtual.troubles import (
+    NAMES,
+    Shake,
+    Troubles,
+    View,
+    counted_frames,
+    repainted,
+    stripe_edges,
+    with_troubles,
+)
 
 
 def named(words: str) -> Troubles:
     return with_troubles(words, Degradation())[0]
 
 
-def test_lost_frames_leave_even_times():
+def test_lost_frames_leave_counted_frames():
     kept = np.arange(241)
-    left, counted = even_times(named("lost-frames"), kept, 3)
+    left, counted = counted_frames(named("lost-frames"), kept, 30.0, 3)
     assert left.size == 241 - 7
     assert counted.tolist() == list(range(234))
     assert left[[0, -1]].tolist() == [0, 240]
-    assert even_times(Troubles(), kept, 3)[0] is kept
+    assert counted_frames(Troubles(), kept, 30.0, 3)[0] is kept
+
+
+def test_the_clock_jumps_in_the_middle_and_nothing_is_missing():
+    kept = np.arange(241)
+    left, counted = counted_frames(named("clock-jump"), kept, 30.0, 3)
+    assert left is kept
+    assert np.flatnonzero(np.diff(counted) != 1).tolist() == [120]
+    assert counted[-1] == 240 + 60
+    assert counted_frames(Troubles(lost_frames=0.5), kept[:2], 30.0, 3)[0].tolist() == [0, 1]
 
 
 def test_uneven_stripes_go_round_once_and_keep_the_body():
@@ -81,7 +99,7 @@ def test_names_give_usual_sizes_and_leave_what_was_given():
     assert not disturbed.glare_moves
     with pytest.raises(InputError, match="trouble ''; allowed"):
         named(",")
-    with pytest.raises(InputError, match=r"trouble 'shaken'.*allowed: lost-frames, handheld, rolled, uneven-stripes"):
+    with pytest.raises(InputError, match=r"trouble 'shaken'.*allowed: lost-frames, clock-jump, handheld, rolled"):
         named("shaken")
     with pytest.raises(InputError, match="handheld"):
         Troubles.of({"handheld": 99.0})

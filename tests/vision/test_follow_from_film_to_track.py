@@ -176,3 +176,18 @@ def test_clutter_that_fits_the_other_way_round_does_not_name_the_direction(tmp_p
     path, setup = film.write(tmp_path, scenery.robot_text)
     with pytest.raises(InputError, match="no robot like"):
         follow(path, *load_setup(setup))
+
+
+def test_after_a_gap_the_robot_is_found_where_it_went(tmp_path):
+    """It went on over no more than a frame, though the times say that it should be three pixels further."""
+    scenery = scene("flat", 7)
+    frames = range(0, 72, 3)
+    numbers = [k + (30 if k >= 36 else 0) for k in frames]
+    film = Film([scenery.draw(k / FPS) for k in frames], numbers, [k / FPS for k in frames], dict(scenery.setup))
+    path, setup = film.write(tmp_path, scenery.robot_text)
+    found = follow(path, *load_setup(setup))
+    step, pixel = np.diff(found.position[:, 0]), found.scale.length_per_pixel
+    true = scenery.truth.velocity * 3 / FPS
+    assert 11 * true > 3 * pixel
+    assert step == pytest.approx(np.full(step.size, true), abs=0.25 * pixel)
+    assert "times-do-not-fit" in [flag.name for flag in found.flags]

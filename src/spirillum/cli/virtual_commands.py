@@ -127,8 +127,8 @@ _Trouble = Annotated[
     list[str] | None,
     typer.Option(
         metavar="NAME,...",
-        help="Of a real bench: lost-frames, handheld, rolled, uneven-stripes, blurred, cables, noise, lamp, "
-        "compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them, or "
+        help="Of a real bench: lost-frames, clock-jump, handheld, rolled, uneven-stripes, blurred, cables, noise, "
+        "lamp, compression, missing-frames, tilted, glare, standing-glare, bubbles, hand; with commas between them, or "
         "repeated.",
         rich_help_panel=_DISTURBED,
     ),

@@ -30,7 +30,7 @@ from spirillum.virtual.motion import motion_of, motion_of_run
 from spirillum.virtual.options import CameraOptions, MotionOptions, Seeded, SetupErrors, TrialOptions
 from spirillum.virtual.painter import Painter
 from spirillum.virtual.tank import tank_of
-from spirillum.virtual.troubles import Troubles, View, even_times, stripe_edges, with_troubles
+from spirillum.virtual.troubles import Troubles, View, counted_frames, stripe_edges, with_troubles
 from spirillum.virtual.truth import SYNTHETIC, names_beside, rate_quantities, setup_text, truth_dataset, truth_text
 
 if TYPE_CHECKING:
@@ -172,7 +172,7 @@ def render(
         length = f"duration = {trajectory.duration:g} s makes {count} frames"
         raise InputError(f"{length}; allowed: 2 to {_MOST_FRAMES} frames")
     disturbances = Disturbances.of_robot(degradation, seed, lens, trajectory.duration, robot, tank)
-    kept, counted = even_times(troubles, np.flatnonzero(disturbances.kept(count)), seed)
+    kept, counted = counted_frames(troubles, np.flatnonzero(disturbances.kept(count)), camera.fps, seed)
     names = names_beside(target) if setup is None else names_beside(target, Path(setup))
     robot_file = robot.name if is_preset(robot) else names["robot"].name
     height = _stated_height(float(trajectory.position[:, 2].mean()), setup_errors.depth_error, lens.surface)

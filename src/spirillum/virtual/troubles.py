@@ -13,11 +13,11 @@ from spirillum.arrays import Samples
 from spirillum.errors import InputError, did_you_mean
 from spirillum.extras import required
 from spirillum.robot.arguments import Options, in_range, whole, within
-from spirillum.robot.fields import Angle
+from spirillum.robot.fields import Angle, Time
 from spirillum.robot.robot import Robot
 from spirillum.virtual.degradation import Degradation
 
-__all__ = ["NAMES", "Shake", "Troubles", "View", "even_times", "repainted", "stripe_edges", "with_troubles"]
+__all__ = ["NAMES", "Shake", "Troubles", "View", "counted_frames", "repainted", "stripe_edges", "with_troubles"]
 
 _LOST, _SHAKE, _PAINT, _CABLES = range(30, 34)
 _WAVES, _SLOWEST, _FASTEST = 4, 0.15, 1.2
@@ -35,6 +35,8 @@ class Troubles(Options):
 
     lost_frames: Annotated[float, BeforeValidator(in_range(0.0, 0.5))] = 0.0
     """Share of frames that are lost while the film's times go on evenly, as simple recording scripts write them."""
+    clock_jump: Annotated[Time, within(0.0, 1e5, "s")] = 0.0
+    """Time by which the clock of the camera jumps forward in the middle of the film, s; no frame is missing there."""
     handheld: Annotated[float, BeforeValidator(in_range(0.0, 30.0, " pixels"))] = 0.0
     """Sway of a camera held by hand: standard deviation of its slow part, pixels; a third of it from frame to frame."""
     rolled: Annotated[Angle, within(-0.6, 0.6, "rad")] = 0.0
@@ -49,13 +51,14 @@ class Troubles(Options):
 
 _USUAL: dict[str, dict[str, Any]] = {
     "lost-frames": {"lost_frames": 0.03},
+    "clock-jump": {"clock_jump": 2.0},
     "handheld": {"handheld": 3.0},
     "rolled": {"rolled": np.radians(4.0)},
     "uneven-stripes": {"uneven_stripes": 0.2},
     "blurred": {"blurred": 1.0},
     "cables": {"cables": 2},
 }
-"""The usual size of each trouble: 7 frames of 240; 3 pixels; 4 degrees; a fifth; one pixel; two."""
+"""The usual size of each trouble: 7 frames of 240; 2 s; 3 pixels; 4 degrees; a fifth; one pixel; two."""
 _DISTURBANCES: dict[str, dict[str, Any]] = {
     "noise": {"noise": 8.0},
     "lamp": {"lamp_drift": 0.2},
@@ -100,23 +103,26 @@ def with_troubles(
     return Troubles.of(chosen if isinstance(value, str) else value), found
 
 
-def even_times(troubles: Troubles, kept: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frames that are left after further ones were lost, and the numbers under which the film holds them.
+def counted_frames(troubles: Troubles, kept: np.ndarray, fps: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Frames that are left after further ones were lost, and the numbers by which the film states their times.
 
     Args:
         troubles: of the film.
         kept: numbers of the frames as recorded, (n,); the first and the last stay.
+        fps: frames a second.
         seed: of the random numbers.
 
     Returns:
         Numbers as recorded, and numbers by which the film counts its times.
     """
-    lost = round(troubles.lost_frames * kept.size)
-    if not lost or kept.size < 3:
-        return kept, kept
-    gone = np.random.default_rng([seed, _LOST]).permutation(kept.size - 2)[: min(lost, kept.size - 2)] + 1
-    left = np.delete(kept, gone)
-    return left, left[0] + np.arange(left.size)
+    lost = min(round(troubles.lost_frames * kept.size), max(kept.size - 2, 0))
+    left = counted = kept
+    if lost:
+        gone = np.random.default_rng([seed, _LOST]).permutation(kept.size - 2)[:lost] + 1
+        left = np.delete(kept, gone)
+        counted = left[0] + np.arange(left.size)
+    late = round(troubles.clock_jump * fps)
+    return left, counted + late * (np.arange(counted.size) >= (counted.size + 1) // 2) if late else counted
 
 
 def stripe_edges(troubles: Troubles, count: int, seed: int) -> Samples:

@@ -669,6 +669,10 @@ class FollowingConstants:
     """Frames from which the next place is predicted."""
     largest_jump: float = 4.0
     """Largest accepted distance from the predicted position, pixels."""
+    gap: float = 3.0
+    """Time between two frames over the usual one from which on the robot may have left its predicted way."""
+    sure_step: float = 1.0
+    """Largest predicted step over such a gap to which the fit converges wherever the robot has gone, pixels."""
 
 
 @dataclass(frozen=True)

@@ -107,17 +107,35 @@ class Follower:
 
     def _placed(self, frame: Frame, guess: BodyPose | None) -> Placed:
         """Place the body near a predicted pose, else where it should be; a jump counts as not detected."""
-        body = self.known.start.body
-        found, far = None, FOLLOWING.largest_jump * body.optics.length_per_pixel
+        found = None
         if guess is not None:
-            found = body.place(frame.image, guess)
-            if found.known and np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+            found = self._after_a_gap(frame, guess) if self._is_after_a_gap(frame.time, guess) else None
+            found = found or self._near(frame, guess)
+            if found.known:
                 return found
-        expected = self._expected(frame.time)
-        again = body.place(frame.image, expected)
-        if again.known and np.hypot(again.pose.x - expected.x, again.pose.y - expected.y) <= far:
-            return again
-        return (again if found is None else found)._replace(error=BodyPose(np.nan, np.nan, np.nan))
+        again = self._near(frame, self._expected(frame.time))
+        return again if found is None or again.known else found
+
+    def _near(self, frame: Frame, guess: BodyPose) -> Placed:
+        """Place the body near a pose; further away it counts as not detected."""
+        body = self.known.start.body
+        found, far = body.place(frame.image, guess), FOLLOWING.largest_jump * body.optics.length_per_pixel
+        if np.hypot(found.pose.x - guess.x, found.pose.y - guess.y) <= far:
+            return found
+        return found._replace(error=BodyPose(np.nan, np.nan, np.nan))
+
+    def _is_after_a_gap(self, time: float, guess: BodyPose) -> bool:
+        """Whether no frame was taken for so long that the robot may not have kept to its predicted way."""
+        times, last = self.record.time[-FOLLOWING.memory :], self.record.placed[-1].pose
+        far = FOLLOWING.sure_step * self.known.start.body.optics.length_per_pixel
+        long = time - times[-1] > FOLLOWING.gap * float(np.median(np.diff(times)))
+        return bool(long and np.hypot(guess.x - last.x, guess.y - last.y) > far)
+
+    def _after_a_gap(self, frame: Frame, guess: BodyPose) -> Placed | None:
+        """The body where most of its edges fit: at the predicted pose, near it, or where it was; None if nowhere."""
+        near = close_place(frame, self.still, self.known.start.body, guess).pose
+        tried = [self._near(frame, pose) for pose in (guess, near, self.record.placed[-1].pose)]
+        return max((one for one in tried if one.known), key=lambda one: one.share, default=None)
 
     def _found_again(self, frame: Frame, lost: Placed) -> Placed:
         """Search the whole picture for the body; `lost` if it is not found."""
