@@ -131,6 +131,14 @@ def test_noise_is_no_change_of_motion(noise: float, seed: int) -> None:
     assert not {"stands-for-a-while", "reverses"} & set(restored(time, readings)[1])
 
 
+def test_copies_of_a_picture_do_not_move_while_a_codec_settles() -> None:
+    """It copies most pictures to the last digit, and changes the first and the last by less than any reading's error."""
+    time, _, readings = film(0, 5)
+    wave = np.where((np.arange(time.size) < 60) | (np.arange(time.size) > 240), np.arange(time.size) // 7, 8)
+    still = tuple(one._replace(values=one.values[0] + 0.05 * one.least * wave) for one in readings)
+    assert restored(time, still)[1] == []
+
+
 def test_true_gaps_are_no_loss() -> None:
     _, true, readings = film(21, 3)
     assert restored(true, readings)[1] == []

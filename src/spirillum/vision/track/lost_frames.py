@@ -184,7 +184,8 @@ def _change_of_motion(time: Samples, readings: tuple[Reading, ...]) -> _Change |
             every = np.interp(np.arange(time.size), known[1:], off)
             mean = sliding_window_view(every, few).mean(axis=1)
             usual = float(np.quantile(np.abs(mean), 0.9))
-            if usual > LOST_FRAMES.told * float(mad_scale(np.diff(off))) / few:  # errors of steps cancel in a row
+            error = max(float(mad_scale(np.diff(off))), reading.least)  # a codec copies pictures without any
+            if usual > LOST_FRAMES.told * error / few:  # errors of steps cancel in a row
                 moving = mean[np.abs(mean) > LOST_FRAMES.still * usual]
                 means.append(mean / usual * np.sign(moving[0]))
     if len(means) < 2:
