@@ -33,6 +33,7 @@ WIDE = "biorob2012-wide"
             "band = True with model 'slender'; allowed: only with",
         ),
         (["predict", WIDE, "--friction", "ice"], "friction = 'ice'; allowed: none, rotor, body, paper"),
+        (["predict", WIDE, "--friction", ""], "friction = ''; allowed: none, rotor, body, paper"),
         (["predict", WIDE, "--tail-rate", "1"], 'tail-rate = "1" has no unit'),
         (["predict", WIDE, "--tail-rate", "1/s"], "does not say what turns"),
         (["predict", WIDE, "--tail-rate", "0 Hz"], "a tail at rest drives nothing"),

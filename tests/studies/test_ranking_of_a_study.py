@@ -100,6 +100,16 @@ def test_a_motor_that_turns_the_other_way_draws_no_less_current() -> None:
     assert least.alike
 
 
+def test_robots_of_a_study_are_named_by_what_differs() -> None:
+    bodies = [{"shape": "capsule", "length": "35 mm", "diameter": size} for size in ("16 mm", "18 mm")]
+    study = {"models": ["rft"], "friction": ["none"], "robots": ["biorob2012-wide"]}
+    tables = sp.study(study | {"vary": {"body": bodies}})
+    assert tables.robot.values.tolist() == ["diameter 16 mm", "diameter 18 mm"]
+    lengths = {"body.length": ["30 mm", "35 mm"], "tail.length": ["60 mm"]}
+    both = sp.study(study | {"vary": lengths})
+    assert both.robot.values.tolist() == [f"body length {size} mm, tail length 60 mm" for size in (30, 35)]
+
+
 def test_one_robot_alone_is_not_said_to_be_like_the_others() -> None:
     found = ranking_of(sp.study({"models": ["sbt"], "friction": ["none"], "robots": ["ecoli"]}))
     assert not any(item.alike for item in found.best)

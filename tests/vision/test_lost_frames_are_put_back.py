@@ -132,7 +132,7 @@ def test_noise_is_no_change_of_motion(noise: float, seed: int) -> None:
 
 
 def test_copies_of_a_picture_do_not_move_while_a_codec_settles() -> None:
-    """It copies most pictures to the last digit, and changes the first and the last by less than any reading's error."""
+    """It copies most pictures to the last digit; the changes of the others are below the error of any reading."""
     time, _, readings = film(0, 5)
     wave = np.where((np.arange(time.size) < 60) | (np.arange(time.size) > 240), np.arange(time.size) // 7, 8)
     still = tuple(one._replace(values=one.values[0] + 0.05 * one.least * wave) for one in readings)

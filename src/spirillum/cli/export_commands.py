@@ -97,16 +97,17 @@ def export(
         raise InputError(f"{given[0]} with {target.suffix or 'no ending'}; allowed: only with .mcap")
     if sidecar and no_sidecar:
         raise InputError("--sidecar with --no-sidecar; allowed: one of them")
-    found = answer(
-        loaded_robot(robot, settings, calibration),
-        target,
-        phase=angle(phase),
-        fineness=fineness,
-        unit=unit,
-        sidecar=sidecar if sidecar or no_sidecar else None,
-        model=model,
-        friction=friction,
-        calibration=calibration,
-        placement=placement_from(gap, None, pitch, None, None, flow) or None,
-    )
+    with renderer.at_work("making the files", quiet=json):
+        found = answer(
+            loaded_robot(robot, settings, calibration),
+            target,
+            phase=angle(phase),
+            fineness=fineness,
+            unit=unit,
+            sidecar=sidecar if sidecar or no_sidecar else None,
+            model=model,
+            friction=friction,
+            calibration=calibration,
+            placement=placement_from(gap, None, pitch, None, None, flow) or None,
+        )
     renderer.show(found.to_dict(), json=json)

@@ -9,14 +9,19 @@ import typer
 
 from spirillum.cli.inputs import loaded_robot
 from spirillum.cli.options import Settings, complete_robots
+from spirillum.errors import InputError
 
 __all__ = ["page"]
 
 
 def page(
     robot: Annotated[
-        str, typer.Argument(autocompletion=complete_robots, help="A preset's name or a robot file (TOML).")
-    ] = "biorob2012-wide",
+        str | None,
+        typer.Argument(
+            autocompletion=complete_robots,
+            help="A preset's name or a robot file (TOML); else that of --run, or biorob2012-wide.",
+        ),
+    ] = None,
     run: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A run (NetCDF) to replay, written by `spirillum simulate`.")
     ] = None,
@@ -33,5 +38,7 @@ def page(
     """
     from spirillum.pages.launch import page as answer
 
-    source = loaded_robot(robot, settings) if settings else robot
+    if robot is None and settings:
+        raise InputError(f"set = {settings[0]} without a robot; allowed: with a preset's name or a robot file")
+    source = loaded_robot(robot, settings) if robot and settings else robot
     answer(source, run=run, host=host, port=port, browser=not no_browser, tell=typer.echo)

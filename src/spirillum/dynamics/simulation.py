@@ -163,7 +163,7 @@ def simulate(  # noqa: PLR0913 - the options of the command
 
     dataset = run(central, times, progress)
     if known is not None:
-        reading = friction_reading(friction or central.friction.reading)
+        reading = friction_reading(central.friction.reading if friction is None else friction)
         said += fitted_of(None, known).run_warnings(central, find_swimmer_model(model), reading)
         same_length = times.model_copy(update={"duration": float(dataset["time"][-1])})
         tell = progress or (lambda _what, _done, _total: None)

@@ -72,8 +72,9 @@ def is_watertight(vertices: Samples, faces: Faces) -> bool:
     joined = merged.reshape(-1)[faces]
     edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
     keys, back = edges @ [len(vertices), 1], edges @ [1, len(vertices)]
-    alone = np.unique(keys)
-    return bool(alone.size == keys.size and np.array_equal(alone, np.sort(back)) and np.all(edges[:, 0] != edges[:, 1]))
+    keys.sort()
+    once = bool(np.all(keys[1:] != keys[:-1]) and np.all(edges[:, 0] != edges[:, 1]))
+    return once and np.array_equal(keys, np.sort(back))
 
 
 def stl_bytes(vertices: Samples, faces: Faces, title: str) -> bytes:

@@ -29,7 +29,7 @@ _HOST_NAME = re.compile(rf"(?=.{{1,253}}$)({_LABEL}\.)*{_LABEL}\.?", re.IGNORECA
 
 @checked
 def page(
-    robot: str | Path | Mapping[str, Any] | Robot = "biorob2012-wide",
+    robot: str | Path | Mapping[str, Any] | Robot | None = None,
     *,
     run: xr.Dataset | str | Path | None = None,
     host: str = "127.0.0.1",
@@ -42,7 +42,8 @@ def page(
     Needs the extra `page`. Everything stays on this machine: nothing is loaded from elsewhere.
 
     Args:
-        robot: a preset's name, a robot file, its tables, or a loaded robot.
+        robot: a preset's name, a robot file, its tables, or a loaded robot; None: that of the run, else the preset
+            biorob2012-wide.
         run: a run of `spirillum.simulate`, or the file with it, to replay.
         host: address to listen on. Any other than the loopback lets whoever is on the network and has the printed
             address turn the knobs.
@@ -69,7 +70,8 @@ def page(
     with listening:
         number = int(listening.getsockname()[1])
         guard = Guard(host, number)
-        app = application(robot, guard, first_run=None if run is None else _replay(run))
+        own, first_run = ("biorob2012-wide", None) if run is None else _replay(run)
+        app = application(own if robot is None else robot, guard, first_run=first_run)
         shown = f"[{host}]" if ":" in host else host
         if host in ("0.0.0.0", "::"):  # noqa: S104 - it was asked for, and is said
             shown = socket.gethostname()
@@ -134,8 +136,10 @@ def _listening(host: str, port: int) -> socket.socket:
     return found
 
 
-def _replay(run: xr.Dataset | str | Path) -> dict[str, Any]:
-    from spirillum.dynamics.run_file import open_run
+def _replay(run: xr.Dataset | str | Path) -> tuple[Robot, dict[str, Any]]:
+    """The robot of a run, and the run to replay."""
+    from spirillum.dynamics.run_file import open_run, robot_of
     from spirillum.pages.replay import replay_of_run
 
-    return replay_of_run(open_run(run) if isinstance(run, (str, Path)) else run)
+    dataset = open_run(run) if isinstance(run, (str, Path)) else run
+    return robot_of(dataset), replay_of_run(dataset)

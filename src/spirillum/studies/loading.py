@@ -243,12 +243,27 @@ def _check_contact(study: Study, robots: Sequence[Robot], name: str) -> None:
 def _named_apart(robots: tuple[Robot, ...], varied: Sequence[Mapping[str, Any]]) -> tuple[Robot, ...]:
     """The robots with what is varied in their names; the robot's own name only where there are several."""
     several = len({robot.name for robot in robots}) > 1
+    every = [dict(_flat(fields)) for fields in varied]
     named = []
-    for robot, fields in zip(robots, varied, strict=True):
-        words = [f"{path.rpartition('.')[2]} {value}" for path, value in fields.items()]
+    for robot, fields, given in zip(robots, every, varied, strict=True):
+        told = [path for path in fields if path in given or any(other.get(path) != fields[path] for other in every)]
+        short = [path.rpartition(".")[2] for path in told]
+        words = [
+            f"{name if short.count(name) == 1 else path.replace('.', ' ')} {fields[path]}"
+            for name, path in zip(short, told, strict=True)
+        ]
         name = ", ".join([robot.name, *words] if several or not words else words)
         named.append(robot.model_copy(update={"name": name[:200]}) if words else robot)
     return tuple(named)
+
+
+def _flat(fields: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Fields by their dotted names, those of whole tables one by one."""
+    for name, value in fields.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def _fitted(

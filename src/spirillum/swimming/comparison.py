@@ -188,7 +188,7 @@ def compare_models(
     own = with_resolution(load(robot), resolution, *names)
     factors = calibration is not None if calibrated is None else calibrated
     ready = own if calibration is None else with_calibration(own, calibration)
-    reading = friction_reading(friction or ready.friction.reading)
+    reading = friction_reading(ready.friction.reading if friction is None else friction)
     place = Placement.of(placement)
     check_placement(place, *(find_swimmer_model(name) for name in names))
     predictions: dict[str, Prediction] = {}

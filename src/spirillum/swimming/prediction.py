@@ -255,7 +255,7 @@ def predict(  # noqa: PLR0913 - the options of the command
     ready, chosen, batch = prepared(
         robot, choice.model, calibration=calibration, resolution=resolution, placement=where if where.is_given else None
     )
-    reading = friction_reading(friction or ready.friction.reading)
+    reading = friction_reading(ready.friction.reading if friction is None else friction)
     rate, fitted = _rate(tail_rate, batch.placement), fitted_of(calibration, drawn)
     case = _Case(ready, chosen, batch, reading, rate, calibrated, motion, fitted)
     if rate is None and ready.drive is None:

@@ -120,7 +120,7 @@ def swim(
         raise InputError("motor_rate with drive.joint = 'fixed': nothing turns in the joint; allowed: a tail rate")
     tail, motor = _per_robot(tail_rate, batch, "tail_rate"), _per_robot(motor_rate, batch, "motor_rate")
     driven_freely = tail_rate is None and motor_rate is None
-    reading = friction_reading(friction or batch.friction)
+    reading = friction_reading(batch.friction if friction is None else friction)
     lateral = motion_of(motion)
     if lateral == "free":
         _check_free(batch, chosen)
