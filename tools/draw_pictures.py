@@ -12,6 +12,7 @@ from spirillum.view.figures.design import design_figure
 from spirillum.view.figures.flow import flow_figure
 from spirillum.view.figures.magnetic import magnetic_figure
 from spirillum.view.figures.robot import robot_figure
+from spirillum.view.figures.trajectory import trajectory_figure
 
 FOLDER = Path(__file__).parent.parent / "docs" / "images"
 
@@ -41,6 +42,7 @@ if __name__ == "__main__":
         "overview": (robot_figure(sp.load("biorob2012-wide")), 150),
         "flow": (flow_figure(flow, flow.plane("xz")), 150),
         "magnetic-sweep": (magnetic_figure(sp.magnetic_sweep(tilted)), 150),
+        "tube-run": (trajectory_figure(sp.simulate("biorob2012-wide", timing={"duration": "20 s"})), 200),
         "frenet": (frenet_figure(sp.load("biorob2012-wide")), 120),
     }
     for name, (figure, dpi) in pictures.items():
@@ -60,5 +62,6 @@ if __name__ == "__main__":
         frame = _frame(folder / "trial.annotated.mp4", 60)
         frame.save(FOLDER / "measured.png")
     target = FOLDER / "robot3d.png"
+    target.unlink(missing_ok=True)
     sp.show("biorob2012-wide", target, phase="30 deg")
     print(target.name, target.stat().st_size, "bytes")

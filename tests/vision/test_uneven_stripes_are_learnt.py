@@ -108,3 +108,15 @@ def test_edges_are_found_where_they_are_drawn():
     seen = np.isfinite(found)
     assert seen.sum() >= 2
     assert found[seen] == pytest.approx(PLACES[seen], abs=np.radians(0.4))
+
+
+def test_one_frame_does_not_say_how_two_groups_of_edges_lie_to_each_other():
+    """Even stripes, of which three were seen before a gap and three after it; one edge in between is misread."""
+    edges = np.full((61, COUNT), np.nan)
+    edges[:30, :3], edges[31:, 3:6] = 0.0, 0.0
+    edges += np.radians(0.2) * np.random.default_rng(4).standard_normal(edges.shape)
+    edges[30, 2:4] = 0.0, np.radians(5.0)
+    angle = np.linspace(0.0, 0.4, 61)
+    found = evened(angle, angle, np.full(61, 0.004), edges, PERIOD)
+    assert found.flags == ()
+    assert found.angle is angle

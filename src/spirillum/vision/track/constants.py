@@ -398,6 +398,8 @@ class WidthConstants:
     """Residual over the usual one from which on an edge of a frame is left out."""
     seen: int = 10
     """Fewest frames of an edge."""
+    linked: int = 4
+    """Fewest frames on which two edges are seen together from which on they say how these lie to each other."""
     uneven: float = radians(2.0)
     """Range of the edges' shifts from which on the stripes are uneven, rad; see `docs/measuring.md`."""
     clear: float = 10.0

@@ -139,10 +139,12 @@ def _not_of_paint(places: Samples) -> Flag | None:
 
 
 def _places(shifts: Samples) -> tuple[Samples, float]:
-    """Shift of each edge, rad, (stripes,), of mean 0, and the scatter of an edge on a frame, rad.
+    """Shift of each edge, rad, (stripes,), and the scatter of an edge on a frame, rad.
 
-    The shift is NaN for edges that were seen too rarely, or beside no others.
+    The mean is 0 over each group of edges that frames link. The shift is NaN for edges that were seen too rarely.
     """
+    from scipy.sparse.csgraph import connected_components
+
     weight = np.isfinite(shifts).astype(float)
     value = np.nan_to_num(shifts)
     places, scale = np.zeros(shifts.shape[1]), 0.0
@@ -156,4 +158,7 @@ def _places(shifts: Samples) -> tuple[Samples, float]:
         scale = float(mad_scale(residual[weight > 0])) + 1e-4
         weight = (np.isfinite(shifts) & (np.abs(residual) < WIDTHS.stray * scale)).astype(float)
     often = weight.sum(axis=0) >= WIDTHS.seen
-    return np.where(often, places - places[often].mean() if often.any() else 0.0, np.nan), scale
+    group = connected_components(weight.T @ weight >= WIDTHS.linked, directed=False)[1]
+    for one in np.unique(group[often]):  # how groups lie to each other hangs on few frames, if on any
+        places[group == one] -= places[often & (group == one)].mean()
+    return np.where(often, places, np.nan), scale
