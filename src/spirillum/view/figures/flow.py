@@ -289,8 +289,9 @@ def _draw_strip(axes: Axes, view: _View) -> None:
 def _conditions(flow: Flow, view: _View) -> Iterator[str]:
     motion, unit = flow.prediction, view.lengths
     frame = "lab frame" if flow.frame == "lab" else "frame of the swimming robot"
-    where = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
-    yield f"{where}, origin at the body's middle · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
+    plane = f"plane {view.name} at {view.across} = {view.offset / unit.factor:.4g} {unit.unit}"
+    where = f"{plane}, origin at the body's middle"
+    yield f"{where} · {frame} · phase {np.degrees(flow.phase):.4g}° · model {motion.model.name}"
     speed = Scale.of(np.array([motion.forward_velocity]), "m/s")
     yield (
         f"$U_x$ = {motion.forward_velocity / speed.factor:.4g} {speed.unit}, "
