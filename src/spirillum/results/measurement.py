@@ -168,8 +168,8 @@ def _annotated_trial(asked: Asked, number: int, folder: _Folder, tell: Callable[
     if says_synthetic(video.words):
         words = {"title": f"{words['title']}, synthetic", "comment": "synthetic: made from a computed film"}
     period = pattern_period(stripes_of(asked.setup, asked.robot))
-    film = partial(annotated_film, robot=asked.robot, words=words, thumbnail=thumbnail, period=period)
-    with whole_file(target) as temporary, film(temporary) as on_frame:
+    film = partial(annotated_film, robot=asked.robot, words=words, period=period, waiting=video.waiting)
+    with whole_file(target) as temporary, film(temporary, thumbnail=thumbnail) as on_frame:
         trial = measured_trial(asked, number, video, progress=tell, on_frame=on_frame)
     folder.files.append(target.name)
     return trial

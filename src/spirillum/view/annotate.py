@@ -37,7 +37,6 @@ _SHIFT = 4
 """Lines are drawn at sixteenths of a pixel."""
 _TICKS = 90_000
 _QUALITY = {"crf": "23", "preset": "ultrafast"}
-_WAITING = 8
 _LARGEST = 1920
 """Longest side of an annotated frame, pixels: a larger one is reduced by a whole number."""
 
@@ -243,6 +242,7 @@ def annotated_film(
     thumbnail: Callable[[bytes], None] | None = None,
     *,
     period: float = 2.0 * math.pi,
+    waiting: int = 8,
 ) -> Iterator[Callable[[int, np.ndarray, Seen], None]]:
     """A film of annotated frames at their true times, drawn and encoded by a thread of its own.
 
@@ -252,6 +252,7 @@ def annotated_film(
         words: title and comment of the film.
         thumbnail: takes a frame as JPEG, when the film is complete.
         period: of the robot's stripes: by whole multiples of it the body's angle is not known, rad.
+        waiting: most frames that wait to be drawn.
 
     Raises:
         InputError: if a package is missing, or no encoder is there.
@@ -265,7 +266,7 @@ def annotated_film(
             kept[:] = [picture]  # frames 1, 2, 4, 8 ...: the last of them lies in the second half
         return picture
 
-    writer = _Writer(path, words, drawn)
+    writer = _Writer(path, words, drawn, waiting)
 
     def on_frame(index: int, image: np.ndarray, seen: Seen) -> None:
         writer.add((index, image, seen))
@@ -292,10 +293,12 @@ _Frame = tuple[int, np.ndarray, Seen]
 class _Writer:
     """Draws frames and writes them to H.264; the film starts with the first frame's time."""
 
-    def __init__(self, path: Path, words: dict[str, str], drawn: Callable[[int, np.ndarray, Seen], np.ndarray]) -> None:
+    def __init__(
+        self, path: Path, words: dict[str, str], drawn: Callable[[int, np.ndarray, Seen], np.ndarray], waiting: int
+    ) -> None:
         required("av", "an annotated video", "video")  # said here, before any frame is tracked
         self._path, self._words, self._drawn = path, words, drawn
-        self._queue: Queue[_Frame | None] = Queue(_WAITING)
+        self._queue: Queue[_Frame | None] = Queue(waiting)
         self._error: BaseException | None = None
         self._ended = False
         self._thread = Thread(target=self._run, name="encoding", daemon=True)

@@ -19,8 +19,8 @@ from spirillum.vision.video.pictures import reduction
 
 __all__ = ["background", "bounds_of", "opened", "ruler_of", "samples_of", "scale_of", "sight_of"]
 
-_SAMPLES = 24
-"""Frames from which scale and appearance are learnt."""
+_SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 330_000_000
+"""Most and fewest frames from which scale and appearance are learnt, and the bytes that they may take between."""
 _GOLDEN = 0.618034
 """Step of the low-discrepancy sequence that spreads them."""
 _UNKNOWN = 10.0
@@ -67,8 +67,9 @@ def samples_of(video: Video, start: float, end: float | None) -> list[Frame]:
         end = video.duration if end is None else min(end, video.duration)
     elif end is None:
         end = start + _UNKNOWN
-    count = np.arange(_SAMPLES)
-    shares = (count + (_GOLDEN * count) % 1.0) / _SAMPLES
+    size = 3 * video.size[0] * video.size[1]
+    count = np.arange(max(_FEWEST_SAMPLES, min(_SAMPLES_BYTES // size, _SAMPLES)))
+    shares = (count + (_GOLDEN * count) % 1.0) / count.size
     return video.samples((start + (end - start) * shares).tolist())
 
 

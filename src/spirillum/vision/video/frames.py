@@ -33,7 +33,7 @@ PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _WHAT = "a film (mp4, avi, mov, mkv) or a folder of images (png, jpg, tif, bmp)"
 _PURPOSE = "measuring a video"
 _AHEAD, _FEWEST_AHEAD, _AHEAD_BYTES = 12, 2, 48_000_000
-"""Most and fewest frames that are decoded ahead of the analysis, and the bytes that they may take between."""
+"""Most and fewest frames that wait between two threads, and the bytes that they may take between."""
 _OPENING = {
     "protocol_whitelist": "file",
     "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mpeg,mpegts,mpegvideo,asf,flv,ogg,gif,dv,h264,hevc,"
@@ -107,14 +107,18 @@ class Video:
             return len(self.images)
         return round(self.duration * self.rate) if self.duration and self.rate else None
 
+    @property
+    def waiting(self) -> int:
+        """Number of frames that may wait between two threads: few large ones."""
+        return max(_FEWEST_AHEAD, min(_AHEAD_BYTES // (3 * self.size[0] * self.size[1]), _AHEAD))
+
     def frames(self, start: float = 0.0, end: float | None = None) -> Iterator[Frame]:
         """The frames from one time to another, decoded ahead by a thread of its own.
 
         Raises:
             InputError: if there is none, or the first cannot be read.
         """
-        most = _AHEAD_BYTES // (3 * self.size[0] * self.size[1])
-        return ahead(self._read(start, end), max(_FEWEST_AHEAD, min(most, _AHEAD)))
+        return ahead(self._read(start, end), self.waiting)
 
     def samples(self, times: Sequence[float]) -> list[Frame]:
         """The first frames at or after some rising times; fewer where the video has ended.
