@@ -19,7 +19,7 @@ from spirillum.vision.video.pictures import reduction
 
 __all__ = ["background", "bounds_of", "opened", "ruler_of", "samples_of", "scale_of", "sight_of"]
 
-_SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 330_000_000
+_SAMPLES, _FEWEST_SAMPLES, _SAMPLES_BYTES = 24, 12, 480_000_000
 """Most and fewest frames from which scale and appearance are learnt, and the bytes that they may take between."""
 _GOLDEN = 0.618034
 """Step of the low-discrepancy sequence that spreads them."""

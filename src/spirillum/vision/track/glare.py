@@ -42,7 +42,7 @@ def standing_glare(images: Sequence[np.ndarray], poses: Sequence[BodyPose], body
         return Glare(0.0, ())
     around = slice(low[1], high[1]), slice(low[0], high[0])
     darkest = 3 * (float(np.ceil(STRIPES.white)),)
-    white = np.array([cv2.inRange(image[around], darkest, (255.0, 255.0, 255.0)) for image in images], dtype=bool)
+    white = [cv2.inRange(image[around], darkest, (255.0, 255.0, 255.0)) > 0 for image in images]
     spots = _standing(white, bodies - low)
     if not spots.any() or not _pass(body, poses, spots, low):
         return Glare(0.0, ())
@@ -68,7 +68,7 @@ def _covered(body: BodyFinder, pose: BodyPose) -> Samples:
     return seen(np.column_stack([x, y, np.zeros(x.size)]), pose, body.optics)
 
 
-def _standing(white: np.ndarray, bodies: Samples) -> np.ndarray:
+def _standing(white: Sequence[np.ndarray], bodies: Samples) -> np.ndarray:
     """Spots that stay white where they are, on the way of the body, (h, w).
 
     What is white and moves along is the body itself, or a highlight on it: more of it stays white in pictures that are
@@ -76,20 +76,22 @@ def _standing(white: np.ndarray, bodies: Samples) -> np.ndarray:
     highlight that reaches over the body's rim would else lose there, and seem to stand.
 
     Args:
-        white: what is white on each frame, (n, h, w).
+        white: what is white on each of n frames, (h, w).
         bodies: corners of what body and coupling cover on each frame, (n, k, 2).
     """
     cv2 = required("cv2", "measuring a video", "video")
-    covered = np.zeros(white.shape, dtype=np.uint8)
-    for picture, corners in zip(covered, bodies, strict=True):
-        cv2.fillConvexPoly(picture, np.round(corners).astype(np.int32), 1)
-    middle = len(white) // 2
+    middle, shape = len(white) // 2, white[0].shape
     moved = np.round(bodies.mean(axis=1) - bodies[middle].mean(axis=0)).astype(int)
-    back = [np.roll(one, (-down, -right), axis=(0, 1)) for one, (right, down) in zip(white, moved, strict=True)]
-    (_, still), (_, along) = (
-        cv2.connectedComponents((np.mean(ones, axis=0) >= GLARE.share).astype(np.uint8)) for ones in (white, back)
-    )
-    way, body = covered.any(axis=0), np.count_nonzero(covered[middle])
+    covered, here = np.zeros(shape, dtype=np.uint8), np.zeros(shape, dtype=np.uint8)
+    cv2.fillConvexPoly(here, np.round(bodies[middle]).astype(np.int32), 1)
+    stays, moves = np.zeros(shape, dtype=np.uint16), np.zeros(shape, dtype=np.uint16)  # on how many frames
+    for one, corners, (right, down) in zip(white, bodies, moved, strict=True):
+        cv2.fillConvexPoly(covered, np.round(corners).astype(np.int32), 1)
+        stays += one
+        moves += np.roll(one, (-down, -right), axis=(0, 1))
+    often = GLARE.share * len(white)
+    (_, still), (_, along) = (cv2.connectedComponents((count >= often).astype(np.uint8)) for count in (stays, moves))
+    way, body = covered > 0, np.count_nonzero(here)
     spots = np.zeros(way.shape, dtype=bool)
     for label in np.unique(still[way & (still > 0)]):
         spot = still == label
