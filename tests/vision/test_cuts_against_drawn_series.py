@@ -63,6 +63,30 @@ def test_times_that_jump_alone_are_said(jump):
     assert "tail_rotation_rate" in flag.spoils
 
 
+def test_the_clock_of_a_slow_robot_is_told_by_all_series_together():
+    """Neither place nor body is clear by itself: 0.25 mm/s, and a body whose pattern nearly comes round again."""
+    true, x, _, tail = series(frames=60)
+    body, jump = 2 * np.pi * 0.15 * true, 3.2
+    stamps = np.where(true > 1.0, true + jump, true)
+    tail = np.where(true > 1.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)
+    body = np.where(true > 1.0, body + np.pi * np.round(0.3 * jump), body)
+    (flag,) = jumps_of_time(Motion(stamps, 0.25 * x, body, tail), PIXEL, np.pi)
+    assert flag.name == "times-do-not-fit"
+
+
+def test_pauses_of_a_camera_are_honest_whatever_the_motor_does():
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        speed, body, tail = np.exp(rng.uniform(np.log([1e-4, 0.1, 2.0]), np.log([3e-3, 12.0, 60.0])))
+        time = np.concatenate([np.arange(120), 120 + 30 * np.exp(rng.uniform(-2, 4)) + np.arange(120)]) / 30
+        way = time + 0.05 * rng.normal() * time**2 / time[-1]  # its rate drifts
+        values = [
+            rate * way + error * rng.normal(size=240)
+            for rate, error in ((speed, 0.05 * PIXEL), (-body, 0.01), (tail, 0.03))
+        ]
+        assert jumps_of_time(Motion(time, *values), PIXEL, np.pi) == ()
+
+
 def test_a_push_moves_the_robot_alone():
     true, x, body, tail = series()
     assert cuts_in(Motion(true, np.where(true > 5.0, x + 2e-3, x), body, tail), PIXEL) == ()

@@ -70,8 +70,8 @@ def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tup
         (tail_phase, CUTS.angle, 2.0 * math.pi),
     )
     true, even = ([_mismatch(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
-    # The place tells it alone; angles agree by chance over whole periods, and over long gaps their lines end anywhere.
-    if (true[0] <= 1.0 and sum(one > 1.0 for one in true) < 2) or not max(even) < CUTS.meeting:
+    # That all three go on by chance is rare: angles would have to turn by whole periods, and the place to stay.
+    if math.hypot(*true) <= 1.0 or not max(even) < CUTS.meeting:
         return ()
     sentence = (
         f"the times of the frames jump by {steps[gap]:.2f} s at {time[gap]:.2f} s, but body and tail go on as if no "
