@@ -6,7 +6,7 @@ A robot whose tail turns while it stays where it is has no speed.
 import numpy as np
 import pytest
 
-from spirillum.vision.track.cuts import cuts_in, jumps_of_time, one_picture, stands_still
+from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
 from spirillum.vision.track.motion import Motion
 
 PIXEL = 2.5e-4
@@ -48,7 +48,7 @@ def test_whole_films_are_whole(seed):
 def test_a_gap_with_true_times_is_honest(gap):
     true, x, body, tail = series(frames=300, seconds=gap + 20.0, missing=[(4.0, 4.0 + gap)])
     assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
-    assert jumps_of_time(Motion(true, x, body, tail), PIXEL, np.pi) == ()
+    assert clock_of(Motion(true, x, body, tail), PIXEL, np.pi) == (0.0, ())
 
 
 @pytest.mark.parametrize("jump", [0.5, 1.7, 4.7, 40.1, 1000.3])
@@ -57,7 +57,7 @@ def test_times_that_jump_alone_are_said(jump):
     stamps = np.where(true > 4.0, true + jump, true)
     tail = np.where(true > 4.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)  # as it is unwrapped by these times
     body = np.where(true > 4.0, body - np.pi * np.round(0.24 * jump), body)
-    (flag,) = jumps_of_time(Motion(stamps, x, body, tail), PIXEL, np.pi)
+    (flag,) = clock_of(Motion(stamps, x, body, tail), PIXEL, np.pi).flags
     assert flag.name == "times-do-not-fit"
     assert f"jump by {jump + 1 / 30:.2f} s at {true[120]:.2f} s" in flag.sentence
     assert "tail_rotation_rate" in flag.spoils
@@ -70,8 +70,20 @@ def test_the_clock_of_a_slow_robot_is_told_by_all_series_together():
     stamps = np.where(true > 1.0, true + jump, true)
     tail = np.where(true > 1.0, tail + 2 * np.pi * np.round(1.2 * jump), tail)
     body = np.where(true > 1.0, body + np.pi * np.round(0.3 * jump), body)
-    (flag,) = jumps_of_time(Motion(stamps, 0.25 * x, body, tail), PIXEL, np.pi)
+    (flag,) = clock_of(Motion(stamps, 0.25 * x, body, tail), PIXEL, np.pi).flags
     assert flag.name == "times-do-not-fit"
+
+
+def test_where_the_motion_does_not_tell_the_intervals_hold_both_readings():
+    """A tail that makes whole turns meanwhile, and a body and a place that hardly move."""
+    true, x, body, tail = series(frames=120)
+    stamps = np.where(true > 2.0, true + 2.5, true)
+    tail = np.where(true > 2.0, tail + 3 * 2 * np.pi, tail)
+    found = clock_of(Motion(stamps, 0.02 * x, 0.02 * body, tail), PIXEL, np.pi)
+    assert found.relative_error == pytest.approx(0.5 * 2.5 / (119 / 30), rel=0.01)
+    assert [flag.name for flag in found.flags] == ["clock-in-doubt"]
+    assert not found.flags[0].spoils
+    assert "no frame was taken for 2.53 s at 2.00 s" in found.flags[0].sentence
 
 
 def test_pauses_of_a_camera_are_honest_whatever_the_motor_does():
@@ -84,7 +96,7 @@ def test_pauses_of_a_camera_are_honest_whatever_the_motor_does():
             rate * way + error * rng.normal(size=240)
             for rate, error in ((speed, 0.05 * PIXEL), (-body, 0.01), (tail, 0.03))
         ]
-        assert jumps_of_time(Motion(time, *values), PIXEL, np.pi) == ()
+        assert clock_of(Motion(time, *values), PIXEL, np.pi) == (0.0, ())
 
 
 def test_a_push_moves_the_robot_alone():
@@ -96,8 +108,8 @@ def test_short_and_unseen_series_say_nothing():
     true, x, body, tail = series(frames=20)
     assert cuts_in(Motion(true, x, body, tail), PIXEL) == ()
     assert cuts_in(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL) == ()
-    assert jumps_of_time(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL, np.pi) == ()
-    assert jumps_of_time(Motion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == ()
+    assert clock_of(Motion(true[:1], x[:1], body[:1], tail[:1]), PIXEL, np.pi) == (0.0, ())
+    assert clock_of(Motion(np.array([0.0, 0.1, 9.0]), x[:3], body[:3], tail[:3]), PIXEL, np.pi) == (0.0, ())
     true, x, body, tail = series()
     assert cuts_in(Motion(true, x, np.full_like(body, np.nan), np.full_like(tail, np.nan)), PIXEL) == ()
 

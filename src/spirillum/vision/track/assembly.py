@@ -13,7 +13,7 @@ from spirillum.vision.camera.optics import BodyPose, Optics, placed, places_seen
 from spirillum.vision.flag import Flag
 from spirillum.vision.setup import Setup
 from spirillum.vision.track.constants import LOST_FRAMES, STRIPES
-from spirillum.vision.track.cuts import cuts_in, jumps_of_time, one_picture, stands_still
+from spirillum.vision.track.cuts import clock_of, cuts_in, one_picture, stands_still
 from spirillum.vision.track.direction import Along, along_its_way
 from spirillum.vision.track.elsewhere import something_else, something_else_flag
 from spirillum.vision.track.identity import Identified
@@ -101,12 +101,15 @@ def track_of(
     odd = (*nothing_moves(motion, body.robot), *contradictions(motion, body.robot, hand))
     odd += no_stripe_passes(motion, body.robot)
     seen_flags = (*seen_flags, *something_else_flag(other))
-    early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     swayed = Swayed(0.0, ()) if still is None else swayed_by(still, motion, setup, sight)
     glare = learnt.glare.drift * pixel / max(float(np.ptp(time)), 1e-9)
+    clock = clock_of(motion, pixel, known.stripes.period)
+    if any(flag.spoils for flag in clock.flags):
+        gap_flags = ()  # by times that are wrong
+    early = (*size_flags, *flags, *seen_flags, *along.flags, *gap_flags, *restored.flags)
     cuts = (
         *cuts_in(motion, pixel),
-        *jumps_of_time(motion, pixel, known.stripes.period),
+        *clock.flags,
         *one_picture(motion),
         *stands_still(motion, pixel),
     )
@@ -126,7 +129,7 @@ def track_of(
         setup=setup,
         video=video.name,
         words=video.words,
-        time_uncertainty=restored.relative_error,
+        time_uncertainty=math.hypot(restored.relative_error, clock.relative_error),
         drift=math.hypot(swayed.drift, glare),
         elongation=elongation * optics.focal / sight.optics.focal,
         body_angle_drift=STRIPES.under_glare if known.stripes.under_glare else 0.0,

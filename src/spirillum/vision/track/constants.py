@@ -507,8 +507,12 @@ class CutConstants:
     """Time between two frames over the usual one from which on it is a gap, and no line goes across."""
     long_window: int = 30
     """Readings before and after a gap through which the lines go that tell whether time has passed."""
-    meeting: float = 0.5
-    """Share of the least jump below which two lines meet."""
+    clock_place: float = 0.3
+    """Distance of these lines below which they meet, pixels."""
+    clock_angle: float = 0.05
+    """Distance of these lines below which they meet, rad."""
+    clock_errors: float = 5.0
+    """Distance over its standard error below which they meet; errors of readings are not independent."""
     unseen: int = 20
     """Frames without the robot over which lines go on: it may be lost where it jumps."""
     advance: float = 0.5

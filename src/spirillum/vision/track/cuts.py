@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -21,7 +22,7 @@ from spirillum.vision.track.motion import Motion
 from spirillum.vision.track.size import LENGTHS
 from spirillum.vision.track.warnings import EVERYTHING
 
-__all__ = ["cuts_in", "jumps_of_time", "one_picture", "stands_still"]
+__all__ = ["Clock", "clock_of", "cuts_in", "one_picture", "stands_still"]
 
 
 def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
@@ -48,8 +49,20 @@ def cuts_in(motion: Motion, length_per_pixel: float) -> tuple[Flag, ...]:
     return ()
 
 
-def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tuple[Flag, ...]:
-    """Flag a jump of the time stamps over which the motion continues as if no time had passed.
+class Clock(NamedTuple):
+    """What the motion says of the largest gap between the times of the frames."""
+
+    relative_error: float
+    """Relative standard uncertainty that it leaves in the length of the film."""
+    flags: tuple[Flag, ...]
+
+
+def clock_of(motion: Motion, length_per_pixel: float, period: float) -> Clock:
+    """Compare the motion before and after the largest gap between times: has time passed, or did the clock jump?
+
+    Straight lines through the readings on both sides are extrapolated to its middle, by the times as they are and as if
+    no time had passed. Where all series meet by the second and not by the first, the clock has jumped. Where they meet
+    by both, as of a slow robot, the uncertainty holds both.
 
     Args:
         motion: the robot's motion.
@@ -57,27 +70,35 @@ def jumps_of_time(motion: Motion, length_per_pixel: float, period: float) -> tup
         period: period of the stripes, rad.
     """
     time, x, body_angle, tail_phase = motion
+    none = Clock(0.0, ())
     if time.size < 2:
-        return ()
+        return none
     steps = np.diff(time)
     usual, gap = float(np.median(steps)), int(np.argmax(steps))
     if not steps[gap] > CUTS.gap * usual:
-        return ()
+        return none
     closed = np.where(np.arange(time.size) > gap, time - (steps[gap] - usual), time)
     series = (
-        (x, CUTS.place * length_per_pixel, math.inf),
-        (body_angle, CUTS.angle, period),
-        (tail_phase, CUTS.angle, 2.0 * math.pi),
+        (x, CUTS.clock_place * length_per_pixel, math.inf),
+        (body_angle, CUTS.clock_angle, period),
+        (tail_phase, CUTS.clock_angle, 2.0 * math.pi),
     )
-    true, even = ([_mismatch(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
-    # That all three go on by chance is rare: angles would have to turn by whole periods, and the place to stay.
-    if math.hypot(*true) <= 1.0 or not max(even) < CUTS.meeting:
-        return ()
+    passed, jumped = ([_mismatch(t, values, gap, *rest) for values, *rest in series] for t in (time, closed))
+    if max(jumped) > 1.0:
+        return none
+    start, span = float(time[gap]), float(steps[gap])
+    if math.hypot(*passed) > 1.0:
+        sentence = (
+            f"the times of the frames jump by {span:.2f} s at {start:.2f} s, but body and tail go on as if no time had "
+            "passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
+        )
+        return Clock(0.0, (Flag("times-do-not-fit", sentence, EVERYTHING),))
     sentence = (
-        f"the times of the frames jump by {steps[gap]:.2f} s at {time[gap]:.2f} s, but body and tail go on as if no "
-        "time had passed: the time stamps are wrong; nothing is given (camera.frames_per_second would replace them)"
+        f"no frame was taken for {span:.3g} s at {start:.2f} s, and the robot moves so little meanwhile that its "
+        "motion does not tell whether that time has passed or the clock of the camera jumped: the intervals hold both "
+        f"(measure with --end {start:.2f}s or --start {start + span:.2f}s)"
     )
-    return (Flag("times-do-not-fit", sentence, EVERYTHING),)
+    return Clock(0.5 * (span - usual) / float(closed[-1] - closed[0]), (Flag("clock-in-doubt", sentence),))
 
 
 def one_picture(motion: Motion) -> tuple[Flag, ...]:
@@ -134,9 +155,10 @@ def _turned(angle: Samples) -> float:
 def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: float) -> float:
     """Mismatch, modulo `period`, of the lines fitted on both sides of the gap after frame `gap`, in its middle.
 
-    It is normalised by the threshold `least`, enlarged by the standard error of the extrapolation.
+    It is in units of what rates that are not quite steady explain (`least`, more where the lines go on for longer than
+    they were fitted), or of what the scatter of the readings does; 0 where too few are known.
     """
-    middle, far, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, []
+    middle, far, variance, reached = 0.5 * (time[gap] + time[gap + 1]), 0.0, 0.0, []
     for part in (slice(None, gap + 1), slice(gap + 1, None)):
         known = np.flatnonzero(np.isfinite(values[part]))
         known = known[-CUTS.long_window :] if part.start is None else known[: CUTS.long_window]
@@ -145,8 +167,12 @@ def _mismatch(time: Samples, values: Samples, gap: int, least: float, period: fl
         t, v = time[part][known], values[part][known]
         line = least_squares_line(t, v)
         reached.append(float(line.at(middle)))
-        far += 0.5 * ((middle - line.time) / (0.5 * float(np.ptp(t)))) ** 2
-    return float(abs(math.remainder(reached[1] - reached[0], period)) / (least * max(1.0, math.sqrt(far))))
+        away = middle - line.time
+        far += 0.5 * (away / (0.5 * float(np.ptp(t)))) ** 2
+        scatter = float(mad_scale(v - line.at(t)))
+        variance += scatter**2 * (1.0 / known.size + away**2 / float(np.sum((t - line.time) ** 2)))
+    unit = max(least * max(1.0, math.sqrt(far)), CUTS.clock_errors * math.sqrt(variance))
+    return abs(math.remainder(reached[1] - reached[0], period)) / unit
 
 
 def _jump(time: Samples, values: Samples, least: float, usual: float) -> float | None:

@@ -125,8 +125,8 @@ def gaps_of(time: Samples, index: Samples) -> tuple[Samples, tuple[Flag, ...]]:
         flags = (
             Flag(
                 "dropped-frames",
-                f"{missing} frames ({share:.1f} %) are missing, the longest gap is {longest:.3g} s: the true times are "
-                "used",
+                f"{missing} frames ({share:.1f} %) are missing by the times of the film, which are used; the longest "
+                f"gap is {longest:.3g} s",
             ),
         )
     return index[0] + whole, flags
